@@ -1,0 +1,54 @@
+# Each target sets up what it needs in .venv by itself; nothing but Python 3.11 or newer, pip and make has to be there.
+# Another Python: make PYTHON=python3.12 test (remove .venv first if it was made with a different one).
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+READY  := $(VENV)/ready
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint bench soak setup clean
+
+help:
+	@echo "make demo    run an example with activity in virtual time"
+	@echo "make test    run all tests (without the long ones)"
+	@echo "make lint    ruff and mypy"
+	@echo "make bench   run the benchmarks"
+	@echo "make soak    run the tests that take minutes"
+	@echo "make clean   remove .venv and everything tools have left"
+
+demo: $(READY)
+	$(BIN)/hfg run examples/fetch.py --clock virtual -v
+
+test: $(READY)
+	$(BIN)/python -m pytest
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(READY)
+	$(BIN)/python -m benchmarks
+
+soak: $(READY)
+	$(BIN)/python -m pytest -m soak --timeout 3600
+
+setup: $(READY)
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Made once, and made anew when pyproject.toml is newer. The old one goes first: an interrupted set-up never looks like a finished one.
+$(READY): pyproject.toml
+	@command -v "$(PYTHON)" >/dev/null 2>&1 || { \
+	  echo "hfg needs Python 3.11 or newer, but there is no '$(PYTHON)' here; name yours: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "hfg needs Python 3.11 or newer, but '$(PYTHON)' is $$("$(PYTHON)" --version 2>&1); name a newer one: make PYTHON=python3.12" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo "'$(PYTHON)' cannot make virtual environments, its modules venv or ensurepip are missing; install them (on Debian and Ubuntu the package python3-venv)" >&2; exit 1; }
+	rm -rf $(VENV)
+	"$(PYTHON)" -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,examples,bench]'
+	@touch $@
