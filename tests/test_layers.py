@@ -1,0 +1,156 @@
+"""The floors of the package hold: imports go down only, and nothing below the engine knows how to wait.
+
+The table says which floor a module or package stands on; every import statement counts, also inside functions and under
+`TYPE_CHECKING`, because a floor that only *names* the one above it cannot be read without it either.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+FLOORS = {
+    "hfg.errors": 0,
+    "hfg.problem": 0,
+    "hfg.token": 0,
+    "hfg.types": 0,
+    "hfg.clock": 0,
+    "hfg.trace": 0,
+    "hfg.ports": 1,
+    "hfg.transport": 1,
+    "hfg.nodetype": 2,
+    "hfg.signature": 2,
+    "hfg.registry": 2,
+    "hfg.graph": 3,
+    "hfg.activity": 4,
+    "hfg.engine": 5,
+    "hfg.nodes": 6,
+    "hfg.files": 6,
+    "hfg.cli": 7,
+    "hfg.studio": 7,
+    "hfg.__main__": 8,  # the two doors: they may see everything, and nobody sees them
+    "hfg": 8,
+    "hfg.testing": 8,
+}
+FIRST_FLOOR_THAT_WAITS = 5
+SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and what a node type is
+SAME_FLOOR_PAIRS = {("hfg.cli", "hfg.studio"), ("hfg.__main__", "hfg.cli"), ("hfg.testing", "hfg")}
+WAITING = {"asyncio", "anyio", "trio"}
+ORACLE_MUST_NOT_SHARE = ("hfg.ports", "hfg.activity", "hfg.engine")
+
+
+def modules(folder: str, source: Path) -> dict[str, Path]:
+    """Return every module below `source/folder` by its dotted name."""
+    found = {}
+    for file in sorted((source / folder).rglob("*.py")):
+        parts = file.relative_to(source).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+    return found
+
+
+HFG = modules("hfg", ROOT)
+TRANSPORTS = modules("hfg_transports", ROOT / "transports")
+ALL = HFG | TRANSPORTS
+
+
+def home(module: str) -> str | None:
+    """Return the entry of the table that the module belongs to: the longest prefix."""
+    parts = module.split(".")
+    for length in range(len(parts), 0, -1):
+        name = ".".join(parts[:length])
+        if name in FLOORS and (length > 1 or len(parts) == 1):
+            return name
+    return None
+
+
+def imported(module: str, file: Path) -> Iterator[tuple[str, int]]:
+    """Yield the full names of the modules that the file imports, with the line; relative imports are resolved."""
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    for statement in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
+        if isinstance(statement, ast.Import):
+            for alias in statement.names:
+                yield alias.name, statement.lineno
+        elif isinstance(statement, ast.ImportFrom):
+            base = statement.module or ""
+            if statement.level:
+                anchor = package.split(".")[: len(package.split(".")) - statement.level + 1]
+                base = ".".join([*anchor, base] if base else anchor)
+            for alias in statement.names:  # `from hfg import graph` imports hfg.graph, `from hfg import Graph` the door
+                full = f"{base}.{alias.name}"
+                yield (full if full in ALL else base), statement.lineno
+
+
+def violations(module: str, file: Path) -> list[str]:
+    """Return one sentence for each import that goes up, sideways or waits too low."""
+    place = home(module)
+    if place is None:
+        return [f"{module} stands on no floor: give it one in FLOORS of tests/test_layers.py"]
+    floor, found = FLOORS[place], []
+    for name, line in imported(module, file):
+        where = f"{module}:{line} (floor {floor})"
+        if name.split(".")[0] in WAITING and floor < FIRST_FLOOR_THAT_WAITS:
+            found.append(f"{where} imports {name}: only floor {FIRST_FLOOR_THAT_WAITS} and above may wait")
+        if name.split(".")[0] == "hfg_transports":
+            found.append(f"{where} imports {name}: the core finds transports by entry point, never by import")
+        if name.split(".")[0] != "hfg":
+            continue
+        other = home(name)
+        if other is None:
+            found.append(f"{where} imports {name}, which stands on no floor")
+        elif other != place and (place, other) not in SAME_FLOOR_PAIRS:
+            below = FLOORS[other] < floor or (FLOORS[other] == floor and floor in SAME_FLOOR_FREE)
+            if not below:
+                found.append(f"{where} imports {name} (floor {FLOORS[other]}): imports go down only")
+    return found
+
+
+@pytest.mark.parametrize("module", HFG)
+def test_imports_go_down_only(module: str) -> None:
+    found = violations(module, HFG[module])
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize("module", TRANSPORTS)
+def test_transports_see_floors_0_and_1_only(module: str) -> None:
+    for name, line in imported(module, TRANSPORTS[module]):
+        if name.split(".")[0] == "hfg":
+            place = home(name)
+            assert place is not None, f"{module}:{line} imports {name}, which stands on no floor"
+            assert FLOORS[place] <= 1, f"{module}:{line} imports {name} (floor {FLOORS[place]})"
+
+
+@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.testing.reference")])
+def test_the_oracle_shares_no_code_with_the_accused(module: str) -> None:
+    for name, line in imported(module, HFG[module]):
+        shared = name.startswith(ORACLE_MUST_NOT_SHARE)
+        assert not shared, f"{module}:{line} imports {name}: an oracle that shares code with the engine proves nothing"
+
+
+def test_the_table_names_only_what_exists_or_is_planned() -> None:
+    planned = {"hfg.transport", "hfg.registry", "hfg.signature", "hfg.activity", "hfg.nodes", "hfg.files", "hfg.studio"}
+    missing = {name for name in FLOORS if name not in HFG} - planned
+    assert not missing, f"FLOORS names modules that are gone: {sorted(missing)}"
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("import asyncio", "only floor 5 and above may wait"),
+        ("from anyio.abc import TaskGroup", "only floor 5 and above may wait"),
+        ("from ..engine import run", "imports hfg.engine"),
+        ("from hfg import engine", "imports hfg.engine"),
+        ("def f():\n    import hfg.engine.plan", "imports hfg.engine.plan"),
+        ("from hfg import Graph", "imports hfg (floor 8)"),
+        ("import hfg_transports", "never by import"),
+    ],
+)
+def test_the_walk_sees_every_way_to_import(tmp_path: Path, line: str, sentence: str) -> None:
+    """A walk that finds nothing would be green for ever."""
+    file = tmp_path / "structure.py"
+    file.write_text(line, encoding="utf-8")
+    assert sentence in "".join(violations("hfg.graph.structure", file))

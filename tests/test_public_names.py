@@ -1,0 +1,92 @@
+"""A name has one home, and `__all__` tells the truth about it."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import subprocess
+import sys
+from types import ModuleType
+
+import pytest
+
+import hfg
+from tests.test_layers import ALL, HFG
+
+PUBLIC = [name for name in ALL if not any(part.startswith("_") for part in name.split("."))]
+
+
+def order(name: str) -> tuple[int, str]:
+    """Sort as ruff's RUF022 does: constants, then classes, then the rest."""
+    return (0 if name.isupper() and len(name) > 1 else 1 if name[:1].isupper() else 2), name
+
+
+def tree(module: str) -> ast.Module:
+    return ast.parse(ALL[module].read_text(encoding="utf-8"))
+
+
+def loaded(module: str) -> ModuleType:
+    return importlib.import_module(module)
+
+
+@pytest.mark.parametrize("module", PUBLIC)
+def test_all_is_there_sorted_and_without_doubles(module: str) -> None:
+    exported = getattr(loaded(module), "__all__", None)
+    assert exported is not None, f"{module} has no __all__"
+    assert list(exported) == sorted(set(exported), key=order), f"{module}.__all__ is not sorted"
+
+
+@pytest.mark.parametrize("module", PUBLIC)
+def test_all_names_what_exists(module: str) -> None:
+    missing = [name for name in loaded(module).__all__ if not hasattr(loaded(module), name)]
+    assert not missing, f"{module}.__all__ names {missing}, which the module does not have"
+
+
+@pytest.mark.parametrize("module", PUBLIC)
+def test_public_definitions_are_in_all(module: str) -> None:
+    """A function or class that others must not use has an underscore, or lives in a module that has one."""
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+    defined = {node.name for node in tree(module).body if isinstance(node, kinds) and not node.name.startswith("_")}
+    left_out = sorted(defined - set(loaded(module).__all__))
+    assert not left_out, f"{module} defines {left_out} but does not list them in __all__"
+
+
+def test_the_face_is_complete() -> None:
+    """What `import hfg` shows is what `hfg.__all__` lists, and the other way round."""
+    shown = {
+        name for name, value in vars(hfg).items() if not name.startswith("_") and not isinstance(value, ModuleType)
+    }
+    shown -= {"annotations"}
+    listed = {name for name in hfg.__all__ if not isinstance(getattr(hfg, name), ModuleType)}
+    assert shown == listed
+
+
+def test_the_face_defines_nothing() -> None:
+    """`hfg/__init__.py` holds a layout comment, imports and `__all__`; every name has its home elsewhere."""
+    for statement in tree("hfg").body:
+        is_docstring = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+        is_all = isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == "__all__"
+        is_import = isinstance(statement, ast.Import | ast.ImportFrom)
+        assert is_docstring or is_all or is_import, f"hfg/__init__.py:{statement.lineno} defines something"
+
+
+def test_no_module_is_named_like_a_public_function() -> None:
+    """`hfg.node` must stay the function, whatever is imported in whatever order."""
+    submodules = {name.split(".")[1] for name in HFG if name.count(".") == 1}
+    clashes = sorted(name for name in submodules & set(hfg.__all__) if not isinstance(getattr(hfg, name), ModuleType))
+    assert not clashes
+
+
+def test_import_hfg_brings_neither_command_line_nor_test_tools() -> None:
+    code = "import sys, hfg; print(*sorted(name for name in sys.modules))"
+    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    unwanted = {"hfg.cli", "hfg.testing", "hfg_transports", "typer", "rich", "hypothesis", "pytest", "cv2"}
+    assert not unwanted & set(names)
+
+
+def test_virtual_time_is_at_the_door() -> None:
+    """The few names that README and docs lean on, so that a slip in `__all__` cannot hide with both halves of it."""
+    for name in ("Graph", "Node", "Subgraph", "Input", "Output", "Event", "Parameter", "State", "Token", "EndOfStream"):
+        assert name in hfg.__all__
+    for name in ("node", "slot", "run", "run_async", "running", "now", "VirtualTimeLoop"):
+        assert name in hfg.__all__
