@@ -1,0 +1,40 @@
+"""hfg: Activity Flow Graphs on asyncio.
+
+Which floor stands on which; imports go down only, and asyncio begins on floor 5:
+
+    7  cli      studio
+    6  nodes    files                              beside: testing (sees all; nobody below sees it)
+    5  engine                                      outside: hfg_transports (sees floors 0-1 only)
+    4  activity
+    3  graph
+    2  nodetype, functions  <-  declaration, signature, description         registry
+    1  ports                                       transport
+    0  errors   problem   token   types   clock   trace
+
+A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
+"""
+
+from hfg import errors
+from hfg.clock import now
+from hfg.errors import EndOfStream
+from hfg.functions import node
+from hfg.nodetype import Node
+from hfg.ports import Event, Input, Output, Parameter, State, slot
+from hfg.token import END, NO_MESSAGE, Token
+
+__all__ = [
+    "END",
+    "NO_MESSAGE",
+    "EndOfStream",
+    "Event",
+    "Input",
+    "Node",
+    "Output",
+    "Parameter",
+    "State",
+    "Token",
+    "errors",
+    "node",
+    "now",
+    "slot",
+]

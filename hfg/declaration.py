@@ -1,0 +1,255 @@
+"""Makes a `NodeType` of a class body, and refuses bodies that cannot work.
+
+Stands on ports, `signature` and `description`; `Node` calls it when a subclass is made.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import types
+from collections.abc import Callable, Iterable
+from typing import Any, Final, TypeAlias
+
+from hfg.description import EventSpec, InputSpec, NodeType, OutputSpec, Result, SlotSpec
+from hfg.errors import DeclarationError, UsageError
+from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS
+from hfg.ports.base import Relaying
+from hfg.ports.events import Event
+from hfg.ports.inputs import Input
+from hfg.ports.outputs import Output
+from hfg.ports.parameters import REQUIRED, Parameter, ParameterSpec
+from hfg.ports.slots import UNSET, Slot
+from hfg.ports.states import State
+from hfg.signature import MISSING, Signature, hints_of, kind_of, read_signature, split_token
+
+__all__ = ["HOOKS", "RESERVED", "Shared", "check_names", "declare", "snake_case"]
+
+HOOKS: Final = ("setup", "ready", "end", "teardown", "on_activated", "on_deactivated")
+"""Methods of a node that a runner calls besides `process`."""
+
+RESERVED: Final = frozenset({*HOOKS, "process", "ports", "place", "active", "log", "inner", *AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS})
+"""Every public name of `Node`; a test keeps the list closed."""
+
+_SUBGRAPH_RESERVED: Final = RESERVED | {"graph", "build", "iterate_over"}
+
+Declaration: TypeAlias = Input[Any] | Output[Any] | Event[Any] | Slot[Any] | Parameter[Any] | State[Any]
+_DECLARATIONS: Final = (Input, Output, Event, Slot, Parameter, State)
+
+
+class Shared:
+    """Stands on a class where an input side and an output side have one name: the short form would be a guess."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __get__(self, node: Any, owner: Any) -> Any:
+        if node is None:
+            return self
+        raise shared_name(node, self.name)
+
+
+def shared_name(node: Any, name: str) -> Exception:
+    """Make the refusal that names both ports."""
+    kinds = [kind for kind in ("inputs", "outputs", "events", "slots") if name in getattr(node._type, kind)]
+    both = " or ".join(f'node.ports.{kind}["{name}"]' for kind in kinds)
+    return UsageError(f'"{name}" of {node._type.name} is two ports; write {both}')
+
+
+def snake_case(name: str) -> str:
+    """Turn a class name into the default name of its nodes: MapLookup -> map_lookup, HTTPServer -> http_server."""
+    words = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1_\2", name.strip("_<>"))
+    return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", words).lower()
+
+
+def declare(cls: type, base: type) -> NodeType:
+    """Describe a subclass of `base`, which is `Node`; ports that `process` declares are added to the class."""
+    where = f"node type {cls.__qualname__}"
+    is_subgraph = issubclass(cls, Relaying)
+    _wrap_overridden_slots(cls, base)
+    declared = _declared(cls, base, where)
+    of = {kind: {n: d for n, d in declared.items() if isinstance(d, kind)} for kind in (Input, Output, Event, Slot, Parameter, State)}
+    parameters = {name: parameter.spec() for name, parameter in of[Parameter].items()}
+    inputs = {name: InputSpec(name, d.type, d.optional, d.default) for name, d in of[Input].items()}
+    outputs = {name: OutputSpec(name, d.type) for name, d in of[Output].items()}
+    process = getattr(cls, "process")
+    signature = None
+    if process is not getattr(base, "process"):
+        if is_subgraph:
+            raise DeclarationError(f"{where}: a subgraph does not fire itself; put the work into a node and add it in build()")
+        signature = _read_process(cls, process, inputs, where)
+        inputs = {spec.name: spec for spec in signature.inputs}
+        parameters.update((spec.name, spec) for spec in signature.parameters if spec.name not in parameters)
+        outputs = outputs or _outputs(signature, where, must_say=not of[Input])
+    events = {name: EventSpec(name, d.type) for name, d in of[Event].items()}
+    slots = {name: _slot_spec(cls, d, where, is_subgraph) for name, d in of[Slot].items()}
+    for spec in parameters.values():
+        if spec.trigger:
+            events[spec.name], slots[spec.name] = EventSpec(spec.name, spec.type), SlotSpec(spec.name, spec.type or object)
+    result: Result = "none" if not outputs else "single" if len(outputs) == 1 else "fields"
+    kind = NodeType(
+        name=snake_case(cls.__name__),
+        origin=cls,
+        module=cls.__module__,
+        qualname=cls.__qualname__,
+        doc=inspect.cleandoc(cls.__dict__.get("__doc__") or ""),
+        inputs=types.MappingProxyType(inputs),
+        outputs=types.MappingProxyType(outputs),
+        events=types.MappingProxyType(events),
+        slots=types.MappingProxyType(slots),
+        parameters=types.MappingProxyType(parameters),
+        states=types.MappingProxyType(of[State]),
+        process_kind="none" if signature is None else signature.kind,
+        result=result,
+        is_subgraph=is_subgraph,
+        shared=shared_names(inputs, outputs, events, slots),
+        declared=declared,
+        hooks=frozenset(name for name in HOOKS if getattr(cls, name) is not getattr(base, name)),
+        caller=None if signature is None else _caller(signature),
+    )
+    check_names(kind, where, _SUBGRAPH_RESERVED if is_subgraph else RESERVED)
+    install_ports(cls, kind, base)
+    return kind
+
+
+def _caller(signature: Signature) -> Callable[[Any], Callable[..., Any]]:
+    plan = signature.plan
+    return lambda node: plan.bind(node.process, node._parameters)
+
+
+def _declared(cls: type, base: type, where: str) -> dict[str, Declaration]:
+    """Collect declarations, bases first; what `process` of a base declared is read anew."""
+    found: dict[str, Declaration] = {}
+    for owner in reversed(cls.__mro__):
+        if owner is base or owner is object:
+            continue
+        for name, value in vars(owner).items():
+            if isinstance(value, _DECLARATIONS):
+                if getattr(value, "inferred", False):
+                    continue
+                if value.name != name:
+                    raise DeclarationError(f'{where}: "{name}" and "{value.name}" are the same object; declare each port by a call of its own')
+                found[name] = value
+            elif name in found and not name.startswith("__"):
+                raise DeclarationError(f'{where}: "{name}" is a port or parameter of {owner.__bases__[0].__name__}, overwritten by {value!r}; use another name')
+    return found
+
+
+def _wrap_overridden_slots(cls: type, base: type) -> None:
+    """A method that overrides a slot's handler is a handler too, decorated or not."""
+    for name, value in list(vars(cls).items()):
+        inherited = next((vars(owner)[name] for owner in cls.__mro__[1:] if name in vars(owner)), None)
+        if inspect.isfunction(value) and isinstance(inherited, Slot) and inherited.handler is not None:
+            made: Slot[Any] = Slot(value, UNSET if _argument(value) in getattr(value, "__annotations__", {}) else inherited.type)
+            if made.type is UNSET and _argument(value) is not None and _argument(value) not in value.__annotations__:
+                made.type = _slot_type(inherited, name)
+            made.name = name
+            setattr(cls, name, made)
+
+
+def _slot_type(inherited: Slot[Any], name: str) -> Any:
+    argument = _argument(inherited.handler)
+    return split_token(hints_of(inherited.handler, f"slot {name}").get(argument or "", Any))[0] if inherited.type is UNSET else inherited.type
+
+
+def _argument(handler: Any) -> str | None:
+    """Give the name of a handler's argument behind self."""
+    names = [a.name for a in inspect.signature(handler).parameters.values()]
+    return names[1] if len(names) > 1 else None
+
+
+def _slot_spec(cls: type, slot: Slot[Any], where: str, is_subgraph: bool) -> SlotSpec:
+    name = slot.name
+    if slot.handler is None:
+        if not is_subgraph:
+            raise DeclarationError(f'{where}: slot "{name}" has no handler; write `@hfg.slot` above `def {name}(self, value: int)`')
+        return SlotSpec(name, object if slot.type is UNSET else slot.type)
+    arguments = list(inspect.signature(slot.handler).parameters.values())[1:]
+    needed = [a for a in arguments if a.default is a.empty and a.kind not in (a.VAR_KEYWORD, a.VAR_POSITIONAL)]
+    if len(needed) > 1 or any(a.kind is a.KEYWORD_ONLY for a in needed):
+        names = ", ".join(a.name for a in needed)
+        raise DeclarationError(f'{where}: the handler of slot "{name}" needs {len(needed)} arguments ({names}), but a signal has one value; take at most one')
+    positional = [a for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
+    runs = "async" in kind_of(slot.handler)
+    if not positional:
+        return SlotSpec(name, object if slot.type is UNSET else slot.type, name, False, False, runs)
+    hint = hints_of(slot.handler, f'{where}, slot "{name}"').get(positional[0].name, MISSING)
+    if hint is MISSING and slot.type is UNSET:
+        raise DeclarationError(f'{where}: argument "{positional[0].name}" of slot "{name}" has no annotation; write `{positional[0].name}: int` or `@hfg.slot(type=int)`')
+    type_, token = split_token(hint) if hint is not MISSING else (slot.type, False)
+    return SlotSpec(name, type_ if slot.type is UNSET else slot.type, name, True, token, runs)
+
+
+def _read_process(cls: type, process: Any, inputs: dict[str, InputSpec], where: str) -> Signature:
+    bound = inspect.isfunction(inspect.getattr_static(cls, "process"))
+    return read_signature(process, where, known=inputs, bound=bound)
+
+
+def _outputs(signature: Signature, where: str, *, must_say: bool) -> dict[str, OutputSpec]:
+    """Give the one output "out" of a return annotation; silence about it is only allowed beside declared inputs."""
+    if signature.output is MISSING:
+        if must_say:
+            raise DeclarationError(f"{where}: process says nothing about its result; annotate it, `-> int` for an output, `-> None` for none")
+        return {}
+    return {} if signature.output is None else {"out": OutputSpec("out", signature.output)}
+
+
+def shared_names(inputs: Iterable[str], outputs: Iterable[str], events: Iterable[str], slots: Iterable[str]) -> frozenset[str]:
+    """Give the names that mean a port on both sides."""
+    return frozenset({*inputs, *slots} & {*outputs, *events})
+
+
+def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED) -> None:
+    """Refuse names that are taken, twice or no names.
+
+    Raises:
+      DeclarationError: naming the port and the remedy.
+    """
+    triggers = {name for name, spec in kind.parameters.items() if spec.trigger}
+    values = [name for name in kind.parameters if name not in triggers]
+    for side in ([*kind.inputs, *kind.slots, *values], [*kind.outputs, *kind.events, *values]):
+        doubled = next((name for name in side if side.count(name) > 1), None)
+        if doubled is not None:
+            raise DeclarationError(f'{where}: two ports are called "{doubled}"; rename one{_rename(kind, doubled)}')
+    for name in [*kind.inputs, *kind.outputs, *kind.events, *kind.slots, *values, *kind.states]:
+        if name in reserved:
+            raise DeclarationError(f'{where}: "{name}" is reserved for every node; choose another name{_rename(kind, name)}')
+        if not name.isidentifier() or name.startswith("_"):
+            raise DeclarationError(f'{where}: "{name}" cannot be the name of a port; use letters, digits and underscores, a letter first{_rename(kind, name)}')
+    for spec in kind.parameters.values():
+        check_default(spec, where)
+
+
+def _rename(kind: NodeType, name: str) -> str:
+    return f', as in inputs={{"{name}": "{name}_in"}}' if kind.is_function and name in kind.inputs else ""
+
+
+def check_default(spec: ParameterSpec, where: str) -> None:
+    """Refuse a default that breaks its own limits."""
+    wrong = None if spec.trigger or spec.default is REQUIRED else spec.check(spec.default)
+    if wrong is not None:
+        raise DeclarationError(f'{where}: the default of parameter "{spec.name}" {wrong}; change the default or the limit')
+
+
+def install_ports(cls: type, kind: NodeType, base: type) -> None:
+    """Make ports that were read from a function attributes of the class, as if they had been declared there."""
+    for name in kind.shared:
+        if not isinstance(kind.declared.get(name), Parameter):
+            setattr(cls, name, Shared(name))
+    made: list[Any] = [Input(spec.type, optional=spec.optional, default=spec.default) for spec in kind.inputs.values()]
+    made += [Output(spec.type) for spec in kind.outputs.values()]
+    names = [*kind.inputs, *kind.outputs]
+    for spec in kind.parameters.values():
+        made.append(Parameter(spec.default, *spec.limits, unit=spec.unit, choices=spec.choices, type=spec.type))
+        names.append(spec.name)
+    for name, declaration in zip(names, made, strict=True):
+        if name in kind.declared or name in kind.shared:
+            continue
+        taken = next((owner for owner in cls.__mro__ if owner is not base and name in vars(owner)), None)
+        if taken is not None and not getattr(vars(taken)[name], "inferred", False) and not isinstance(vars(taken)[name], Shared):
+            raise DeclarationError(
+                f'node type {cls.__qualname__}: "{name}" is both a port that process declares and an attribute of {taken.__name__}; rename one of them'
+            )
+        declaration.name = name
+        declaration.inferred = True
+        setattr(cls, name, declaration)

@@ -1,0 +1,128 @@
+"""What is known of a node type: its ports, its process function and where to find it, as plain data computed once at declaration.
+
+Files, the studio, checks and runners read a node type here and never look at the class. Stands on ports; knows neither `Node` nor graphs.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import msgspec
+
+from hfg.ports.parameters import ParameterSpec
+from hfg.ports.states import State
+
+__all__ = ["EventSpec", "InputSpec", "NodeType", "OutputSpec", "ProcessKind", "Result", "SlotSpec", "look_up"]
+
+ProcessKind = Literal["none", "function", "async", "generator", "async generator"]
+Result = Literal["none", "single", "fields"]
+
+
+class InputSpec(msgspec.Struct, frozen=True):
+    """An input; `token`: the process function wants the token itself, not its value."""
+
+    name: str
+    type: Any
+    optional: bool = False
+    default: Any = None
+    token: bool = False
+
+
+class OutputSpec(msgspec.Struct, frozen=True):
+    """An output."""
+
+    name: str
+    type: Any
+
+
+class EventSpec(msgspec.Struct, frozen=True):
+    """An event; type None means its signals carry no value."""
+
+    name: str
+    type: Any
+
+
+class SlotSpec(msgspec.Struct, frozen=True):
+    """A slot.
+
+    Attributes:
+      handler_name: the method, or "" if there is none: a trigger parameter's, which triggers the event of its name, and a subgraph's.
+      takes_value: the handler has an argument for the value, or for the token if `token`.
+    """
+
+    name: str
+    type: Any
+    handler_name: str = ""
+    takes_value: bool = False
+    token: bool = False
+    is_async: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeType:
+    """A node type; one object for all its nodes.
+
+    Attributes:
+      name: in snake case, the default name of its nodes.
+      origin: what a user calls to make a node: the class, or the `NodeFunction`.
+      module: where it was declared.
+      doc: its docstring, indentation taken off.
+      process_kind: how the process function runs; "none" lives by its slots.
+      result: how what the function gives back maps to outputs: "none" of it, the "single" output, or "fields", one each in order.
+      fields: attribute names to read a "fields" result by, for results that are no sequence.
+      shared: names that an input side and an output side both use; the short form `node.name` is refused for them.
+      declared: the declarations in the class by name; identity tells a method reached by `super()` from the node's own.
+      hooks: the hooks it overrides.
+      caller: makes `node._process_call()`.
+    """
+
+    name: str
+    origin: Any
+    module: str
+    qualname: str
+    doc: str
+    inputs: Mapping[str, InputSpec] = field(default_factory=dict)
+    outputs: Mapping[str, OutputSpec] = field(default_factory=dict)
+    events: Mapping[str, EventSpec] = field(default_factory=dict)
+    slots: Mapping[str, SlotSpec] = field(default_factory=dict)
+    parameters: Mapping[str, ParameterSpec] = field(default_factory=dict)
+    states: Mapping[str, State[Any]] = field(default_factory=dict)
+    process_kind: ProcessKind = "none"
+    result: Result = "none"
+    fields: tuple[str, ...] = ()
+    is_subgraph: bool = False
+    is_function: bool = False
+    shared: frozenset[str] = frozenset()
+    declared: Mapping[str, Any] = field(default_factory=dict)
+    hooks: frozenset[str] = frozenset()
+    caller: Callable[[Any], Callable[..., Any]] | None = None
+
+    @property
+    def is_source(self) -> bool:
+        """Whether it fires without inputs; belongs to the type, never to how it is connected (rule F2)."""
+        return self.process_kind != "none" and not self.inputs
+
+    @property
+    def reference(self) -> str | None:
+        """Where to find it, "module:qualname"; None for what has no name of its own: lambdas and types made inside functions."""
+        for module, qualname in self._places():
+            if "<" not in qualname and look_up(module, qualname) is self.origin:
+                return f"{module}:{qualname}"
+        return None
+
+    def _places(self) -> list[tuple[str, str]]:
+        """Where it may be: under its own name, else under the name that its module gave it (`smooth = hfg.node(cv2.medianBlur)`)."""
+        places = [(self.module, self.qualname)]
+        names = vars(sys.modules.get(self.module, object)).items()
+        return places + [(self.module, name) for name, value in list(names) if value is self.origin]
+
+
+def look_up(module: str, qualname: str) -> Any:
+    """Find a name in a module that is already imported; None if there is no such name."""
+    found: Any = sys.modules.get(module)
+    for part in qualname.split("."):
+        found = getattr(found, part, None)
+    return found

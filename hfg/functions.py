@@ -1,0 +1,268 @@
+"""Node types as functions: `hfg.node` turns any function into something that makes nodes.
+
+Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output "out"; what a library does not say is said in the call.
+Stands on `nodetype` and `signature`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import sys
+import types
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, TypeVar, cast, overload
+
+import msgspec
+import numpy as np
+from typing_extensions import TypeForm
+
+from hfg.declaration import RESERVED, check_names, install_ports, shared_names, snake_case
+from hfg.description import InputSpec, NodeType, OutputSpec, Result
+from hfg.errors import DeclarationError
+from hfg.nodetype import Node
+from hfg.ports.outputs import OutputPort
+from hfg.ports.parameters import Parameter, ParameterSpec
+from hfg.signature import MISSING, CallPlan, Signature, function_name, hints_of_class, output_type, read_signature
+
+__all__ = ["FunctionNode", "NodeFunction", "node"]
+
+P = ParamSpec("P")
+R = TypeVar("R")
+T = TypeVar("T")
+R_co = TypeVar("R_co", covariant=True)
+A = TypeVar("A")
+B = TypeVar("B")
+C = TypeVar("C")
+D = TypeVar("D")
+E = TypeVar("E")
+F = TypeVar("F")
+
+
+class FunctionNode(Node, Generic[T]):
+    """A node whose type is a function; `out` is its output unless outputs= gave others."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def out(self) -> OutputPort[T]: ...
+
+        # Inputs and parameters have the names of the function's arguments, which no annotation can express.
+        def __getattr__(self, name: str) -> Any: ...
+
+
+class NodeFunction(Generic[P, R_co]):
+    """A node type made of a function; calling it with parameters makes a node.
+
+    Attributes:
+      function: the function itself.
+    """
+
+    def __init__(self, function: Callable[..., R_co], node_class: type[Node]) -> None:
+        self.function = function
+        self._class = node_class
+        self._type = node_class._type
+        for name in ("__module__", "__name__", "__qualname__", "__doc__"):
+            if hasattr(function, name):
+                setattr(self, name, getattr(function, name))
+        self.__wrapped__ = function
+
+    @overload
+    def __call__(self: NodeFunction[P, Coroutine[Any, Any, T | None]], *args: P.args, **parameters: P.kwargs) -> FunctionNode[T]: ...
+    @overload
+    def __call__(self: NodeFunction[P, Iterator[T | None]], *args: P.args, **parameters: P.kwargs) -> FunctionNode[T]: ...
+    @overload
+    def __call__(self: NodeFunction[P, AsyncIterator[T | None]], *args: P.args, **parameters: P.kwargs) -> FunctionNode[T]: ...
+    @overload
+    def __call__(self: NodeFunction[P, T | None], *args: P.args, **parameters: P.kwargs) -> FunctionNode[T]: ...
+    def __call__(self, *args: Any, **parameters: Any) -> Any:
+        """Make a node.
+
+        Raises:
+          TypeError: called like the function itself.
+          ValueError: a value breaks the parameter's limits.
+        """
+        return self._class(*args, **parameters)
+
+    def __repr__(self) -> str:
+        return f"<node type {self._type.name}>"
+
+
+# One overload for each number of positional arguments: they are inputs and no part of the call that makes a node.
+@overload
+def node(function: Callable[Concatenate[A, B, C, D, E, F, P], R], /) -> NodeFunction[P, R]: ...
+@overload
+def node(function: Callable[Concatenate[A, B, C, D, E, P], R], /) -> NodeFunction[P, R]: ...
+@overload
+def node(function: Callable[Concatenate[A, B, C, D, P], R], /) -> NodeFunction[P, R]: ...
+@overload
+def node(function: Callable[Concatenate[A, B, C, P], R], /) -> NodeFunction[P, R]: ...
+@overload
+def node(function: Callable[Concatenate[A, B, P], R], /) -> NodeFunction[P, R]: ...
+@overload
+def node(function: Callable[Concatenate[A, P], R], /) -> NodeFunction[P, R]: ...
+@overload
+def node(function: Callable[P, R], /) -> NodeFunction[P, R]: ...
+@overload
+def node(
+    function: Callable[..., Any],
+    /,
+    *,
+    inputs: Mapping[str, Any] | None = None,
+    outputs: TypeForm[T],
+    parameters: Mapping[str, Any] | None = None,
+) -> NodeFunction[..., T]: ...
+@overload
+def node(
+    function: Callable[..., Any],
+    /,
+    *,
+    inputs: Mapping[str, Any] | None = None,
+    outputs: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> NodeFunction[..., Any]: ...
+@overload
+def node(
+    *, inputs: Mapping[str, Any] | None = None, outputs: Any = None, parameters: Mapping[str, Any] | None = None
+) -> Callable[[Callable[..., Any]], NodeFunction[..., Any]]: ...
+def node(
+    function: Callable[..., Any] | None = None,
+    /,
+    *,
+    inputs: Mapping[str, Any] | None = None,
+    outputs: Any = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> Any:
+    """Make a node type of a function.
+
+    Args:
+      function: with annotations; else `inputs` and `outputs` say what it does not. A generator, sync or async, is a source.
+      inputs: argument name -> type, or -> new name as a string.
+      outputs: one type; or a NamedTuple or dataclass, or a mapping from name to type, whose fields become one output each.
+      parameters: argument name -> default.
+
+    Raises:
+      DeclarationError: what is missing, and the call to write.
+
+    Example:
+      >>> @node
+      ... def scale(value: float, *, factor: float = 2.0) -> float:
+      ...     return factor * value
+      >>> scale(factor=3.0)
+      <scale(factor=3.0)>
+      >>> scale.function(1.5)
+      3.0
+    """
+    if function is None:
+        return functools.partial(node, inputs=inputs, outputs=outputs, parameters=parameters)
+    if isinstance(function, NodeFunction) or inspect.isclass(function) and issubclass(function, Node):
+        raise DeclarationError(f"{function_name(function)} is a node type already; use it as it is")
+    if not callable(function):
+        raise DeclarationError(f"hfg.node needs a function, got {function!r}; options are given by keyword, as in hfg.node(outputs=Found)")
+    caller = sys._getframe(1)
+    while caller.f_globals.get("__name__") == "functools" and caller.f_back is not None:
+        caller = caller.f_back
+    return _make(function, inputs, outputs, parameters, caller.f_globals.get("__name__", "__main__"))
+
+
+def _make(
+    function: Callable[..., Any], inputs: Mapping[str, Any] | None, outputs: Any, parameters: Mapping[str, Any] | None, module: str
+) -> NodeFunction[..., Any]:
+    name = function_name(function)
+    where = f"node type {name}"
+    signature = _read(function, where, inputs, outputs, parameters)
+    output_specs, fields = _read_outputs(function, where, outputs, signature)
+    result: Result = "none" if not output_specs else "fields" if fields is not None else "single"
+    plan = signature.plan
+    inputs_by_name = {spec.name: spec for spec in signature.inputs}
+    if len(inputs_by_name) < len(signature.inputs):
+        raise DeclarationError(f"{where}: two inputs have the same name; give each its own in inputs=")
+
+    def call_of(made: Node) -> Callable[..., Any]:
+        return plan.bind(function, made._parameters)
+
+    def describe_type(cls: type[Node]) -> NodeType:
+        made = NodeType(
+            name=snake_case(name) or "function",
+            origin=cls,  # the NodeFunction takes this place below
+            module=module,
+            qualname=getattr(function, "__qualname__", name) if getattr(function, "__module__", None) == module else name,
+            doc=inspect.cleandoc(getattr(function, "__doc__", None) or ""),
+            inputs=types.MappingProxyType(inputs_by_name),
+            outputs=types.MappingProxyType({spec.name: spec for spec in output_specs}),
+            parameters=types.MappingProxyType({spec.name: spec for spec in signature.parameters}),
+            process_kind=signature.kind,
+            result=result,
+            fields=fields or (),
+            is_function=True,
+            shared=shared_names(inputs_by_name, [spec.name for spec in output_specs], (), ()),
+            caller=call_of,
+        )
+        check_names(made, where, RESERVED)
+        install_ports(cls, made, Node)
+        return made
+
+    body = {"__module__": module, "__qualname__": getattr(function, "__qualname__", name), "__doc__": getattr(function, "__doc__", None)}
+    node_class = cast(type[Node], types.new_class(name, (FunctionNode,), {"_made": describe_type}, lambda namespace: namespace.update(body)))
+    made = NodeFunction(function, node_class)
+    made._type = node_class._type = dataclasses.replace(node_class._type, origin=made)
+    return made
+
+
+def _read(
+    function: Callable[..., Any], where: str, inputs: Mapping[str, Any] | None, outputs: Any, parameters: Mapping[str, Any] | None
+) -> Signature:
+    if isinstance(function, np.ufunc) and inputs is None and not parameters:
+        names = ["x"] if function.nin == 1 else [f"x{number}" for number in range(1, function.nin + 1)]
+        plan = CallPlan(tuple(range(function.nin)))
+        return Signature(tuple(InputSpec(name, Any) for name in names), (), MISSING, "function", plan)
+    declared = {name: value for name, value in (parameters or {}).items() if isinstance(value, Parameter)}
+    defaults = {name: value.default if name in declared else value for name, value in (parameters or {}).items()}
+    signature = read_signature(function, where, inputs=inputs, parameters=defaults)
+    if not declared:
+        return signature
+
+    def complete(spec: ParameterSpec) -> ParameterSpec:
+        return spec if spec.name not in declared else msgspec.structs.replace(declared[spec.name].spec(), name=spec.name)
+
+    return dataclasses.replace(signature, parameters=tuple(complete(spec) for spec in signature.parameters))
+
+
+def _read_outputs(function: Any, where: str, outputs: Any, signature: Signature) -> tuple[list[OutputSpec], tuple[str, ...] | None]:
+    """Give the outputs, and the field names if the result is split; None if it is one value."""
+    if isinstance(outputs, Mapping):
+        return [OutputSpec(name, hint) for name, hint in outputs.items()], tuple(outputs)
+    if outputs is not None:
+        fields = _fields_of(outputs, where)
+        if fields is not None:
+            return [OutputSpec(name, output_type(hint)) for name, hint in fields.items()], tuple(fields)
+        return [OutputSpec("out", output_type(outputs))], None
+    if isinstance(function, np.ufunc):
+        if function.nout == 1:
+            return [OutputSpec("out", Any)], None
+        names = [f"out{number}" for number in range(1, function.nout + 1)]
+        return [OutputSpec(name, Any) for name in names], tuple(names)
+    if signature.output is MISSING:
+        given = ", inputs={...}" if signature.inputs and not inspect.isfunction(function) else ""
+        raise DeclarationError(
+            f"{where}: nothing says what it gives back; annotate the result (`-> None` for a sink), or write hfg.node({function_name(function)}{given}, outputs=Any)"
+        )
+    return ([] if signature.output is None else [OutputSpec("out", signature.output)]), None
+
+
+def _fields_of(outputs: Any, where: str) -> dict[str, Any] | None:
+    """Give the fields of a NamedTuple, dataclass or msgspec struct; None for any other type."""
+    if not inspect.isclass(outputs):
+        return None
+    named_tuple = issubclass(outputs, tuple) and hasattr(outputs, "_fields")
+    if not (named_tuple or dataclasses.is_dataclass(outputs) or issubclass(outputs, msgspec.Struct)):
+        return None
+    hints = hints_of_class(outputs, where)
+    if named_tuple:
+        names: tuple[str, ...] = outputs._fields
+    elif dataclasses.is_dataclass(outputs):
+        names = tuple(item.name for item in dataclasses.fields(outputs))
+    else:
+        names = outputs.__struct_fields__
+    return {name: hints.get(name, Any) for name in names}

@@ -1,0 +1,373 @@
+"""Node types as classes: `Node`, what it offers to users, and what a runner does with it.
+
+A node is a type, parameters and options, nothing else: it can always be made again from its reference and parameters, so copies, files, workers and reload work.
+What is the same for all nodes of a type lies in its `NodeType`; a node holds its parameters and the ports that somebody asked for.
+Stands on ports, `declaration` and `description`; knows neither graphs nor who runs it.
+"""
+
+from __future__ import annotations
+
+import copy
+import logging
+from collections.abc import Callable, MutableMapping
+from typing import Any, ClassVar, Final, TypeVar
+
+import msgspec
+
+from hfg.declaration import declare
+from hfg.description import NodeType
+from hfg.errors import DeclarationError, EngineInternalError, UsageError
+from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, SUBGRAPH_EVENTS, SUBGRAPH_SLOTS, automatic_event, automatic_slot
+from hfg.ports.base import Kind, Port, Source, Target
+from hfg.ports.events import EventPort
+from hfg.ports.inputs import InputPort
+from hfg.ports.outputs import OutputPort
+from hfg.ports.parameters import REQUIRED, ParameterPort
+from hfg.ports.slots import SlotPort
+from hfg.ports.views import Ports
+from hfg.token import Token
+
+__all__ = ["Node", "NodeType", "Place"]
+
+Other = TypeVar("Other")
+
+_NO_PARAMETERS: Final[dict[str, Any]] = {}  # shared by all nodes without any; never written, since there is no name to write
+_NOTHING: Final[frozenset[str]] = frozenset()
+
+
+class Place(msgspec.Struct, frozen=True):
+    """Where a node is: its graph, its name there, and its path from the root, "subgraph/node"."""
+
+    graph: Any
+    name: str
+    path: str
+
+
+class Node:
+    """Base of node types that are classes; see `hfg.node` for functions.
+
+    Ports, parameters and state are declared in the class body (`hfg.Input`, `Output`, `Event`, `slot`, `Parameter`, `State`); without declared ports the
+    arguments and the return annotation of `process` declare them. A type without `process` never fires and lives by its slots. There is no `__init__`:
+    nothing is opened before `setup()`.
+
+    Example:
+      >>> class Count(Node):
+      ...     '''Count the values.'''
+      ...     def process(self, value: object) -> int:
+      ...         self.total = getattr(self, "total", 0) + 1
+      ...         return self.total
+      >>> Count().ports
+      <ports <inputs ['value']> <outputs ['out']> <events []> <slots []> <parameters []>>
+    """
+
+    # Slots keep what hfg needs apart from what users write on `self`: a run starts fresh by looking at the instance's dictionary alone.
+    __slots__ = ("__dict__", "__weakref__", "_active", "_before", "_log", "_options", "_parameters", "_place")
+
+    _type: ClassVar[NodeType]
+    _active: bool  # A(v) during a run; written by the runner
+    _before: frozenset[str] | None  # attributes that users set before the first run; None before it
+    _log: logging.LoggerAdapter[logging.Logger] | None
+    _options: Any  # written by the graph
+    _parameters: dict[str, Any]  # the live values; change them by `_set_parameter`
+    _place: Place | None  # written by the graph
+
+    activated = automatic_event("activated")
+    deactivated = automatic_event("deactivated")
+    processed = automatic_event("processed")
+    failed = automatic_event("failed")
+    timeout = automatic_event("timeout")
+    enable = automatic_slot("enable")
+    disable = automatic_slot("disable")
+    activate = automatic_slot("activate")
+    deactivate = automatic_slot("deactivate")
+    reset = automatic_slot("reset")
+
+    def __init__(self, *positional: Any, **parameters: Any) -> None:
+        """Make a node; parameters by keyword only.
+
+        Raises:
+          TypeError: a value without a name, or a parameter that the type does not have, or one without default is missing.
+          ValueError: a value breaks the parameter's limits.
+        """
+        self._active = False
+        self._before = None
+        self._log = None
+        self._options = None
+        self._place = None
+        if positional:
+            raise TypeError(_positional(self._type))
+        self._parameters = _values(self._type, parameters) if parameters or self._type.parameters else _NO_PARAMETERS
+
+    def __init_subclass__(cls, *, _made: Callable[[type[Node]], NodeType] | None = None, **arguments: Any) -> None:
+        super().__init_subclass__(**arguments)
+        if cls.__init__ is not Node.__init__:
+            raise DeclarationError(
+                f"node type {cls.__name__}: __init__ is not overridden, a node is made from its parameters alone; "
+                "declare hfg.Parameter and hfg.State, and open things in setup()"
+            )
+        cls._type = declare(cls, Node) if _made is None else _made(cls)
+
+    # --- for users ---------------------------------------------------------------------------------------------------------------------------------------
+
+    def setup(self) -> Any:
+        """Open what a run needs; called before the first firing and after `reset`. May be async, like all hooks."""
+
+    def process(self, *inputs: Any, **parameters: Any) -> Any:
+        """Work on one token from every input; overridden, or the node never fires."""
+
+    def ready(self) -> Any:
+        """Say whether the node may fire now; asked last (rule F1)."""
+        return True
+
+    def end(self) -> Any:
+        """Give the last outputs when the inputs have ended (rule F4)."""
+
+    def teardown(self) -> Any:
+        """Close what `setup` opened; called in any case."""
+
+    def on_activated(self) -> Any:
+        """Learn that A(v) became 1."""
+
+    def on_deactivated(self) -> Any:
+        """Learn that A(v) became 0."""
+
+    @property
+    def ports(self) -> Ports:
+        """All ports, by kind and name."""
+        return Ports(self)
+
+    @property
+    def place(self) -> Place | None:
+        """Graph, name and path; None before the node is added to a graph."""
+        return self._place
+
+    @property
+    def active(self) -> bool:
+        """A(v) of the paper; False outside a run."""
+        return self._active
+
+    @property
+    def log(self) -> logging.LoggerAdapter[logging.Logger]:
+        """A logger whose records carry the node's `path`."""
+        if self._log is None:
+            self._log = _PathLogger(self)
+        return self._log
+
+    @property
+    def inner(self) -> Any:
+        """Refused: ports have inner sides, nodes do not."""
+        raise UsageError(f'node "{_name(self)}" has no inner side; .inner belongs to the ports of a subgraph: self.port.inner')
+
+    def __rshift__(self, other: Other) -> Other:
+        """Connect the only port that sends to a target, or to the only free one of a node; gives back `other`."""
+        return self._free_source() >> other
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={value!r}" for name, value in self._parameters.items())
+        where = f' at "{self._place.path}"' if self._place is not None else ""
+        return f"<{self._type.qualname}({values}){where}>"
+
+    # --- for whoever runs, draws or stores nodes -----------------------------------------------------------------------------------------------------------
+
+    def _port(self, kind: Kind, name: str) -> Any:
+        """Give the bound port, made at the first call and kept where attribute access finds it."""
+        key = f"{name} {kind}" if name in self._type.shared else name
+        port = self.__dict__.get(key)
+        if port is None:
+            port = self.__dict__[key] = self._make_port(kind, name)
+        elif not isinstance(port, Port):
+            raise UsageError(f'"{_name(self)}.{name}" is a port, but the node\'s code wrote {port!r} over it; write self.{name}.send(...) or use another name')
+        return port
+
+    def _make_port(self, kind: Kind, name: str) -> Port:
+        type_ = self._type
+        match kind:
+            case "input" if name in type_.inputs:
+                return InputPort(self, name, type_.inputs[name].type)
+            case "output" if name in type_.outputs:
+                return OutputPort(self, name, type_.outputs[name].type)
+            case "event" if name in type_.events:
+                return EventPort(self, name, type_.events[name].type)
+            case "slot" if name in type_.slots:
+                return SlotPort(self, name, type_.slots[name].type)
+            case "parameter" if name in type_.parameters:
+                return ParameterPort(self, name, type_.parameters[name])
+            case "event" if name in AUTOMATIC_EVENTS and (not type_.is_subgraph or name in SUBGRAPH_EVENTS):
+                return EventPort(self, name, AUTOMATIC_EVENTS[name])
+            case "slot" if name in AUTOMATIC_SLOTS and (not type_.is_subgraph or name in SUBGRAPH_SLOTS):
+                return SlotPort(self, name, object)
+        if type_.is_subgraph and name in (*AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS):
+            raise UsageError(
+                f'subgraph "{_name(self)}" has no {kind} "{name}", for it does not fire itself; connect that of a node inside, or a {kind} of its own'
+            )
+        raise UsageError(f'node type {type_.name} has no {kind} "{name}"')
+
+    def _process_call(self) -> Callable[..., Any]:
+        """Give what runs one firing: one positional argument for each input in order; the raw result, coroutine or iterator comes back."""
+        if self._type.caller is None:
+            raise EngineInternalError(f'node "{_name(self)}" has no process function to call')
+        return self._type.caller(self)
+
+    def _handler(self, name: str) -> Callable[..., Any] | None:
+        """Give the bound handler of a slot, or None if it has none."""
+        spec = self._type.slots.get(name)
+        if spec is None or not spec.handler_name:
+            return None
+        handler: Callable[..., Any] = self._type.declared[name].handler.__get__(self)
+        return handler
+
+    def _slot_call(self, name: str) -> Callable[[Token[Any]], Any]:
+        """Give what runs one call of a declared slot for a token; an async handler's coroutine comes back."""
+        spec = self._type.slots[name]
+        handler = self._handler(name)
+        if handler is None:
+            trigger = self._port("event", name).trigger
+            return lambda token: trigger(token.value)
+        run = handler
+        if spec.token:
+            return run
+        if spec.takes_value:
+            return lambda token: run(token.value)
+        return lambda token: run()
+
+    def _hook(self, name: str) -> Callable[..., Any] | None:
+        """Give a hook that the type overrides, else None."""
+        return getattr(self, name) if name in self._type.hooks else None
+
+    def _split(self, result: Any) -> list[Any]:
+        """Give one value for each output, in order of declaration, of what the process function gave back.
+
+        Raises:
+          TypeError: the result does not fit the outputs.
+        """
+        type_ = self._type
+        if type_.result == "single":
+            return [result]
+        if result is None:
+            return [None] * len(type_.outputs)
+        names = ", ".join(f'"{name}"' for name in type_.outputs)
+        if type_.result == "none":
+            raise TypeError(f"{type_.name} has no output but gave back {result!r}; declare an output (annotate the result), or return nothing")
+        if isinstance(result, tuple | list):
+            if len(result) != len(type_.outputs):
+                raise TypeError(f"{type_.name} gave back {len(result)} values, but has {len(type_.outputs)} outputs: {names}; return one for each")
+            return list(result)
+        if type_.fields and all(hasattr(result, name) for name in type_.fields):
+            return [getattr(result, name) for name in type_.fields]
+        raise TypeError(f"{type_.name} gave back {result!r}, but has the outputs {names}; return a tuple with one value for each")
+
+    def _set_parameter(self, name: str, value: Any) -> None:
+        """Change a parameter; the value stays if it is refused.
+
+        Raises:
+          ValueError: the value breaks the limits.
+        """
+        spec = self._type.parameters.get(name)
+        if spec is None or spec.trigger:
+            raise ValueError(_unknown(self._type, name))
+        wrong = spec.check(value)
+        if wrong is not None:
+            raise ValueError(f'parameter "{_name(self)}.{name}" {wrong}')
+        self._parameters[name] = value
+
+    def _reset_states(self) -> None:
+        """Begin a run: state afresh, and nothing left of what an earlier run wrote on the node; what was there before the first run stays."""
+        own = self.__dict__
+        states = self._type.states
+        if self._before is None:
+            # Ports are the node's own and stay as well; state is written anew.
+            self._before = frozenset(name for name, value in own.items() if not isinstance(value, Port) and name not in states) or _NOTHING
+        else:
+            for name in [name for name, value in own.items() if name not in self._before and not isinstance(value, Port)]:
+                del own[name]
+        for name, state in states.items():
+            own[name] = state.fresh()
+
+    def _copy(self) -> Node:
+        """Make a node of the same type and parameters that is in no graph."""
+        return type(self)(**copy.copy(self._parameters))
+
+    def _free_source(self) -> Source[Any]:
+        """Find the only port that sends.
+
+        Raises:
+          UsageError: there is none, or more than one.
+        """
+        candidates = [*self.ports.outputs.values(), *self.ports.events.values()]
+        return _only(self, candidates, "output or event")
+
+    def _free_target(self) -> Target[Any]:
+        """Find the only port that receives and is free: inputs without an edge, and slots.
+
+        Raises:
+          UsageError: there is none, or more than one.
+        """
+        candidates = [*self.ports.inputs.values(), *self.ports.slots.values()]
+        if len(candidates) > 1 and self._place is not None:
+            taken = {id(edge.target) for edge in self._place.graph.edges}
+            candidates = [port for port in candidates if port.kind == "slot" or id(port) not in taken]
+        return _only(self, candidates, "free input or slot")
+
+
+def _only(node: Node, candidates: list[Any], what: str) -> Any:
+    if len(candidates) == 1:
+        return candidates[0]
+    if not candidates:
+        raise UsageError(f'node "{_name(node)}" has no {what} for >>; write graph.connect(source, target)')
+    names = " and ".join(f'{port.kind} "{port.path}"' for port in candidates)
+    raise UsageError(f"ambiguous >>: it could mean {names}; name the port, as in graph.connect(source, target)")
+
+
+def _name(node: Node) -> str:
+    return node._type.name if node._place is None else node._place.path
+
+
+def _values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
+    """Give every parameter its value, checked."""
+    values: dict[str, Any] = {}
+    for name, spec in type_.parameters.items():
+        if spec.trigger:
+            continue
+        if name in given:
+            value = given[name]
+            wrong = spec.check(value)
+            if wrong is not None:
+                raise ValueError(f'parameter "{type_.name}.{name}" {wrong}')
+        elif spec.default is REQUIRED:
+            raise TypeError(f'{type_.name} needs a value for its parameter "{name}": write {type_.qualname}({name}=...)')
+        else:
+            # A list as default must not be shared by all nodes.
+            value = copy.copy(spec.default) if isinstance(spec.default, MutableMapping | list | set) else spec.default
+        values[name] = value
+    unknown = [name for name in given if name not in values]
+    if unknown:
+        raise TypeError(_unknown(type_, unknown[0]))
+    return values
+
+
+def _unknown(type_: NodeType, name: str) -> str:
+    known = ", ".join(f'"{known}"' for known, spec in type_.parameters.items() if not spec.trigger) or "none"
+    hint = "; inputs are connected, not given here" if name in type_.inputs else ""
+    return f'{type_.name} has no parameter "{name}"; its parameters are {known}{hint}'
+
+
+def _positional(type_: NodeType) -> str:
+    example = next((f"{name}=..." for name, spec in type_.parameters.items() if not spec.trigger), "")
+    if type_.is_function:
+        return f"{type_.qualname}(...) makes a node; the function itself is {type_.qualname}.function"
+    return f"{type_.qualname}({example}) takes its parameters by keyword only; values for inputs come from connections"
+
+
+class _PathLogger(logging.LoggerAdapter[logging.Logger]):
+    """Adds the node's path to each record; looked up late, for a node may log before it is placed."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(logging.getLogger("hfg.node"), {})
+        self._node = node
+
+    def process(self, msg: Any, kwargs: MutableMapping[str, Any]) -> tuple[Any, MutableMapping[str, Any]]:
+        kwargs["extra"] = {**kwargs.get("extra", {}), "path": _name(self._node)}
+        return msg, kwargs
+
+
+Node._type = NodeType("node", Node, Node.__module__, Node.__qualname__, "")

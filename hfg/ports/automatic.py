@@ -1,0 +1,37 @@
+"""The ports that every node has without declaring them (rule A9): their names, and their declarations on `Node`. Stands on events and slots."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from hfg.errors import NodeError
+from hfg.ports.events import Event
+from hfg.ports.slots import Slot
+
+__all__ = ["AUTOMATIC_EVENTS", "AUTOMATIC_SLOTS", "SUBGRAPH_EVENTS", "SUBGRAPH_SLOTS"]
+
+AUTOMATIC_EVENTS: Final[dict[str, Any]] = {"activated": None, "deactivated": None, "processed": None, "failed": NodeError, "timeout": None}
+"""Name and type of the events that the runner triggers."""
+
+AUTOMATIC_SLOTS: Final = ("enable", "disable", "activate", "deactivate", "reset")
+"""Slots that the runner itself answers, whatever their signals carry."""
+
+SUBGRAPH_EVENTS: Final = ("activated", "deactivated", "timeout")
+"""A subgraph does not fire itself, so it has only these (rule G2)."""
+
+SUBGRAPH_SLOTS: Final = ("enable", "disable", "deactivate", "reset")
+"""There is no telling which inner node `activate` would mean (rule G2)."""
+
+
+def automatic_event(name: str) -> Event[Any]:
+    """Declare an automatic event."""
+    event: Event[Any] = Event(AUTOMATIC_EVENTS[name])
+    event.name = name
+    return event
+
+
+def automatic_slot(name: str) -> Slot[object]:
+    """Declare an automatic slot."""
+    made: Slot[object] = Slot(None, object)
+    made.name = name
+    return made

@@ -1,0 +1,124 @@
+"""Events: asynchronous sending, triggered at any moment of a firing or call (rules F3, F8); each is a reactivex Observable of its tokens.
+
+A plain edge does not pass through reactivex: the runner puts signals into queues itself and tells subscribers only when there are any.
+Stands on `base` and `observable`.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Awaitable, Callable
+from typing import Any, ClassVar, Final, Generic, TypeVar, overload
+
+from reactivex import abc
+from reactivex.disposable import Disposable
+from typing_extensions import Self, TypeForm
+
+from hfg.ports.base import Kind, Owner, Port, Source
+from hfg.ports.observable import RunObservable
+from hfg.ports.relays import InnerTarget, inner_target
+from hfg.token import Token
+
+__all__ = ["Event", "EventPort"]
+
+T = TypeVar("T")
+
+_LOGGER: Final = logging.getLogger("hfg.events")
+
+
+class EventPort(Port, Source[T], RunObservable[Token[T]]):
+    """The event of one node."""
+
+    kind: ClassVar[Kind] = "event"
+
+    # Subscribers in order of subscription, or None; the runner looks here before it calls `_notify`.
+    _observers: list[abc.ObserverBase[Token[T]]] | None = None
+
+    def __init__(self, node: Owner, name: str, type: Any = None) -> None:  # noqa: A002
+        Port.__init__(self, node, name, type)
+        # Whoever runs the node puts its own functions here.
+        self._emit: Callable[[Any, int | None, float | None], None] = self._refuse
+        self._emit_wait: Callable[[Any, int | None, float | None], Awaitable[None]] = self._refuse_wait
+
+    def trigger(self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+        """Send a signal at once to everything connected; never waits (rule F8).
+
+        Args:
+          value: an event may be triggered without a value (rule T2); a received token passed on keeps its modifier and its stamp.
+          activity: an explicit modifier (-1, 0, +1) for active edges (rule A4); without one, rule A3 decides.
+          stamp: in seconds; without one, rule T5 decides.
+
+        Raises:
+          NotRunning: nobody runs the node.
+          QueueOverflow: an edge with policy "error" is full; nothing was sent (rule P5).
+        """
+        self._emit(value, activity, stamp)
+
+    async def trigger_wait(self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+        """Send a signal and wait until every queue behind it has room again; for async code that triggers without end (rule F8)."""
+        await self._emit_wait(value, activity, stamp)
+
+    @property
+    def inner(self) -> InnerTarget[T]:
+        """Its side that looks into a subgraph."""
+        return self.__dict__.get("_inner") or self.__dict__.setdefault("_inner", inner_target(self))
+
+    def _refuse(self, value: Any, activity: int | None, stamp: float | None) -> None:
+        raise self._not_running("trigger")
+
+    async def _refuse_wait(self, value: Any, activity: int | None, stamp: float | None) -> None:
+        raise self._not_running("trigger")
+
+    def _subscribe_core(
+        self, observer: abc.ObserverBase[Token[T]], scheduler: abc.SchedulerBase | None = None
+    ) -> abc.DisposableBase:
+        self._observers = [*(self._observers or ()), observer]
+        return Disposable(lambda: self._drop(observer))
+
+    def _drop(self, observer: abc.ObserverBase[Token[T]]) -> None:
+        self._observers = [one for one in self._observers or () if one is not observer] or None
+
+    def _notify(self, token: Token[T]) -> None:
+        """Hand a signal to every subscriber; for the runner."""
+        for observer in self._observers or ():
+            try:
+                observer.on_next(token)
+            except Exception:  # noqa: BLE001 - the emitter must never see a subscriber's fault
+                _LOGGER.exception('a subscriber of "%s" failed and was dropped', self.path, extra={"path": self.path})
+                self._drop(observer)
+
+    def _complete(self) -> None:
+        """Tell every subscriber that no signal will follow; for the runner."""
+        observers, self._observers = self._observers, None
+        for observer in observers or ():
+            try:
+                observer.on_completed()
+            except Exception:  # noqa: BLE001
+                _LOGGER.exception('a subscriber of "%s" failed as the event completed', self.path, extra={"path": self.path})
+
+
+class Event(Generic[T]):
+    """Declare an event in a class body; without a type its signals carry no value."""
+
+    kind: ClassVar[Kind] = "event"
+
+    @overload
+    def __init__(self: Event[None]) -> None: ...
+    @overload
+    def __init__(self, type: TypeForm[T]) -> None: ...
+    def __init__(self, type: Any = None) -> None:  # noqa: A002
+        self.type: Any = type
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = self.name or name
+
+    @overload
+    def __get__(self, node: None, owner: Any) -> Self: ...
+    @overload
+    def __get__(self, node: Owner, owner: Any) -> EventPort[T]: ...
+    def __get__(self, node: Any, owner: Any) -> Any:
+        return self if node is None else node._port("event", self.name)
+
+    def __repr__(self) -> str:
+        return f"<Event {self.name}>"

@@ -1,0 +1,80 @@
+"""Outputs: synchronous sending, exactly one token on every edge for each firing (rule F3). Stands on `base`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar, Generic, TypeVar, overload
+
+from typing_extensions import Self, TypeForm
+
+from hfg.ports.base import Kind, Owner, Port, Source
+from hfg.ports.relays import InnerTarget, inner_target
+from hfg.token import Token
+
+__all__ = ["Output", "OutputPort"]
+
+T = TypeVar("T")
+
+
+class OutputPort(Port, Source[T]):
+    """The output of one node."""
+
+    __slots__ = ("_emit", "_inner")
+
+    kind: ClassVar[Kind] = "output"
+    _inner: InnerTarget[T]
+
+    def __init__(self, node: Owner, name: str, type: Any) -> None:  # noqa: A002
+        super().__init__(node, name, type)
+        # Whoever runs the node puts its own function here: (value, activity, stamp) -> None.
+        self._emit: Callable[[Any, int | None, float | None], None] = self._refuse
+
+    def send(self, value: T | Token[T] | None, *, activity: int | None = None, stamp: float | None = None) -> None:
+        """Write what leaves when the firing is over, with all outputs together (rule F3).
+
+        Args:
+          value: None is silence (rule T2); a received token passed on keeps its modifier and its stamp.
+          activity: an explicit modifier (-1, 0, +1) for active edges (rule A4); without one, rule A3 decides.
+          stamp: in seconds; without one, rule T5 decides.
+
+        Raises:
+          NotRunning: nobody runs the node.
+          UsageError: the output was already written in this firing, or this is no firing.
+        """
+        self._emit(value, activity, stamp)
+
+    @property
+    def inner(self) -> InnerTarget[T]:
+        """Its side that looks into a subgraph."""
+        try:
+            return self._inner
+        except AttributeError:
+            self._inner = inner_target(self)
+            return self._inner
+
+    def _refuse(self, value: Any, activity: int | None, stamp: float | None) -> None:
+        raise self._not_running("send")
+
+
+class Output(Generic[T]):
+    """Declare an output in a class body; `type` is what it sends, any type hint."""
+
+    kind: ClassVar[Kind] = "output"
+
+    def __init__(self, type: TypeForm[T]) -> None:  # noqa: A002
+        self.type: Any = type
+        self.inferred = False  # read from a function, not written in a class body
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = self.name or name
+
+    @overload
+    def __get__(self, node: None, owner: Any) -> Self: ...
+    @overload
+    def __get__(self, node: Owner, owner: Any) -> OutputPort[T]: ...
+    def __get__(self, node: Any, owner: Any) -> Any:
+        return self if node is None else node._port("output", self.name)
+
+    def __repr__(self) -> str:
+        return f"<Output {self.name}>"

@@ -1,0 +1,400 @@
+"""Reads a function as a node type: arguments are inputs, keyword-only arguments are parameters, the return annotation is the output.
+
+Stands on ports and descriptions; knows no class of nodes. Every refusal says which function, which argument and what to write instead.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import types
+import typing
+from collections import abc
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, NoReturn
+
+import annotated_types
+
+from hfg.description import InputSpec, OutputSpec, ProcessKind
+from hfg.errors import DeclarationError
+from hfg.ports.parameters import REQUIRED, ParameterSpec, limits_of
+from hfg.token import Token
+from hfg.types import describe
+
+__all__ = ["CallPlan", "Signature", "hints_of", "hints_of_class", "kind_of", "output_type", "read_signature", "split_token"]
+
+_NONE: Final = type(None)
+_SYNC_ITERATORS: Final = (abc.Iterator, abc.Generator)
+_ASYNC_ITERATORS: Final = (abc.AsyncIterator, abc.AsyncGenerator)
+_POSITIONAL: Final = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+
+
+@dataclass(frozen=True, slots=True)
+class CallPlan:
+    """How values of inputs and parameters become the arguments of a call.
+
+    Attributes:
+      positional: for each positional argument, the index of its input, or the name of its parameter.
+      keyword_inputs: argument name and index of inputs passed by keyword.
+      keyword_parameters: names of parameters passed by keyword.
+    """
+
+    positional: tuple[int | str, ...]
+    keyword_inputs: tuple[tuple[str, int], ...] = ()
+    keyword_parameters: tuple[str, ...] = ()
+
+    def bind(self, function: Callable[..., Any], parameters: Mapping[str, Any]) -> Callable[..., Any]:
+        """Make what takes one positional argument for each input; parameters are read from the live mapping at each call.
+
+        Without parameters and with inputs in order it is the function itself: no call between runner and user.
+        """
+        inputs_lead = self.positional == tuple(range(len(self.positional))) and not self.keyword_inputs
+        names = self.keyword_parameters
+        if inputs_lead and not names:
+            return function
+        if inputs_lead and len(names) == len(parameters):
+            return lambda *values: function(*values, **parameters)
+        if inputs_lead:
+            return lambda *values: function(*values, **{name: parameters[name] for name in names})
+
+        def call(*values: Any) -> Any:
+            positional = [values[item] if type(item) is int else parameters[item] for item in self.positional]  # type: ignore[index]
+            keywords = {name: values[index] for name, index in self.keyword_inputs}
+            keywords.update((name, parameters[name]) for name in names)
+            return function(*positional, **keywords)
+
+        return call
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """What a function says; `output` is its return type, or None without one, or `MISSING` if nothing was said."""
+
+    inputs: tuple[InputSpec, ...]
+    parameters: tuple[ParameterSpec, ...]
+    output: Any
+    kind: ProcessKind
+    plan: CallPlan
+
+
+MISSING: Final = inspect.Parameter.empty
+
+
+def hints_of(function: Any, where: str) -> dict[str, Any]:
+    """Resolve the annotations of a callable, metadata kept.
+
+    Raises:
+      DeclarationError: a name in them does not exist at run time.
+    """
+    target = function
+    while isinstance(target, functools.partial):
+        target = target.func
+    if inspect.isclass(target):
+        hints = hints_of(target.__init__, where)
+        return {**hints, "return": target}
+    if not hasattr(target, "__annotations__") and hasattr(type(target), "__call__"):
+        target = getattr(target, "__call__")
+    return _resolve(target, where)
+
+
+def hints_of_class(cls: type, where: str) -> dict[str, Any]:
+    """Resolve the annotations of a class body, metadata kept; the errors are those of `hints_of`."""
+    return _resolve(cls, where)
+
+
+def _resolve(target: Any, where: str) -> dict[str, Any]:
+    try:
+        return typing.get_type_hints(target, include_extras=True)
+    except NameError as error:
+        missing = error.name
+        users = [name for name, hint in getattr(target, "__annotations__", {}).items() if isinstance(hint, str) and str(missing) in hint]
+        place = f'the annotation of "{users[0]}"' if users else "an annotation"
+        raise DeclarationError(
+            f'{where}: "{missing}" in {place} cannot be found at run time; '
+            "define it at module level before the node type, and import it outside `if TYPE_CHECKING:`"
+        ) from None
+    except TypeError as error:
+        if not hasattr(target, "__annotations__"):  # a function of a C library has none
+            return {}
+        raise DeclarationError(f"{where}: its annotations cannot be read ({error})") from error
+    except Exception as error:
+        raise DeclarationError(f"{where}: its annotations cannot be read ({type(error).__name__}: {error})") from error
+
+
+def kind_of(function: Any) -> ProcessKind:
+    """Say how a callable runs by what it is; annotations may say more."""
+    while isinstance(function, functools.partial):
+        function = function.func
+    candidates = (function,) if inspect.isroutine(function) or inspect.isclass(function) else (function, getattr(function, "__call__", None))
+    if any(map(inspect.isasyncgenfunction, candidates)):
+        return "async generator"
+    if any(map(inspect.isgeneratorfunction, candidates)):
+        return "generator"
+    if any(map(inspect.iscoroutinefunction, candidates)):
+        return "async"
+    return "function"
+
+
+def split_token(hint: Any) -> tuple[Any, bool]:
+    """Take `Token[...]` off: its value's type, and whether it was there."""
+    bare = without_none(hint)
+    if bare is Token:
+        return Any, True
+    if typing.get_origin(bare) is Token:
+        return typing.get_args(bare)[0], True
+    return hint, False
+
+
+def without_none(hint: Any) -> Any:
+    """Take None out of a union: None in an output is silence (rule T2)."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        members = [member for member in typing.get_args(hint) if member is not _NONE]
+        if len(members) < len(typing.get_args(hint)):
+            return typing.Union[tuple(members)]
+    return hint
+
+
+def output_type(hint: Any) -> Any:
+    """Give what an output annotated like this sends; None for no output."""
+    hint = without_none(hint)
+    return None if hint in (None, _NONE, NoReturn, typing.Never) else split_token(hint)[0]
+
+
+def _return_type(hint: Any, kind: ProcessKind, has_inputs: bool) -> tuple[Any, ProcessKind]:
+    """Take iterators and awaitables off the return annotation; a function that gives an iterator and has no inputs is a generator too."""
+    origin, arguments = typing.get_origin(hint) or hint, typing.get_args(hint)
+    first = arguments[0] if arguments else Any
+    if kind == "generator" and origin in (*_SYNC_ITERATORS, abc.Iterable):
+        return output_type(first), kind
+    if kind == "async generator" and origin in (*_ASYNC_ITERATORS, abc.AsyncIterable):
+        return output_type(first), kind
+    if kind == "function" and not has_inputs and origin in _SYNC_ITERATORS:
+        return output_type(first), "generator"
+    if kind == "function" and not has_inputs and origin in _ASYNC_ITERATORS:
+        return output_type(first), "async generator"
+    if kind == "function" and origin in (abc.Awaitable, abc.Coroutine):
+        return output_type(arguments[-1] if arguments else Any), "async"
+    return output_type(hint), kind
+
+
+def read_signature(
+    function: Any,
+    where: str,
+    *,
+    inputs: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    known: Mapping[str, InputSpec] | None = None,
+    bound: bool = False,
+) -> Signature:
+    """Read a callable.
+
+    Args:
+      where: names the node type in messages.
+      inputs: types of arguments that are inputs, or new names as strings.
+      parameters: defaults of arguments that are parameters.
+      known: for classes, inputs declared as ports; then arguments take their types from there.
+      bound: the first argument is the node itself.
+
+    Raises:
+      DeclarationError: something needed is missing, or cannot be a port.
+    """
+    return _Reader(function, where, inputs or {}, parameters or {}, known).read(bound)
+
+
+class _Reader:
+    """Goes through the arguments once; its fields are what was found so far."""
+
+    def __init__(
+        self, function: Any, where: str, inputs: Mapping[str, Any], parameters: Mapping[str, Any], known: Mapping[str, InputSpec] | None
+    ) -> None:
+        self.function = function
+        self.where = where
+        self.given_inputs = inputs
+        self.given_parameters = parameters
+        self.known = known
+        # With types in inputs= that list is complete; with new names only, the others are read from the annotations.
+        self.inputs_complete = any(not isinstance(value, str) for value in inputs.values())
+        self.inputs: list[InputSpec] = []
+        self.parameters: list[ParameterSpec] = []
+        self.positional: list[int | str] = []
+        self.keyword_inputs: list[tuple[str, int]] = []
+        self.keyword_parameters: list[str] = []
+        self.hints: dict[str, Any] = {}
+
+    def read(self, bound: bool) -> Signature:
+        try:
+            arguments = list(inspect.signature(self.function).parameters.values())[1 if bound else 0 :]
+        except (ValueError, TypeError):
+            return self._unreadable()
+        self.hints = hints_of(self.function, self.where)
+        self._check_given({argument.name for argument in arguments}, any(a.kind is a.VAR_KEYWORD for a in arguments))
+        by_position = True  # until an argument is left at its default: what follows must be passed by keyword
+        for argument in arguments:
+            by_position = self._argument(argument, by_position)
+        if self.known is not None:
+            self._match_known()
+        kind = kind_of(self.function)
+        output = MISSING
+        if "return" in self.hints or kind in ("generator", "async generator") and self.known is not None:
+            output, kind = _return_type(self.hints.get("return"), kind, bool(self.inputs))
+        return self._signature(output, kind)
+
+    def _signature(self, output: Any, kind: ProcessKind) -> Signature:
+        if kind in ("generator", "async generator") and self.inputs:
+            raise DeclarationError(
+                f'{self.where}: a generator is a source and takes no inputs, but it has "{self.inputs[0].name}"; '
+                "return one value for each firing, or make the argument a keyword-only parameter"
+            )
+        plan = CallPlan(tuple(self.positional), tuple(self.keyword_inputs), tuple(self.keyword_parameters))
+        return Signature(tuple(self.inputs), tuple(self.parameters), output, kind, plan)
+
+    def _check_given(self, names: set[str], any_keyword: bool) -> None:
+        for word, given in (("inputs", self.given_inputs), ("parameters", self.given_parameters)):
+            unknown = [name for name in given if name not in names and not any_keyword]
+            if unknown:
+                raise DeclarationError(
+                    f'{self.where}: {word}= names "{unknown[0]}", which is no argument of it; its arguments are {", ".join(sorted(names)) or "none"}'
+                )
+        if any_keyword:
+            self.keyword_parameters += [name for name in self.given_parameters if name not in names]
+            self.parameters += [self._given_parameter(name, MISSING) for name in self.keyword_parameters]
+
+    def _argument(self, argument: inspect.Parameter, by_position: bool) -> bool:
+        name = argument.name
+        if argument.kind is argument.VAR_KEYWORD:
+            return by_position
+        if argument.kind is argument.VAR_POSITIONAL:
+            if self.known is not None or not (self.given_inputs or self.given_parameters):
+                raise DeclarationError(f'{self.where}: "*{name}" cannot be a port; name each argument, or connect through a node that collects them')
+            return False
+        positional = argument.kind in _POSITIONAL
+        if name in self.given_parameters:
+            self._pass_parameter(self._given_parameter(name, self.hints.get(name, MISSING)), positional and by_position)
+        elif not positional and name not in self.given_inputs:
+            if not (self.given_parameters or self.inputs_complete) or argument.default is MISSING:
+                self._pass_parameter(self._parameter(argument), False)
+        elif self._is_left_alone(argument):
+            return False
+        else:
+            self._pass_input(self._input(argument), name, positional and by_position)
+        return by_position
+
+    def _is_left_alone(self, argument: inspect.Parameter) -> bool:
+        """Arguments of library functions that nobody asked for stay at their defaults."""
+        if argument.name in self.given_inputs or argument.default is MISSING:
+            return False
+        return self.inputs_complete or argument.name not in self.hints and bool(self.given_inputs or self.given_parameters)
+
+    def _pass_input(self, spec: InputSpec, argument: str, by_position: bool) -> None:
+        if by_position:
+            self.positional.append(len(self.inputs))
+        else:
+            self.keyword_inputs.append((argument, len(self.inputs)))
+        self.inputs.append(spec)
+
+    def _pass_parameter(self, spec: ParameterSpec, by_position: bool) -> None:
+        if by_position:
+            self.positional.append(spec.name)
+        else:
+            self.keyword_parameters.append(spec.name)
+        self.parameters.append(spec)
+
+    def _input(self, argument: inspect.Parameter) -> InputSpec:
+        name, has_default = argument.name, argument.default is not MISSING
+        default = argument.default if has_default else None
+        given = self.given_inputs.get(name, MISSING)
+        hint = self.hints.get(name, MISSING) if given is MISSING or isinstance(given, str) else given
+        if self.known is not None and name in self.known:
+            spec = self.known[name]
+            token = hint is not MISSING and split_token(hint)[1]
+            if has_default and not spec.optional:
+                raise DeclarationError(
+                    f'{self.where}: process gives "{name}" a default, but the input is mandatory; write hfg.Input(..., optional=True, default=...)'
+                )
+            return InputSpec(name, spec.type, spec.optional, spec.default if spec.default is not None or not has_default else default, token)
+        if self.known:
+            raise DeclarationError(
+                f'{self.where}: process has an argument "{name}", but the declared inputs are {_names(self.known)}; declare `{name} = hfg.Input(...)` too'
+            )
+        if hint is MISSING:
+            raise DeclarationError(f'{self.where}: argument "{name}" has no annotation, so its input has no type; {self._call_to_write(name)}')
+        type_, token = split_token(hint)
+        return InputSpec(given if isinstance(given, str) else name, type_, has_default, default, token)
+
+    def _match_known(self) -> None:
+        """The call gives values in the order of the declared ports, whatever the order of the arguments."""
+        assert self.known is not None
+        if not self.known:
+            return
+        missing = [name for name in self.known if name not in {spec.name for spec in self.inputs}]
+        if missing:
+            raise DeclarationError(f'{self.where}: process has no argument for the input "{missing[0]}"; it needs one for each of {_names(self.known)}')
+        order = {name: index for index, name in enumerate(self.known)}
+        new_index = [order[spec.name] for spec in self.inputs]
+        self.positional = [new_index[item] if isinstance(item, int) else item for item in self.positional]
+        self.keyword_inputs = [(name, new_index[index]) for name, index in self.keyword_inputs]
+        self.inputs.sort(key=lambda spec: order[spec.name])
+
+    def _parameter(self, argument: inspect.Parameter) -> ParameterSpec:
+        default = REQUIRED if argument.default is MISSING else argument.default
+        hint = self.hints.get(argument.name, MISSING)
+        if hint is MISSING:
+            if default is REQUIRED or default is None:
+                raise DeclarationError(
+                    f'{self.where}: parameter "{argument.name}" has neither annotation nor default; write `{argument.name}: float = 1.0`'
+                )
+            hint = type(default)
+        return self._parameter_spec(argument.name, default, hint)
+
+    def _given_parameter(self, name: str, hint: Any) -> ParameterSpec:
+        default = self.given_parameters[name]
+        if hint is MISSING:
+            hint = Any if default is None else type(default)
+        return self._parameter_spec(name, default, hint)
+
+    def _parameter_spec(self, name: str, default: Any, hint: Any) -> ParameterSpec:
+        metadata = getattr(hint, "__metadata__", ()) if typing.get_origin(hint) is Annotated else ()
+        limits = limits_of(metadata)
+        units = [item.unit for item in metadata if isinstance(item, annotated_types.Unit)]
+        if limits or units:
+            hint = typing.get_args(hint)[0]
+        if default is None and hint is not Any:
+            hint = hint | None if isinstance(hint, type | types.UnionType) else typing.Optional[hint]
+        return ParameterSpec(name, hint, default, limits, units[0] if units else None)
+
+    def _unreadable(self) -> Signature:
+        """A function of a C library: only what inputs= and parameters= say is known."""
+        if not self.given_inputs or not self.inputs_complete:
+            raise DeclarationError(f"{self.where}: the function's signature cannot be read; {self._call_to_write(None)}")
+        by_position = not self.given_parameters
+        for name, hint in self.given_inputs.items():
+            type_, token = split_token(hint)
+            self._pass_input(InputSpec(name, type_, token=token), name, by_position)
+        for name in self.given_parameters:
+            self._pass_parameter(self._given_parameter(name, MISSING), False)
+        return self._signature(MISSING, kind_of(self.function))
+
+    def _call_to_write(self, missing: str | None) -> str:
+        if self.known is not None:
+            return f"write `{missing}: float`, or declare `{missing} = hfg.Input(float)`"
+        name = function_name(self.function)
+        try:
+            arguments = [a for a in inspect.signature(self.function).parameters.values() if a.kind in _POSITIONAL and a.default is MISSING]
+            inputs = {a.name: describe(self.hints.get(a.name, Any)) for a in arguments}
+        except (ValueError, TypeError):
+            inputs = {"src": "Any"}
+        types_ = ", ".join(f'"{argument}": {type_}' for argument, type_ in inputs.items())
+        annotate = "annotate it, or " if inspect.isfunction(self.function) else ""
+        return f"{annotate}write hfg.node({name}, inputs={{{types_}}}, outputs=Any)"
+
+
+def function_name(function: Any) -> str:
+    """Give what to call a function in messages."""
+    while isinstance(function, functools.partial):
+        function = function.func
+    return str(getattr(function, "__name__", type(function).__name__))
+
+
+def _names(names: abc.Iterable[str]) -> str:
+    return ", ".join(f'"{name}"' for name in names) or "none"
