@@ -1,0 +1,71 @@
+"""The command `hfg`: its verbs, and what becomes of an error that a verb does not expect.
+
+Stands on the verbs. Verbs return their exit code; only `main` knows about the process.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Annotated
+
+import typer
+from typer.exceptions import TyperException
+
+from hfg.cli import check, nodes, run, show
+from hfg.cli.interrupt import Interrupt
+from hfg.errors import HfgError, TargetError
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="hfg",
+    help="Build, check and run activity flow graphs.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("run")(run.run)
+app.command("check")(check.check)
+app.command("nodes")(nodes.nodes)
+
+
+@app.callback(invoke_without_command=True)
+def hfg(
+    context: typer.Context,
+    show_version: Annotated[bool, typer.Option("--version", help="Show the version and leave.")] = False,
+) -> None:
+    """Build, check and run activity flow graphs."""
+    if show_version:
+        sys.stdout.write(f"hfg {version('hfg')}\n")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        sys.stdout.write(context.get_help() + "\n")
+        raise typer.Exit
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and give back its exit code.
+
+    Args:
+      arguments: those behind "hfg"; the process's own if not given.
+    """
+    with Interrupt.installed():
+        try:
+            code = app(args=arguments, prog_name="hfg", standalone_mode=False)
+        except TyperException as error:
+            show.sentence(f"{error.format_message().rstrip('.')}; hfg --help shows what there is")
+            return 2
+        except TargetError as error:
+            show.user_traceback(error.__cause__)
+            show.sentence(str(error))
+            return 2
+        except HfgError as error:
+            show.failure(error)
+            return 1
+        except (KeyboardInterrupt, typer.Abort):
+            show.sentence("interrupted")
+            return 1
+        return 1 if code == Interrupt.TYPERS_CODE else int(code or 0)

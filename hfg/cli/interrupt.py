@@ -1,0 +1,110 @@
+"""Ctrl-C: the first ends the run and tears all down, the second leaves at once; neither takes longer than two seconds.
+
+    first Ctrl-C ── a run is on: its task is cancelled, the engine tears down ─┬─ done: exit code 1
+                 └─ none is:     KeyboardInterrupt                            │
+       after 0.6 s, if the loop has not even noticed: a node blocks it;        │
+                 its code gets a KeyboardInterrupt, then teardown as above ────┤
+       after 1.8 s: say who does not come back and leave ──────────────────────┘
+    second Ctrl-C: leave at once
+
+Stands on asyncio and signals; knows neither graphs nor verbs.
+"""
+
+from __future__ import annotations
+
+import _thread
+import asyncio
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, ClassVar, Final
+
+__all__ = ["Interrupt"]
+
+_BREAK_IN_AFTER_S = 0.6
+_LEAVE_AFTER_S = 1.8
+
+
+class Interrupt:
+    """What Ctrl-C does in this process; one at a time.
+
+    Attributes:
+      count: how often it was pressed.
+      before_leaving: called before the process is left without teardown, so that files are whole.
+    """
+
+    TYPERS_CODE: Final = 130
+    """What typer makes of a KeyboardInterrupt; our rule is 1."""
+
+    current: ClassVar[Interrupt | None] = None
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.before_leaving: list[Callable[[], None]] = []
+        self._run: tuple[asyncio.AbstractEventLoop, asyncio.Task[Any]] | None = None
+        self._noticed = threading.Event()
+        self._breaking_in = False
+
+    @classmethod
+    @contextmanager
+    def installed(cls) -> Iterator[Interrupt]:
+        """Handle Ctrl-C inside the block; outside the main thread, where Python forbids that, nothing changes."""
+        interrupt = cls()
+        if threading.current_thread() is not threading.main_thread():
+            yield interrupt
+            return
+        previous = signal.signal(signal.SIGINT, interrupt._pressed)
+        outer, cls.current = cls.current, interrupt
+        try:
+            yield interrupt
+        finally:
+            cls.current = outer
+            signal.signal(signal.SIGINT, previous)
+
+    @contextmanager
+    def cancels(self, task: asyncio.Task[Any]) -> Iterator[None]:
+        """Inside the block Ctrl-C cancels the task, which may then clean up."""
+        self._run = (task.get_loop(), task)
+        try:
+            yield
+        finally:
+            self._run = None
+
+    def _pressed(self, _number: int, _frame: FrameType | None) -> None:
+        if self._breaking_in:  # our own signal, from `_insist`
+            self._breaking_in = False
+            raise KeyboardInterrupt
+        self.count += 1
+        if self.count > 1:
+            self._leave("interrupted twice: left at once, without tearing anything down")
+        threading.Thread(target=self._insist, name="hfg interrupt", daemon=True).start()
+        if self._run is None:
+            self._noticed.set()
+            raise KeyboardInterrupt
+        loop, task = self._run
+        loop.call_soon_threadsafe(self._cancel, task)
+
+    def _cancel(self, task: asyncio.Task[Any]) -> None:
+        self._noticed.set()
+        task.cancel()
+
+    def _insist(self) -> None:
+        if not self._noticed.wait(_BREAK_IN_AFTER_S):
+            self._breaking_in = True
+            if hasattr(signal, "pthread_kill"):  # wakes the code also from a sleep or a read
+                signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+            else:
+                _thread.interrupt_main()
+        threading.Event().wait(_LEAVE_AFTER_S - _BREAK_IN_AFTER_S)
+        self._leave("interrupted: something did not come back in time and was left behind, not everything is torn down")
+
+    def _leave(self, sentence: str) -> None:
+        for call in self.before_leaving:
+            call()
+        sys.stderr.write(f"hfg: {sentence}\n")
+        sys.stderr.flush()
+        os._exit(1)

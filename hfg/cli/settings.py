@@ -1,0 +1,61 @@
+"""`--param path=value`: finds the parameter, reads the value as a Python literal and sets it.
+
+Stands on the graph floor.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+from typing import Any
+
+from hfg.errors import TargetError
+from hfg.graph import Graph
+
+__all__ = ["set_parameters"]
+
+
+def set_parameters(graph: Graph, settings: Iterable[str]) -> None:
+    """Set parameters of a graph's nodes before it runs.
+
+    Args:
+      graph: whose nodes have the parameters.
+      settings: "path/of/node.parameter=value" each; a text needs no quotes where the parameter is a text.
+
+    Raises:
+      TargetError: there is no such node or parameter, or the value does not fit it.
+    """
+    for setting in settings:
+        path, equals, text = setting.partition("=")
+        place, dot, name = path.strip().rpartition(".")
+        if not equals or not dot or not place or not name:
+            raise TargetError(f'--param "{setting}" sets nothing: write --param node.parameter=value')
+        node = _node(graph, place)
+        ports = node.ports.parameters
+        if name not in ports:
+            there = ", ".join(ports) or "none"
+            raise TargetError(f'node "{place}" has no parameter "{name}"; it has {there}')
+        _set(ports[name], f"{place}.{name}", text)
+
+
+def _node(graph: Graph, path: str) -> Any:
+    try:
+        found = graph[path]
+    except (KeyError, ValueError, LookupError):
+        found = None
+    if found is None or not hasattr(found, "ports"):
+        raise TargetError(f'graph "{graph.name}" has no node "{path}"; it has {", ".join(graph.nodes) or "none"}')
+    return found
+
+
+def _set(port: Any, path: str, text: str) -> None:
+    try:
+        value = ast.literal_eval(text.strip())
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        value = text
+    complaint = port.spec.check(value)
+    if complaint is not None and port.spec.check(text) is None:
+        value, complaint = text, None  # "3" for a parameter that is a text
+    if complaint is not None:
+        raise TargetError(f'parameter "{path}" {complaint}')
+    port.value = value

@@ -1,0 +1,146 @@
+"""How things look on a terminal: one-sentence errors, tracebacks that begin in the user's code, tables, JSON.
+
+Stands on rich and msgspec; knows reports and problems, no verbs.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import hfg
+from hfg.engine.report import Report
+from hfg.errors import EngineInternalError, NodeError, TeardownError
+
+__all__ = ["encode", "failure", "json", "plain", "report", "sentence", "set_debug", "table", "user_traceback"]
+
+_OURS = (str(Path(hfg.__file__).parent),)
+_MACHINERY = (
+    "asyncio",
+    "importlib",
+    "runpy.py",
+    "<frozen importlib",
+    "<frozen runpy",
+    "concurrent/futures",
+    "threading.py",
+    "typer",
+)
+_LONGEST_VALUE = 200
+_debug = False
+
+
+def set_debug(debug: bool) -> None:
+    """Show hfg's own frames too, from now on."""
+    global _debug  # one process, one terminal
+    _debug = debug
+
+
+def sentence(text: str) -> None:
+    """Write one sentence to standard error."""
+    sys.stderr.write(f"hfg: {text}\n")
+
+
+def failure(error: BaseException) -> None:
+    """Tell what went wrong in a run: the user's frames first, then the sentence."""
+    for one in error.errors if isinstance(error, TeardownError) else [error]:
+        if isinstance(one, NodeError) or _debug:
+            user_traceback(one.__cause__ or one)
+        elif isinstance(one, EngineInternalError):
+            traceback.print_exception(one)
+        sentence(str(one))
+
+
+def user_traceback(error: BaseException | None) -> None:
+    """Write a traceback without the frames of hfg and of what lies between it and the user's code."""
+    if error is None or (isinstance(error, hfg.errors.HfgError) and not _debug):
+        return
+    shown = traceback.TracebackException.from_exception(error)
+    if not _debug:
+        _filter(shown)
+    sys.stderr.write("".join(shown.format()))
+
+
+def _filter(shown: traceback.TracebackException) -> None:
+    shown.stack = traceback.StackSummary.from_list(frame for frame in shown.stack if not _is_machinery(frame.filename))
+    for other in (shown.__cause__, shown.__context__, *(shown.exceptions or ())):
+        if other is not None:
+            _filter(other)
+
+
+def _is_machinery(file: str) -> bool:
+    standard = Path(traceback.__file__).parent
+    inside = file.removeprefix(f"{standard}/").replace("\\", "/")
+    return file.startswith(_OURS) or ((inside != file or file.startswith("<")) and inside.startswith(_MACHINERY))
+
+
+def encode(value: Any) -> bytes:
+    """Write JSON; a value that JSON does not know is written as text, arrays by their shape."""
+    return _ENCODER.encode(value)
+
+
+def json(value: Any) -> None:
+    """Write JSON to standard output, indented for people."""
+    sys.stdout.write(msgspec.json.format(encode(value), indent=2).decode() + "\n")
+
+
+def plain(value: Any) -> Any:
+    """Describe a value that JSON does not know."""
+    if isinstance(value, np.ndarray):
+        return f"array {'x'.join(map(str, value.shape))} {value.dtype}"
+    if isinstance(value, np.generic):
+        return value.item()
+    text = str(value) if isinstance(value, BaseException) else repr(value)
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + "…"
+
+
+_ENCODER = msgspec.json.Encoder(enc_hook=plain)
+
+
+def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]], *, to_stderr: bool = False) -> None:
+    """Write a table; numbers stand to the right."""
+    rows = [[str(cell) for cell in row] for row in rows]
+    drawn = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+    for index, column in enumerate(columns):
+        numbers = bool(rows) and all(row[index].replace(".", "").isdigit() for row in rows)
+        drawn.add_column(column, justify="right" if numbers else "left", overflow="fold")
+    for row in rows:
+        drawn.add_row(*(cell.replace("[", "\\[") for cell in row))
+    Console(stderr=to_stderr, soft_wrap=not sys.stderr.isatty()).print(drawn)
+
+
+def report(name: str, result: Report, verbosity: int) -> None:
+    """Tell on standard error how a run went: a line; from verbosity 1 its nodes, from 2 its edges."""
+    for error in result.errors:
+        sentence(error)
+    sentence(f'graph "{name}": {result.outcome} after {result.duration_s:.3f} s, {result.firings} firings')
+    if result.lost_activity:
+        sentence(f'graph "{name}": activity was lost {result.lost_activity} times')
+    if verbosity:
+        nodes = [
+            (
+                path,
+                node.firings,
+                node.silent,
+                node.calls,
+                node.failed,
+                "yes" if node.active else "",
+                "yes" if node.ended else "",
+            )
+            for path, node in result.nodes.items()
+        ]
+        table("nodes", ("node", "firings", "silent", "calls", "failed", "active", "ended"), nodes, to_stderr=True)
+    edges = [
+        (label, edge.sent, edge.dropped, edge.drained, edge.untaken, edge.grown)
+        for label, edge in result.edges.items()
+        if verbosity > 1 or edge.dropped or edge.grown
+    ]
+    if verbosity and edges:
+        table("edges", ("edge", "sent", "dropped", "drained", "untaken", "grown"), edges, to_stderr=True)

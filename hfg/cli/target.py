@@ -1,0 +1,207 @@
+"""Finds what TARGET names: `package.module:graph`, `file.py` or `file.py:graph`; a graph, or a function that makes one.
+
+The file or module is imported as Python itself would import it. Stands on the graph floor; runs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import sys
+import typing
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from hfg.errors import TargetError
+from hfg.graph import Graph
+
+__all__ = ["load_graph", "load_module"]
+
+
+def load_graph(target: str) -> Graph:
+    """Import the target and give back its graph, built if need be.
+
+    Raises:
+      TargetError: there is no such file, module or name, its code fails, or what it names is no graph; `__cause__` is
+        the user's exception.
+    """
+    place, name = _split(target)
+    module = load_module(place)
+    found = _named(module, name, place) if name else _only(module, place)
+    if isinstance(found, Graph):
+        return found
+    try:
+        graph = found()
+    except Exception as error:
+        raise TargetError(f"{place}: {_name(found)}() failed: {type(error).__name__}: {error}") from error
+    if not isinstance(graph, Graph):
+        raise TargetError(
+            f"{place}: {_name(found)}() gave back {_a(graph)}, not a Graph: return the graph that it builds"
+        )
+    return graph
+
+
+def load_module(place: str) -> ModuleType:
+    """Import a module by name, or a Python file by its path.
+
+    Raises:
+      TargetError: it is not there, or its code fails.
+    """
+    if place.endswith((".yaml", ".yml")):
+        raise TargetError(
+            f"{place}: graph files come in a later version; name a Python file or module that builds the graph"
+        )
+    if place.endswith(".py") or "/" in place or "\\" in place:
+        return _load_file(Path(place))
+    _import_from(Path.cwd())
+    try:
+        return importlib.import_module(place)
+    except ModuleNotFoundError as error:
+        if error.name is not None and (place + ".").startswith(error.name + "."):
+            hint = f"; is {place}.py meant?" if Path(f"{place}.py").exists() else ""
+            raise TargetError(f'there is no module "{error.name}" here or installed{hint}') from None
+        raise TargetError(f"importing {place} failed: {type(error).__name__}: {error}") from error
+    except Exception as error:
+        raise TargetError(f"importing {place} failed: {type(error).__name__}: {error}") from error
+    except SystemExit as error:
+        raise TargetError(
+            f'importing {place} left the program; put what it runs under if __name__ == "__main__":'
+        ) from error
+
+
+def _load_file(file: Path) -> ModuleType:
+    if not file.is_file():
+        what = "is a folder, name a file in it" if file.is_dir() else "does not exist"
+        raise TargetError(f"{file}: {what}")
+    file = file.resolve()
+    _import_from(file.parent)
+    name = file.stem
+    if name in sys.modules:
+        loaded = getattr(sys.modules[name], "__file__", None)
+        if loaded is not None and Path(loaded).resolve() == file:
+            return sys.modules[name]
+    spec = importlib.util.find_spec(name) if name.isidentifier() and name not in sys.modules else None
+    if spec is None or spec.origin is None or Path(spec.origin).resolve() != file:
+        # Another module has this name, or it cannot be one. Node types are then not found by name outside this process.
+        spec = importlib.util.spec_from_file_location(f"hfg_target_{abs(hash(file))}", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException as error:
+        del sys.modules[spec.name]
+        if isinstance(error, SystemExit):
+            raise TargetError(
+                f'{file.name} left the program; put what it runs under if __name__ == "__main__":'
+            ) from error
+        if not isinstance(error, Exception):
+            raise
+        raise TargetError(f"{file.name} failed: {type(error).__name__}: {error}") from error
+    return module
+
+
+def _import_from(folder: Path) -> None:
+    """Let the target import its neighbours, as `python file.py` would."""
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
+
+
+def _split(target: str) -> tuple[str, str]:
+    place, colon, name = target.rpartition(":")
+    if colon and not ("/" in name or "\\" in name):  # the colon of C:\\graph.py is none of ours
+        if not place or not name:
+            raise TargetError(f'"{target}" names nothing: write module:graph, file.py or file.py:graph')
+        return place, name
+    return target, ""
+
+
+def _named(module: ModuleType, name: str, place: str) -> Any:
+    found: Any = module
+    for part in name.split("."):
+        if not hasattr(found, part):
+            raise TargetError(f'{place} has no "{name}"; {_there_are(module)}')
+        found = getattr(found, part)
+    if isinstance(found, Graph) or _can_build(found):
+        return found
+    if callable(found) and not isinstance(found, type):
+        raise TargetError(f"{place}:{name} needs arguments to build a graph: {_signature(found)}; give them defaults")
+    raise TargetError(f"{place}:{name} is {_a(found)}, no Graph and no function that builds one; {_there_are(module)}")
+
+
+def _only(module: ModuleType, place: str) -> Any:
+    for candidates in (_graphs(module), _builders(module)):
+        if len(candidates) == 1:
+            return next(iter(candidates.values()))
+        if candidates:
+            choices = ", ".join(f"{place}:{name}" for name in candidates)
+            raise TargetError(f"{place} has {len(candidates)} graphs: name one of {choices}")
+    raise TargetError(
+        f"{place} has no graph: it needs a Graph, or a function without arguments that is annotated to return one"
+    )
+
+
+def _there_are(module: ModuleType) -> str:
+    names = [*_graphs(module), *_builders(module)]
+    return f"it has {', '.join(names)}" if names else "it has no graph at all"
+
+
+def _graphs(module: ModuleType) -> dict[str, Graph]:
+    """The graphs of a module, each under the first name it has."""
+    found: dict[str, Graph] = {}
+    for name, value in vars(module).items():
+        if (
+            isinstance(value, Graph)
+            and not name.startswith("_")
+            and not any(value is other for other in found.values())
+        ):
+            found[name] = value
+    return found
+
+
+def _builders(module: ModuleType) -> dict[str, Callable[[], Any]]:
+    """The functions that a module defines itself and that promise a graph."""
+    return {
+        name: value
+        for name, value in vars(module).items()
+        if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_")
+        if _can_build(value) and _promises_graph(value)
+    }
+
+
+def _promises_graph(function: Callable[..., Any]) -> bool:
+    try:
+        return typing.get_type_hints(function).get("return") is Graph
+    except Exception:  # noqa: BLE001 - hints of the user's that cannot be resolved promise nothing
+        return False
+
+
+def _can_build(value: Any) -> bool:
+    if not callable(value) or isinstance(value, type):
+        return False
+    try:
+        parameters = inspect.signature(value).parameters.values()
+    except (TypeError, ValueError):
+        return False
+    variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    return all(one.default is not one.empty or one.kind in variadic for one in parameters)
+
+
+def _signature(value: Any) -> str:
+    try:
+        return f"{_name(value)}{inspect.signature(value)}"
+    except (TypeError, ValueError):
+        return _name(value)
+
+
+def _name(value: Any) -> str:
+    return str(getattr(value, "__name__", value))
+
+
+def _a(value: Any) -> str:
+    name = value.__name__ if isinstance(value, type) else type(value).__name__
+    return f"the class {name}" if isinstance(value, type) else f"{'an' if name[:1].lower() in 'aeiou' else 'a'} {name}"
