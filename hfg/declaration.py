@@ -8,8 +8,8 @@ from __future__ import annotations
 import inspect
 import re
 import types
-from collections.abc import Callable, Iterable
-from typing import Any, Final, TypeAlias
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final, TypeAlias, TypeVar
 
 from hfg.description import EventSpec, InputSpec, NodeType, OutputSpec, Result, SlotSpec
 from hfg.errors import DeclarationError, UsageError
@@ -28,12 +28,15 @@ __all__ = ["HOOKS", "RESERVED", "Shared", "check_names", "declare", "snake_case"
 HOOKS: Final = ("setup", "ready", "end", "teardown", "on_activated", "on_deactivated")
 """Methods of a node that a runner calls besides `process`."""
 
-RESERVED: Final = frozenset({*HOOKS, "process", "ports", "place", "active", "log", "inner", *AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS})
+RESERVED: Final = frozenset(
+    {*HOOKS, "process", "ports", "place", "active", "log", "inner", *AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS}
+)
 """Every public name of `Node`; a test keeps the list closed."""
 
 _SUBGRAPH_RESERVED: Final = RESERVED | {"graph", "build", "iterate_over"}
 
 Declaration: TypeAlias = Input[Any] | Output[Any] | Event[Any] | Slot[Any] | Parameter[Any] | State[Any]
+D = TypeVar("D")
 _DECLARATIONS: Final = (Input, Output, Event, Slot, Parameter, State)
 
 
@@ -62,30 +65,34 @@ def snake_case(name: str) -> str:
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", words).lower()
 
 
-def declare(cls: type, base: type) -> NodeType:
+def declare(cls: type[Any], base: type[Any]) -> NodeType:
     """Describe a subclass of `base`, which is `Node`; ports that `process` declares are added to the class."""
     where = f"node type {cls.__qualname__}"
     is_subgraph = issubclass(cls, Relaying)
     _wrap_overridden_slots(cls, base)
     declared = _declared(cls, base, where)
-    of = {kind: {n: d for n, d in declared.items() if isinstance(d, kind)} for kind in (Input, Output, Event, Slot, Parameter, State)}
-    parameters = {name: parameter.spec() for name, parameter in of[Parameter].items()}
-    inputs = {name: InputSpec(name, d.type, d.optional, d.default) for name, d in of[Input].items()}
-    outputs = {name: OutputSpec(name, d.type) for name, d in of[Output].items()}
-    process = getattr(cls, "process")
+    parameters = {name: parameter.spec() for name, parameter in _of(declared, Parameter).items()}
+    inputs = {name: InputSpec(name, d.type, d.optional, d.default) for name, d in _of(declared, Input).items()}
+    outputs = {name: OutputSpec(name, d.type) for name, d in _of(declared, Output).items()}
+    process = cls.process
     signature = None
-    if process is not getattr(base, "process"):
+    if process is not base.process:
         if is_subgraph:
-            raise DeclarationError(f"{where}: a subgraph does not fire itself; put the work into a node and add it in build()")
+            raise DeclarationError(
+                f"{where}: a subgraph does not fire itself; put the work into a node and add it in build()"
+            )
         signature = _read_process(cls, process, inputs, where)
         inputs = {spec.name: spec for spec in signature.inputs}
         parameters.update((spec.name, spec) for spec in signature.parameters if spec.name not in parameters)
-        outputs = outputs or _outputs(signature, where, must_say=not of[Input])
-    events = {name: EventSpec(name, d.type) for name, d in of[Event].items()}
-    slots = {name: _slot_spec(cls, d, where, is_subgraph) for name, d in of[Slot].items()}
+        outputs = outputs or _outputs(signature, where, must_say=not _of(declared, Input))
+    events = {name: EventSpec(name, d.type) for name, d in _of(declared, Event).items()}
+    slots = {name: _slot_spec(cls, d, where, is_subgraph) for name, d in _of(declared, Slot).items()}
     for spec in parameters.values():
         if spec.trigger:
-            events[spec.name], slots[spec.name] = EventSpec(spec.name, spec.type), SlotSpec(spec.name, spec.type or object)
+            events[spec.name], slots[spec.name] = (
+                EventSpec(spec.name, spec.type),
+                SlotSpec(spec.name, spec.type or object),
+            )
     result: Result = "none" if not outputs else "single" if len(outputs) == 1 else "fields"
     kind = NodeType(
         name=snake_case(cls.__name__),
@@ -98,7 +105,7 @@ def declare(cls: type, base: type) -> NodeType:
         events=types.MappingProxyType(events),
         slots=types.MappingProxyType(slots),
         parameters=types.MappingProxyType(parameters),
-        states=types.MappingProxyType(of[State]),
+        states=types.MappingProxyType(_of(declared, State)),
         process_kind="none" if signature is None else signature.kind,
         result=result,
         is_subgraph=is_subgraph,
@@ -110,6 +117,10 @@ def declare(cls: type, base: type) -> NodeType:
     check_names(kind, where, _SUBGRAPH_RESERVED if is_subgraph else RESERVED)
     install_ports(cls, kind, base)
     return kind
+
+
+def _of(declared: Mapping[str, Declaration], kind: type[D]) -> dict[str, D]:
+    return {name: declaration for name, declaration in declared.items() if isinstance(declaration, kind)}
 
 
 def _caller(signature: Signature) -> Callable[[Any], Callable[..., Any]]:
@@ -128,10 +139,16 @@ def _declared(cls: type, base: type, where: str) -> dict[str, Declaration]:
                 if getattr(value, "inferred", False):
                     continue
                 if value.name != name:
-                    raise DeclarationError(f'{where}: "{name}" and "{value.name}" are the same object; declare each port by a call of its own')
+                    raise DeclarationError(
+                        f'{where}: "{name}" and "{value.name}" are the same object; declare each port by a call of '
+                        "its own"
+                    )
                 found[name] = value
             elif name in found and not name.startswith("__"):
-                raise DeclarationError(f'{where}: "{name}" is a port or parameter of {owner.__bases__[0].__name__}, overwritten by {value!r}; use another name')
+                raise DeclarationError(
+                    f'{where}: "{name}" is a port or parameter of {owner.__bases__[0].__name__}, overwritten by '
+                    f"{value!r}; use another name"
+                )
     return found
 
 
@@ -140,7 +157,9 @@ def _wrap_overridden_slots(cls: type, base: type) -> None:
     for name, value in list(vars(cls).items()):
         inherited = next((vars(owner)[name] for owner in cls.__mro__[1:] if name in vars(owner)), None)
         if inspect.isfunction(value) and isinstance(inherited, Slot) and inherited.handler is not None:
-            made: Slot[Any] = Slot(value, UNSET if _argument(value) in getattr(value, "__annotations__", {}) else inherited.type)
+            made: Slot[Any] = Slot(
+                value, UNSET if _argument(value) in getattr(value, "__annotations__", {}) else inherited.type
+            )
             if made.type is UNSET and _argument(value) is not None and _argument(value) not in value.__annotations__:
                 made.type = _slot_type(inherited, name)
             made.name = name
@@ -149,7 +168,11 @@ def _wrap_overridden_slots(cls: type, base: type) -> None:
 
 def _slot_type(inherited: Slot[Any], name: str) -> Any:
     argument = _argument(inherited.handler)
-    return split_token(hints_of(inherited.handler, f"slot {name}").get(argument or "", Any))[0] if inherited.type is UNSET else inherited.type
+    return (
+        split_token(hints_of(inherited.handler, f"slot {name}").get(argument or "", Any))[0]
+        if inherited.type is UNSET
+        else inherited.type
+    )
 
 
 def _argument(handler: Any) -> str | None:
@@ -162,20 +185,28 @@ def _slot_spec(cls: type, slot: Slot[Any], where: str, is_subgraph: bool) -> Slo
     name = slot.name
     if slot.handler is None:
         if not is_subgraph:
-            raise DeclarationError(f'{where}: slot "{name}" has no handler; write `@hfg.slot` above `def {name}(self, value: int)`')
+            raise DeclarationError(
+                f'{where}: slot "{name}" has no handler; write `@hfg.slot` above `def {name}(self, value: int)`'
+            )
         return SlotSpec(name, object if slot.type is UNSET else slot.type)
     arguments = list(inspect.signature(slot.handler).parameters.values())[1:]
     needed = [a for a in arguments if a.default is a.empty and a.kind not in (a.VAR_KEYWORD, a.VAR_POSITIONAL)]
     if len(needed) > 1 or any(a.kind is a.KEYWORD_ONLY for a in needed):
         names = ", ".join(a.name for a in needed)
-        raise DeclarationError(f'{where}: the handler of slot "{name}" needs {len(needed)} arguments ({names}), but a signal has one value; take at most one')
+        raise DeclarationError(
+            f'{where}: the handler of slot "{name}" needs {len(needed)} arguments ({names}), but a signal has one '
+            "value; take at most one"
+        )
     positional = [a for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
     runs = "async" in kind_of(slot.handler)
     if not positional:
         return SlotSpec(name, object if slot.type is UNSET else slot.type, name, False, False, runs)
     hint = hints_of(slot.handler, f'{where}, slot "{name}"').get(positional[0].name, MISSING)
     if hint is MISSING and slot.type is UNSET:
-        raise DeclarationError(f'{where}: argument "{positional[0].name}" of slot "{name}" has no annotation; write `{positional[0].name}: int` or `@hfg.slot(type=int)`')
+        raise DeclarationError(
+            f'{where}: argument "{positional[0].name}" of slot "{name}" has no annotation; '
+            f"write `{positional[0].name}: int` or `@hfg.slot(type=int)`"
+        )
     type_, token = split_token(hint) if hint is not MISSING else (slot.type, False)
     return SlotSpec(name, type_ if slot.type is UNSET else slot.type, name, True, token, runs)
 
@@ -189,12 +220,17 @@ def _outputs(signature: Signature, where: str, *, must_say: bool) -> dict[str, O
     """Give the one output "out" of a return annotation; silence about it is only allowed beside declared inputs."""
     if signature.output is MISSING:
         if must_say:
-            raise DeclarationError(f"{where}: process says nothing about its result; annotate it, `-> int` for an output, `-> None` for none")
+            raise DeclarationError(
+                f"{where}: process says nothing about its result; annotate it, `-> int` for an output, `-> None` for "
+                "none"
+            )
         return {}
     return {} if signature.output is None else {"out": OutputSpec("out", signature.output)}
 
 
-def shared_names(inputs: Iterable[str], outputs: Iterable[str], events: Iterable[str], slots: Iterable[str]) -> frozenset[str]:
+def shared_names(
+    inputs: Iterable[str], outputs: Iterable[str], events: Iterable[str], slots: Iterable[str]
+) -> frozenset[str]:
     """Give the names that mean a port on both sides."""
     return frozenset({*inputs, *slots} & {*outputs, *events})
 
@@ -213,9 +249,14 @@ def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED)
             raise DeclarationError(f'{where}: two ports are called "{doubled}"; rename one{_rename(kind, doubled)}')
     for name in [*kind.inputs, *kind.outputs, *kind.events, *kind.slots, *values, *kind.states]:
         if name in reserved:
-            raise DeclarationError(f'{where}: "{name}" is reserved for every node; choose another name{_rename(kind, name)}')
+            raise DeclarationError(
+                f'{where}: "{name}" is reserved for every node; choose another name{_rename(kind, name)}'
+            )
         if not name.isidentifier() or name.startswith("_"):
-            raise DeclarationError(f'{where}: "{name}" cannot be the name of a port; use letters, digits and underscores, a letter first{_rename(kind, name)}')
+            raise DeclarationError(
+                f'{where}: "{name}" cannot be the name of a port; use letters, digits and underscores, a letter '
+                f"first{_rename(kind, name)}"
+            )
     for spec in kind.parameters.values():
         check_default(spec, where)
 
@@ -228,7 +269,9 @@ def check_default(spec: ParameterSpec, where: str) -> None:
     """Refuse a default that breaks its own limits."""
     wrong = None if spec.trigger or spec.default is REQUIRED else spec.check(spec.default)
     if wrong is not None:
-        raise DeclarationError(f'{where}: the default of parameter "{spec.name}" {wrong}; change the default or the limit')
+        raise DeclarationError(
+            f'{where}: the default of parameter "{spec.name}" {wrong}; change the default or the limit'
+        )
 
 
 def install_ports(cls: type, kind: NodeType, base: type) -> None:
@@ -246,9 +289,14 @@ def install_ports(cls: type, kind: NodeType, base: type) -> None:
         if name in kind.declared or name in kind.shared:
             continue
         taken = next((owner for owner in cls.__mro__ if owner is not base and name in vars(owner)), None)
-        if taken is not None and not getattr(vars(taken)[name], "inferred", False) and not isinstance(vars(taken)[name], Shared):
+        if (
+            taken is not None
+            and not getattr(vars(taken)[name], "inferred", False)
+            and not isinstance(vars(taken)[name], Shared)
+        ):
             raise DeclarationError(
-                f'node type {cls.__qualname__}: "{name}" is both a port that process declares and an attribute of {taken.__name__}; rename one of them'
+                f'node type {cls.__qualname__}: "{name}" is both a port that process declares and an attribute of '
+                f"{taken.__name__}; rename one of them"
             )
         declaration.name = name
         declaration.inferred = True

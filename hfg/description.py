@@ -1,6 +1,7 @@
-"""What is known of a node type: its ports, its process function and where to find it, as plain data computed once at declaration.
+"""What is known of a node type: its ports, its process function and where to find it.
 
-Files, the studio, checks and runners read a node type here and never look at the class. Stands on ports; knows neither `Node` nor graphs.
+Plain data, computed once at declaration. Files, the studio, checks and runners read a node type here and never look at
+the class. Stands on ports; knows neither `Node` nor graphs.
 """
 
 from __future__ import annotations
@@ -49,7 +50,8 @@ class SlotSpec(msgspec.Struct, frozen=True):
     """A slot.
 
     Attributes:
-      handler_name: the method, or "" if there is none: a trigger parameter's, which triggers the event of its name, and a subgraph's.
+      handler_name: the method, or "" if there is none: a trigger parameter's, which triggers the event of its name, and
+        a subgraph's.
       takes_value: the handler has an argument for the value, or for the token if `token`.
     """
 
@@ -71,7 +73,8 @@ class NodeType:
       module: where it was declared.
       doc: its docstring, indentation taken off.
       process_kind: how the process function runs; "none" lives by its slots.
-      result: how what the function gives back maps to outputs: "none" of it, the "single" output, or "fields", one each in order.
+      result: how what the function gives back maps to outputs: "none" of it, the "single" output, or "fields", one each
+        in order.
       fields: attribute names to read a "fields" result by, for results that are no sequence.
       shared: names that an input side and an output side both use; the short form `node.name` is refused for them.
       declared: the declarations in the class by name; identity tells a method reached by `super()` from the node's own.
@@ -107,14 +110,20 @@ class NodeType:
 
     @property
     def reference(self) -> str | None:
-        """Where to find it, "module:qualname"; None for what has no name of its own: lambdas and types made inside functions."""
+        """Where to find it, "module:qualname"; None for what has no name of its own.
+
+        Lambdas and types made inside functions.
+        """
         for module, qualname in self._places():
             if "<" not in qualname and look_up(module, qualname) is self.origin:
                 return f"{module}:{qualname}"
         return None
 
     def _places(self) -> list[tuple[str, str]]:
-        """Where it may be: under its own name, else under the name that its module gave it (`smooth = hfg.node(cv2.medianBlur)`)."""
+        """Where it may be.
+
+        Under its own name, else under the name that its module gave it (`smooth = hfg.node(cv2.medianBlur)`).
+        """
         places = [(self.module, self.qualname)]
         names = vars(sys.modules.get(self.module, object)).items()
         return places + [(self.module, name) for name, value in list(names) if value is self.origin]

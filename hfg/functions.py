@@ -1,7 +1,7 @@
 """Node types as functions: `hfg.node` turns any function into something that makes nodes.
 
-Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output "out"; what a library does not say is said in the call.
-Stands on `nodetype` and `signature`.
+Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output "out"; what a library
+does not say is said in the call. Stands on `nodetype` and `signature`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class FunctionNode(Node, Generic[T]):
     if TYPE_CHECKING:
 
         @property
-        def out(self) -> OutputPort[T]: ...
+        def out(self) -> OutputPort[T]:  # noqa: D102 - the class says it
+            ...
 
         # Inputs and parameters have the names of the function's arguments, which no annotation can express.
         def __getattr__(self, name: str) -> Any: ...
@@ -69,11 +70,17 @@ class NodeFunction(Generic[P, R_co]):
         self.__wrapped__ = function
 
     @overload
-    def __call__(self: NodeFunction[P, Coroutine[Any, Any, T | None]], *args: P.args, **parameters: P.kwargs) -> FunctionNode[T]: ...
+    def __call__(
+        self: NodeFunction[P, Coroutine[Any, Any, T | None]], *args: P.args, **parameters: P.kwargs
+    ) -> FunctionNode[T]: ...
     @overload
-    def __call__(self: NodeFunction[P, Iterator[T | None]], *args: P.args, **parameters: P.kwargs) -> FunctionNode[T]: ...
+    def __call__(
+        self: NodeFunction[P, Iterator[T | None]], *args: P.args, **parameters: P.kwargs
+    ) -> FunctionNode[T]: ...
     @overload
-    def __call__(self: NodeFunction[P, AsyncIterator[T | None]], *args: P.args, **parameters: P.kwargs) -> FunctionNode[T]: ...
+    def __call__(
+        self: NodeFunction[P, AsyncIterator[T | None]], *args: P.args, **parameters: P.kwargs
+    ) -> FunctionNode[T]: ...
     @overload
     def __call__(self: NodeFunction[P, T | None], *args: P.args, **parameters: P.kwargs) -> FunctionNode[T]: ...
     def __call__(self, *args: Any, **parameters: Any) -> Any:
@@ -137,9 +144,11 @@ def node(
     """Make a node type of a function.
 
     Args:
-      function: with annotations; else `inputs` and `outputs` say what it does not. A generator, sync or async, is a source.
+      function: with annotations; else `inputs` and `outputs` say what it does not. A generator, sync or async, is a
+        source.
       inputs: argument name -> type, or -> new name as a string.
-      outputs: one type; or a NamedTuple or dataclass, or a mapping from name to type, whose fields become one output each.
+      outputs: one type; or a NamedTuple or dataclass, or a mapping from name to type, whose fields become one output
+        each.
       parameters: argument name -> default.
 
     Raises:
@@ -156,10 +165,12 @@ def node(
     """
     if function is None:
         return functools.partial(node, inputs=inputs, outputs=outputs, parameters=parameters)
-    if isinstance(function, NodeFunction) or inspect.isclass(function) and issubclass(function, Node):
+    if isinstance(function, NodeFunction) or (inspect.isclass(function) and issubclass(function, Node)):
         raise DeclarationError(f"{function_name(function)} is a node type already; use it as it is")
     if not callable(function):
-        raise DeclarationError(f"hfg.node needs a function, got {function!r}; options are given by keyword, as in hfg.node(outputs=Found)")
+        raise DeclarationError(
+            f"hfg.node needs a function, got {function!r}; options are given by keyword, as in hfg.node(outputs=Found)"
+        )
     caller = sys._getframe(1)
     while caller.f_globals.get("__name__") == "functools" and caller.f_back is not None:
         caller = caller.f_back
@@ -167,7 +178,11 @@ def node(
 
 
 def _make(
-    function: Callable[..., Any], inputs: Mapping[str, Any] | None, outputs: Any, parameters: Mapping[str, Any] | None, module: str
+    function: Callable[..., Any],
+    inputs: Mapping[str, Any] | None,
+    outputs: Any,
+    parameters: Mapping[str, Any] | None,
+    module: str,
 ) -> NodeFunction[..., Any]:
     name = function_name(function)
     where = f"node type {name}"
@@ -187,7 +202,9 @@ def _make(
             name=snake_case(name) or "function",
             origin=cls,  # the NodeFunction takes this place below
             module=module,
-            qualname=getattr(function, "__qualname__", name) if getattr(function, "__module__", None) == module else name,
+            qualname=getattr(function, "__qualname__", name)
+            if getattr(function, "__module__", None) == module
+            else name,
             doc=inspect.cleandoc(getattr(function, "__doc__", None) or ""),
             inputs=types.MappingProxyType(inputs_by_name),
             outputs=types.MappingProxyType({spec.name: spec for spec in output_specs}),
@@ -203,15 +220,26 @@ def _make(
         install_ports(cls, made, Node)
         return made
 
-    body = {"__module__": module, "__qualname__": getattr(function, "__qualname__", name), "__doc__": getattr(function, "__doc__", None)}
-    node_class = cast(type[Node], types.new_class(name, (FunctionNode,), {"_made": describe_type}, lambda namespace: namespace.update(body)))
-    made = NodeFunction(function, node_class)
+    body = {
+        "__module__": module,
+        "__qualname__": getattr(function, "__qualname__", name),
+        "__doc__": getattr(function, "__doc__", None),
+    }
+    node_class = cast(
+        type[Node],
+        types.new_class(name, (FunctionNode,), {"_made": describe_type}, lambda namespace: namespace.update(body)),
+    )
+    made: NodeFunction[..., Any] = NodeFunction(function, node_class)
     made._type = node_class._type = dataclasses.replace(node_class._type, origin=made)
     return made
 
 
 def _read(
-    function: Callable[..., Any], where: str, inputs: Mapping[str, Any] | None, outputs: Any, parameters: Mapping[str, Any] | None
+    function: Callable[..., Any],
+    where: str,
+    inputs: Mapping[str, Any] | None,
+    outputs: Any,
+    parameters: Mapping[str, Any] | None,
 ) -> Signature:
     if isinstance(function, np.ufunc) and inputs is None and not parameters:
         names = ["x"] if function.nin == 1 else [f"x{number}" for number in range(1, function.nin + 1)]
@@ -224,12 +252,16 @@ def _read(
         return signature
 
     def complete(spec: ParameterSpec) -> ParameterSpec:
-        return spec if spec.name not in declared else msgspec.structs.replace(declared[spec.name].spec(), name=spec.name)
+        return (
+            spec if spec.name not in declared else msgspec.structs.replace(declared[spec.name].spec(), name=spec.name)
+        )
 
     return dataclasses.replace(signature, parameters=tuple(complete(spec) for spec in signature.parameters))
 
 
-def _read_outputs(function: Any, where: str, outputs: Any, signature: Signature) -> tuple[list[OutputSpec], tuple[str, ...] | None]:
+def _read_outputs(
+    function: Any, where: str, outputs: Any, signature: Signature
+) -> tuple[list[OutputSpec], tuple[str, ...] | None]:
     """Give the outputs, and the field names if the result is split; None if it is one value."""
     if isinstance(outputs, Mapping):
         return [OutputSpec(name, hint) for name, hint in outputs.items()], tuple(outputs)
@@ -246,7 +278,8 @@ def _read_outputs(function: Any, where: str, outputs: Any, signature: Signature)
     if signature.output is MISSING:
         given = ", inputs={...}" if signature.inputs and not inspect.isfunction(function) else ""
         raise DeclarationError(
-            f"{where}: nothing says what it gives back; annotate the result (`-> None` for a sink), or write hfg.node({function_name(function)}{given}, outputs=Any)"
+            f"{where}: nothing says what it gives back; annotate the result (`-> None` for a sink), or write "
+            f"hfg.node({function_name(function)}{given}, outputs=Any)"
         )
     return ([] if signature.output is None else [OutputSpec("out", signature.output)]), None
 
@@ -260,9 +293,9 @@ def _fields_of(outputs: Any, where: str) -> dict[str, Any] | None:
         return None
     hints = hints_of_class(outputs, where)
     if named_tuple:
-        names: tuple[str, ...] = outputs._fields
+        names: tuple[str, ...] = cast(Any, outputs)._fields
     elif dataclasses.is_dataclass(outputs):
         names = tuple(item.name for item in dataclasses.fields(outputs))
     else:
-        names = outputs.__struct_fields__
+        names = cast(Any, outputs).__struct_fields__
     return {name: hints.get(name, Any) for name in names}

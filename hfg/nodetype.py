@@ -1,8 +1,9 @@
 """Node types as classes: `Node`, what it offers to users, and what a runner does with it.
 
-A node is a type, parameters and options, nothing else: it can always be made again from its reference and parameters, so copies, files, workers and reload work.
-What is the same for all nodes of a type lies in its `NodeType`; a node holds its parameters and the ports that somebody asked for.
-Stands on ports, `declaration` and `description`; knows neither graphs nor who runs it.
+A node is a type, parameters and options, nothing else: it can always be made again from its reference and parameters,
+so copies, files, workers and reload work. What is the same for all nodes of a type lies in its `NodeType`; a node holds
+its parameters and the ports that somebody asked for. Stands on ports, `declaration` and `description`; knows neither
+graphs nor who runs it.
 """
 
 from __future__ import annotations
@@ -16,10 +17,17 @@ import msgspec
 
 from hfg.declaration import declare
 from hfg.description import NodeType
-from hfg.errors import DeclarationError, EngineInternalError, UsageError
-from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, SUBGRAPH_EVENTS, SUBGRAPH_SLOTS, automatic_event, automatic_slot
+from hfg.errors import DeclarationError, EngineInternalError, NodeError, UsageError
+from hfg.ports.automatic import (
+    AUTOMATIC_EVENTS,
+    AUTOMATIC_SLOTS,
+    SUBGRAPH_EVENTS,
+    SUBGRAPH_SLOTS,
+    automatic_event,
+    automatic_slot,
+)
 from hfg.ports.base import Kind, Port, Source, Target
-from hfg.ports.events import EventPort
+from hfg.ports.events import Event, EventPort
 from hfg.ports.inputs import InputPort
 from hfg.ports.outputs import OutputPort
 from hfg.ports.parameters import REQUIRED, ParameterPort
@@ -31,7 +39,9 @@ __all__ = ["Node", "NodeType", "Place"]
 
 Other = TypeVar("Other")
 
-_NO_PARAMETERS: Final[dict[str, Any]] = {}  # shared by all nodes without any; never written, since there is no name to write
+_NO_PARAMETERS: Final[
+    dict[str, Any]
+] = {}  # shared by all nodes without any; never written, since there is no name to write
 _NOTHING: Final[frozenset[str]] = frozenset()
 
 
@@ -46,9 +56,9 @@ class Place(msgspec.Struct, frozen=True):
 class Node:
     """Base of node types that are classes; see `hfg.node` for functions.
 
-    Ports, parameters and state are declared in the class body (`hfg.Input`, `Output`, `Event`, `slot`, `Parameter`, `State`); without declared ports the
-    arguments and the return annotation of `process` declare them. A type without `process` never fires and lives by its slots. There is no `__init__`:
-    nothing is opened before `setup()`.
+    Ports, parameters and state are declared in the class body (`hfg.Input`, `Output`, `Event`, `slot`, `Parameter`,
+    `State`); without declared ports the arguments and the return annotation of `process` declare them. A type without
+    `process` never fires and lives by its slots. There is no `__init__`: nothing is opened before `setup()`.
 
     Example:
       >>> class Count(Node):
@@ -60,22 +70,32 @@ class Node:
       <ports <inputs ['value']> <outputs ['out']> <events []> <slots []> <parameters []>>
     """
 
-    # Slots keep what hfg needs apart from what users write on `self`: a run starts fresh by looking at the instance's dictionary alone.
-    __slots__ = ("__dict__", "__weakref__", "_active", "_before", "_log", "_options", "_parameters", "_place")
+    # Slots keep what hfg needs apart from what users write on `self`: a run starts fresh by looking at the instance's
+    # dictionary alone.
+    __slots__ = (
+        "__dict__",
+        "__weakref__",
+        "_active",
+        "_options",
+        "_parameters",
+        "_path_log",
+        "_place",
+        "_written_before",
+    )
 
     _type: ClassVar[NodeType]
     _active: bool  # A(v) during a run; written by the runner
-    _before: frozenset[str] | None  # attributes that users set before the first run; None before it
-    _log: logging.LoggerAdapter[logging.Logger] | None
+    _written_before: frozenset[str] | None  # attributes that users set before the first run; None before it
+    _path_log: logging.LoggerAdapter[logging.Logger] | None
     _options: Any  # written by the graph
     _parameters: dict[str, Any]  # the live values; change them by `_set_parameter`
     _place: Place | None  # written by the graph
 
-    activated = automatic_event("activated")
-    deactivated = automatic_event("deactivated")
-    processed = automatic_event("processed")
-    failed = automatic_event("failed")
-    timeout = automatic_event("timeout")
+    activated: Event[None] = automatic_event("activated")
+    deactivated: Event[None] = automatic_event("deactivated")
+    processed: Event[None] = automatic_event("processed")
+    failed: Event[NodeError] = automatic_event("failed")
+    timeout: Event[None] = automatic_event("timeout")
     enable = automatic_slot("enable")
     disable = automatic_slot("disable")
     activate = automatic_slot("activate")
@@ -86,12 +106,13 @@ class Node:
         """Make a node; parameters by keyword only.
 
         Raises:
-          TypeError: a value without a name, or a parameter that the type does not have, or one without default is missing.
+          TypeError: a value without a name, or a parameter that the type does not have, or one without default is
+            missing.
           ValueError: a value breaks the parameter's limits.
         """
         self._active = False
-        self._before = None
-        self._log = None
+        self._written_before = None
+        self._path_log = None
         self._options = None
         self._place = None
         if positional:
@@ -105,9 +126,14 @@ class Node:
                 f"node type {cls.__name__}: __init__ is not overridden, a node is made from its parameters alone; "
                 "declare hfg.Parameter and hfg.State, and open things in setup()"
             )
+        hidden = next((name for name in vars(cls) if name in _HIDDEN), None)
+        if hidden is not None and not cls.__module__.startswith("hfg."):
+            raise DeclarationError(
+                f'node type {cls.__name__}: "{hidden}" is used by hfg itself; choose a name without the underscore'
+            )
         cls._type = declare(cls, Node) if _made is None else _made(cls)
 
-    # --- for users ---------------------------------------------------------------------------------------------------------------------------------------
+    # --- for users ---
 
     def setup(self) -> Any:
         """Open what a run needs; called before the first firing and after `reset`. May be async, like all hooks."""
@@ -149,14 +175,16 @@ class Node:
     @property
     def log(self) -> logging.LoggerAdapter[logging.Logger]:
         """A logger whose records carry the node's `path`."""
-        if self._log is None:
-            self._log = _PathLogger(self)
-        return self._log
+        if self._path_log is None:
+            self._path_log = _PathLogger(self)
+        return self._path_log
 
     @property
     def inner(self) -> Any:
         """Refused: ports have inner sides, nodes do not."""
-        raise UsageError(f'node "{_name(self)}" has no inner side; .inner belongs to the ports of a subgraph: self.port.inner')
+        raise UsageError(
+            f'node "{_name(self)}" has no inner side; .inner belongs to the ports of a subgraph: self.port.inner'
+        )
 
     def __rshift__(self, other: Other) -> Other:
         """Connect the only port that sends to a target, or to the only free one of a node; gives back `other`."""
@@ -167,7 +195,7 @@ class Node:
         where = f' at "{self._place.path}"' if self._place is not None else ""
         return f"<{self._type.qualname}({values}){where}>"
 
-    # --- for whoever runs, draws or stores nodes -----------------------------------------------------------------------------------------------------------
+    # --- for whoever runs, draws or stores nodes ---
 
     def _port(self, kind: Kind, name: str) -> Any:
         """Give the bound port, made at the first call and kept where attribute access finds it."""
@@ -176,7 +204,10 @@ class Node:
         if port is None:
             port = self.__dict__[key] = self._make_port(kind, name)
         elif not isinstance(port, Port):
-            raise UsageError(f'"{_name(self)}.{name}" is a port, but the node\'s code wrote {port!r} over it; write self.{name}.send(...) or use another name')
+            raise UsageError(
+                f'"{_name(self)}.{name}" is a port, but the node\'s code wrote {port!r} over it; '
+                f"write self.{name}.send(...) or use another name"
+            )
         return port
 
     def _make_port(self, kind: Kind, name: str) -> Port:
@@ -198,12 +229,16 @@ class Node:
                 return SlotPort(self, name, object)
         if type_.is_subgraph and name in (*AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS):
             raise UsageError(
-                f'subgraph "{_name(self)}" has no {kind} "{name}", for it does not fire itself; connect that of a node inside, or a {kind} of its own'
+                f'subgraph "{_name(self)}" has no {kind} "{name}", for it does not fire itself; connect that of a '
+                f"node inside, or a {kind} of its own"
             )
         raise UsageError(f'node type {type_.name} has no {kind} "{name}"')
 
     def _process_call(self) -> Callable[..., Any]:
-        """Give what runs one firing: one positional argument for each input in order; the raw result, coroutine or iterator comes back."""
+        """Give what runs one firing: one positional argument for each input in order.
+
+        The raw result, coroutine or iterator comes back.
+        """
         if self._type.caller is None:
             raise EngineInternalError(f'node "{_name(self)}" has no process function to call')
         return self._type.caller(self)
@@ -247,14 +282,22 @@ class Node:
             return [None] * len(type_.outputs)
         names = ", ".join(f'"{name}"' for name in type_.outputs)
         if type_.result == "none":
-            raise TypeError(f"{type_.name} has no output but gave back {result!r}; declare an output (annotate the result), or return nothing")
+            raise TypeError(
+                f"{type_.name} has no output but gave back {result!r}; declare an output (annotate the result), or "
+                "return nothing"
+            )
         if isinstance(result, tuple | list):
             if len(result) != len(type_.outputs):
-                raise TypeError(f"{type_.name} gave back {len(result)} values, but has {len(type_.outputs)} outputs: {names}; return one for each")
+                raise TypeError(
+                    f"{type_.name} gave back {len(result)} values, but has {len(type_.outputs)} outputs: {names}; "
+                    "return one for each"
+                )
             return list(result)
         if type_.fields and all(hasattr(result, name) for name in type_.fields):
             return [getattr(result, name) for name in type_.fields]
-        raise TypeError(f"{type_.name} gave back {result!r}, but has the outputs {names}; return a tuple with one value for each")
+        raise TypeError(
+            f"{type_.name} gave back {result!r}, but has the outputs {names}; return a tuple with one value for each"
+        )
 
     def _set_parameter(self, name: str, value: Any) -> None:
         """Change a parameter; the value stays if it is refused.
@@ -271,14 +314,22 @@ class Node:
         self._parameters[name] = value
 
     def _reset_states(self) -> None:
-        """Begin a run: state afresh, and nothing left of what an earlier run wrote on the node; what was there before the first run stays."""
+        """Begin a run: state afresh, and nothing left of what an earlier run wrote on the node.
+
+        What was there before the first run stays.
+        """
         own = self.__dict__
         states = self._type.states
-        if self._before is None:
+        if self._written_before is None:
             # Ports are the node's own and stay as well; state is written anew.
-            self._before = frozenset(name for name, value in own.items() if not isinstance(value, Port) and name not in states) or _NOTHING
+            self._written_before = (
+                frozenset(name for name, value in own.items() if not isinstance(value, Port) and name not in states)
+                or _NOTHING
+            )
         else:
-            for name in [name for name, value in own.items() if name not in self._before and not isinstance(value, Port)]:
+            for name in [
+                name for name, value in own.items() if name not in self._written_before and not isinstance(value, Port)
+            ]:
                 del own[name]
         for name, state in states.items():
             own[name] = state.fresh()
@@ -294,7 +345,8 @@ class Node:
           UsageError: there is none, or more than one.
         """
         candidates = [*self.ports.outputs.values(), *self.ports.events.values()]
-        return _only(self, candidates, "output or event")
+        source: Source[Any] = _only(self, candidates, "output or event")
+        return source
 
     def _free_target(self) -> Target[Any]:
         """Find the only port that receives and is free: inputs without an edge, and slots.
@@ -306,7 +358,8 @@ class Node:
         if len(candidates) > 1 and self._place is not None:
             taken = {id(edge.target) for edge in self._place.graph.edges}
             candidates = [port for port in candidates if port.kind == "slot" or id(port) not in taken]
-        return _only(self, candidates, "free input or slot")
+        target: Target[Any] = _only(self, candidates, "free input or slot")
+        return target
 
 
 def _only(node: Node, candidates: list[Any], what: str) -> Any:
@@ -334,7 +387,9 @@ def _values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
             if wrong is not None:
                 raise ValueError(f'parameter "{type_.name}.{name}" {wrong}')
         elif spec.default is REQUIRED:
-            raise TypeError(f'{type_.name} needs a value for its parameter "{name}": write {type_.qualname}({name}=...)')
+            raise TypeError(
+                f'{type_.name} needs a value for its parameter "{name}": write {type_.qualname}({name}=...)'
+            )
         else:
             # A list as default must not be shared by all nodes.
             value = copy.copy(spec.default) if isinstance(spec.default, MutableMapping | list | set) else spec.default
@@ -369,5 +424,8 @@ class _PathLogger(logging.LoggerAdapter[logging.Logger]):
         kwargs["extra"] = {**kwargs.get("extra", {}), "path": _name(self._node)}
         return msg, kwargs
 
+
+_HIDDEN: Final = frozenset(name for name in vars(Node) if name.startswith("_") and not name.endswith("__"))
+"""What a user's class must not define by chance; only hfg's own classes may."""
 
 Node._type = NodeType("node", Node, Node.__module__, Node.__qualname__, "")

@@ -1,4 +1,7 @@
-"""Finds node types by reference, "module:qualname", and gives the reference of a type. Stands on `nodetype` and `functions`."""
+"""Finds node types by reference, "module:qualname", and gives the reference of a type.
+
+Stands on `nodetype` and `functions`.
+"""
 
 from __future__ import annotations
 
@@ -22,19 +25,28 @@ def find(reference: str) -> type[Node] | NodeFunction[..., Any]:
     """
     module, colon, qualname = reference.partition(":")
     if not (module and colon and qualname):
-        raise TargetError(f'"{reference}" is no reference to a node type; write "module:name", as in "my_robot.nodes:MapLookup"')
+        raise TargetError(
+            f'"{reference}" is no reference to a node type; write "module:name", as in "my_robot.nodes:MapLookup"'
+        )
     try:
         importlib.import_module(module)
     except ModuleNotFoundError as error:
-        raise TargetError(f'node type "{reference}": module "{error.name}" cannot be found; is it installed, or the folder on the path?') from error
+        raise TargetError(
+            f'node type "{reference}": module "{error.name}" cannot be found; is it installed, or the folder on the '
+            "path?"
+        ) from error
     except Exception as error:
-        raise TargetError(f'node type "{reference}": importing "{module}" failed ({type(error).__name__}: {error})') from error
+        raise TargetError(
+            f'node type "{reference}": importing "{module}" failed ({type(error).__name__}: {error})'
+        ) from error
     found = look_up(module, qualname)
-    if isinstance(found, NodeFunction) or inspect.isclass(found) and issubclass(found, Node):
+    if isinstance(found, NodeFunction) or (inspect.isclass(found) and issubclass(found, Node)):
         return found
     if found is None:
         raise TargetError(f'node type "{reference}": module "{module}" has no "{qualname}"')
-    raise TargetError(f'"{reference}" is {found!r}, no node type; derive it from hfg.Node, or decorate it with hfg.node')
+    raise TargetError(
+        f'"{reference}" is {found!r}, no node type; derive it from hfg.Node, or decorate it with hfg.node'
+    )
 
 
 def reference_of(node_type: Node | type[Node] | NodeFunction[..., Any]) -> str | None:

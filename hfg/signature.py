@@ -1,6 +1,7 @@
-"""Reads a function as a node type: arguments are inputs, keyword-only arguments are parameters, the return annotation is the output.
+"""Reads a function as a node type.
 
-Stands on ports and descriptions; knows no class of nodes. Every refusal says which function, which argument and what to write instead.
+Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output. Stands on ports and
+descriptions; knows no class of nodes. Every refusal says which function, which argument and what to write instead.
 """
 
 from __future__ import annotations
@@ -16,13 +17,22 @@ from typing import Annotated, Any, Final, NoReturn
 
 import annotated_types
 
-from hfg.description import InputSpec, OutputSpec, ProcessKind
+from hfg.description import InputSpec, ProcessKind
 from hfg.errors import DeclarationError
 from hfg.ports.parameters import REQUIRED, ParameterSpec, limits_of
 from hfg.token import Token
 from hfg.types import describe
 
-__all__ = ["CallPlan", "Signature", "hints_of", "hints_of_class", "kind_of", "output_type", "read_signature", "split_token"]
+__all__ = [
+    "CallPlan",
+    "Signature",
+    "hints_of",
+    "hints_of_class",
+    "kind_of",
+    "output_type",
+    "read_signature",
+    "split_token",
+]
 
 _NONE: Final = type(None)
 _SYNC_ITERATORS: Final = (abc.Iterator, abc.Generator)
@@ -45,9 +55,10 @@ class CallPlan:
     keyword_parameters: tuple[str, ...] = ()
 
     def bind(self, function: Callable[..., Any], parameters: Mapping[str, Any]) -> Callable[..., Any]:
-        """Make what takes one positional argument for each input; parameters are read from the live mapping at each call.
+        """Make what takes one positional argument for each input.
 
-        Without parameters and with inputs in order it is the function itself: no call between runner and user.
+        Parameters are read from the live mapping at each call. Without parameters and with inputs in order it is the
+        function itself: no call between runner and user.
         """
         inputs_lead = self.positional == tuple(range(len(self.positional))) and not self.keyword_inputs
         names = self.keyword_parameters
@@ -93,8 +104,8 @@ def hints_of(function: Any, where: str) -> dict[str, Any]:
     if inspect.isclass(target):
         hints = hints_of(target.__init__, where)
         return {**hints, "return": target}
-    if not hasattr(target, "__annotations__") and hasattr(type(target), "__call__"):
-        target = getattr(target, "__call__")
+    if not hasattr(target, "__annotations__") and not inspect.isroutine(target):
+        target = target.__call__  # an object that can be called
     return _resolve(target, where)
 
 
@@ -108,7 +119,11 @@ def _resolve(target: Any, where: str) -> dict[str, Any]:
         return typing.get_type_hints(target, include_extras=True)
     except NameError as error:
         missing = error.name
-        users = [name for name, hint in getattr(target, "__annotations__", {}).items() if isinstance(hint, str) and str(missing) in hint]
+        users = [
+            name
+            for name, hint in getattr(target, "__annotations__", {}).items()
+            if isinstance(hint, str) and str(missing) in hint
+        ]
         place = f'the annotation of "{users[0]}"' if users else "an annotation"
         raise DeclarationError(
             f'{where}: "{missing}" in {place} cannot be found at run time; '
@@ -126,7 +141,9 @@ def kind_of(function: Any) -> ProcessKind:
     """Say how a callable runs by what it is; annotations may say more."""
     while isinstance(function, functools.partial):
         function = function.func
-    candidates = (function,) if inspect.isroutine(function) or inspect.isclass(function) else (function, getattr(function, "__call__", None))
+    candidates = (
+        (function,) if inspect.isroutine(function) or inspect.isclass(function) else (function, type(function).__call__)
+    )
     if any(map(inspect.isasyncgenfunction, candidates)):
         return "async generator"
     if any(map(inspect.isgeneratorfunction, candidates)):
@@ -151,7 +168,7 @@ def without_none(hint: Any) -> Any:
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         members = [member for member in typing.get_args(hint) if member is not _NONE]
         if len(members) < len(typing.get_args(hint)):
-            return typing.Union[tuple(members)]
+            return typing.Union[tuple(members)]  # noqa: UP007 - known at run time only
     return hint
 
 
@@ -162,7 +179,10 @@ def output_type(hint: Any) -> Any:
 
 
 def _return_type(hint: Any, kind: ProcessKind, has_inputs: bool) -> tuple[Any, ProcessKind]:
-    """Take iterators and awaitables off the return annotation; a function that gives an iterator and has no inputs is a generator too."""
+    """Take iterators and awaitables off the return annotation.
+
+    A function that gives an iterator and has no inputs is a generator too.
+    """
     origin, arguments = typing.get_origin(hint) or hint, typing.get_args(hint)
     first = arguments[0] if arguments else Any
     if kind == "generator" and origin in (*_SYNC_ITERATORS, abc.Iterable):
@@ -190,6 +210,7 @@ def read_signature(
     """Read a callable.
 
     Args:
+      function: a function, or anything else that can be called.
       where: names the node type in messages.
       inputs: types of arguments that are inputs, or new names as strings.
       parameters: defaults of arguments that are parameters.
@@ -206,7 +227,12 @@ class _Reader:
     """Goes through the arguments once; its fields are what was found so far."""
 
     def __init__(
-        self, function: Any, where: str, inputs: Mapping[str, Any], parameters: Mapping[str, Any], known: Mapping[str, InputSpec] | None
+        self,
+        function: Any,
+        where: str,
+        inputs: Mapping[str, Any],
+        parameters: Mapping[str, Any],
+        known: Mapping[str, InputSpec] | None,
     ) -> None:
         self.function = function
         self.where = where
@@ -236,7 +262,7 @@ class _Reader:
             self._match_known()
         kind = kind_of(self.function)
         output = MISSING
-        if "return" in self.hints or kind in ("generator", "async generator") and self.known is not None:
+        if "return" in self.hints or (kind in ("generator", "async generator") and self.known is not None):
             output, kind = _return_type(self.hints.get("return"), kind, bool(self.inputs))
         return self._signature(output, kind)
 
@@ -254,7 +280,8 @@ class _Reader:
             unknown = [name for name in given if name not in names and not any_keyword]
             if unknown:
                 raise DeclarationError(
-                    f'{self.where}: {word}= names "{unknown[0]}", which is no argument of it; its arguments are {", ".join(sorted(names)) or "none"}'
+                    f'{self.where}: {word}= names "{unknown[0]}", which is no argument of it; its arguments are '
+                    f"{', '.join(sorted(names)) or 'none'}"
                 )
         if any_keyword:
             self.keyword_parameters += [name for name in self.given_parameters if name not in names]
@@ -266,7 +293,10 @@ class _Reader:
             return by_position
         if argument.kind is argument.VAR_POSITIONAL:
             if self.known is not None or not (self.given_inputs or self.given_parameters):
-                raise DeclarationError(f'{self.where}: "*{name}" cannot be a port; name each argument, or connect through a node that collects them')
+                raise DeclarationError(
+                    f'{self.where}: "*{name}" cannot be a port; name each argument, or connect through a node that '
+                    "collects them"
+                )
             return False
         positional = argument.kind in _POSITIONAL
         if name in self.given_parameters:
@@ -284,7 +314,9 @@ class _Reader:
         """Arguments of library functions that nobody asked for stay at their defaults."""
         if argument.name in self.given_inputs or argument.default is MISSING:
             return False
-        return self.inputs_complete or argument.name not in self.hints and bool(self.given_inputs or self.given_parameters)
+        return self.inputs_complete or (
+            argument.name not in self.hints and bool(self.given_inputs or self.given_parameters)
+        )
 
     def _pass_input(self, spec: InputSpec, argument: str, by_position: bool) -> None:
         if by_position:
@@ -310,15 +342,26 @@ class _Reader:
             token = hint is not MISSING and split_token(hint)[1]
             if has_default and not spec.optional:
                 raise DeclarationError(
-                    f'{self.where}: process gives "{name}" a default, but the input is mandatory; write hfg.Input(..., optional=True, default=...)'
+                    f'{self.where}: process gives "{name}" a default, but the input is mandatory; '
+                    "write hfg.Input(..., optional=True, default=...)"
                 )
-            return InputSpec(name, spec.type, spec.optional, spec.default if spec.default is not None or not has_default else default, token)
+            return InputSpec(
+                name,
+                spec.type,
+                spec.optional,
+                spec.default if spec.default is not None or not has_default else default,
+                token,
+            )
         if self.known:
             raise DeclarationError(
-                f'{self.where}: process has an argument "{name}", but the declared inputs are {_names(self.known)}; declare `{name} = hfg.Input(...)` too'
+                f'{self.where}: process has an argument "{name}", but the declared inputs are {_names(self.known)}; '
+                f"declare `{name} = hfg.Input(...)` too"
             )
         if hint is MISSING:
-            raise DeclarationError(f'{self.where}: argument "{name}" has no annotation, so its input has no type; {self._call_to_write(name)}')
+            raise DeclarationError(
+                f'{self.where}: argument "{name}" has no annotation, so its input has no type; '
+                f"{self._call_to_write(name)}"
+            )
         type_, token = split_token(hint)
         return InputSpec(given if isinstance(given, str) else name, type_, has_default, default, token)
 
@@ -329,7 +372,10 @@ class _Reader:
             return
         missing = [name for name in self.known if name not in {spec.name for spec in self.inputs}]
         if missing:
-            raise DeclarationError(f'{self.where}: process has no argument for the input "{missing[0]}"; it needs one for each of {_names(self.known)}')
+            raise DeclarationError(
+                f'{self.where}: process has no argument for the input "{missing[0]}"; it needs one for each of '
+                f"{_names(self.known)}"
+            )
         order = {name: index for index, name in enumerate(self.known)}
         new_index = [order[spec.name] for spec in self.inputs]
         self.positional = [new_index[item] if isinstance(item, int) else item for item in self.positional]
@@ -342,7 +388,8 @@ class _Reader:
         if hint is MISSING:
             if default is REQUIRED or default is None:
                 raise DeclarationError(
-                    f'{self.where}: parameter "{argument.name}" has neither annotation nor default; write `{argument.name}: float = 1.0`'
+                    f'{self.where}: parameter "{argument.name}" has neither annotation nor default; write '
+                    f"`{argument.name}: float = 1.0`"
                 )
             hint = type(default)
         return self._parameter_spec(argument.name, default, hint)
@@ -360,13 +407,15 @@ class _Reader:
         if limits or units:
             hint = typing.get_args(hint)[0]
         if default is None and hint is not Any:
-            hint = hint | None if isinstance(hint, type | types.UnionType) else typing.Optional[hint]
+            hint = typing.Union[hint, None]  # noqa: UP007 - some hints know no |
         return ParameterSpec(name, hint, default, limits, units[0] if units else None)
 
     def _unreadable(self) -> Signature:
         """A function of a C library: only what inputs= and parameters= say is known."""
         if not self.given_inputs or not self.inputs_complete:
-            raise DeclarationError(f"{self.where}: the function's signature cannot be read; {self._call_to_write(None)}")
+            raise DeclarationError(
+                f"{self.where}: the function's signature cannot be read; {self._call_to_write(None)}"
+            )
         by_position = not self.given_parameters
         for name, hint in self.given_inputs.items():
             type_, token = split_token(hint)
@@ -380,7 +429,11 @@ class _Reader:
             return f"write `{missing}: float`, or declare `{missing} = hfg.Input(float)`"
         name = function_name(self.function)
         try:
-            arguments = [a for a in inspect.signature(self.function).parameters.values() if a.kind in _POSITIONAL and a.default is MISSING]
+            arguments = [
+                a
+                for a in inspect.signature(self.function).parameters.values()
+                if a.kind in _POSITIONAL and a.default is MISSING
+            ]
             inputs = {a.name: describe(self.hints.get(a.name, Any)) for a in arguments}
         except (ValueError, TypeError):
             inputs = {"src": "Any"}

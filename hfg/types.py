@@ -1,8 +1,9 @@
 """Which port types fit together, and which values fit a type (rule P3).
 
-Our own comparison instead of beartype's `is_subhint`, which raises on every `NDArray` and knows neither int -> float nor arrays with a layout. Metadata of
-`Annotated` is taken off, apart from our own: `Shape` and `Pixels` say how an array is laid out. What cannot be judged is said, never guessed.
-Stands on numpy and beartype; knows neither ports nor nodes.
+Our own comparison instead of beartype's `is_subhint`, which raises on every `NDArray` and knows neither int -> float
+nor arrays with a layout. Metadata of `Annotated` is taken off, apart from our own: `Shape` and `Pixels` say how an
+array is laid out. What cannot be judged is said, never guessed. Stands on numpy and beartype; knows neither ports nor
+nodes.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class Shape:
         self.axes = axes
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and isinstance(other, Shape) and other.axes == self.axes
+        return isinstance(other, Shape) and type(other) is type(self) and other.axes == self.axes
 
     def __hash__(self) -> int:
         return hash((type(self), self.axes))
@@ -102,8 +103,23 @@ ColorImage: TypeAlias = Annotated[npt.NDArray[Any], Pixels(3)]
 """An image of three channels."""
 
 _NONE: Final = type(None)
-_TOWER: Final[dict[type, tuple[type, ...]]] = {float: (int,), complex: (int, float)}
-"""What a number type takes besides itself (PEP 484); bool is an int already."""
+_OPEN_DTYPES: Final = frozenset(
+    {
+        np.generic,
+        np.number,
+        np.integer,
+        np.signedinteger,
+        np.unsignedinteger,
+        np.inexact,
+        np.floating,
+        np.complexfloating,
+        np.flexible,
+        np.character,
+    }
+)
+"""Scalar classes that stand for several dtypes."""
+_TOWER: Final[dict[type, tuple[type, ...]]] = {float: (int, bool), complex: (int, bool, float)}
+"""What a number type takes besides itself (PEP 484)."""
 
 
 def compatible(source: Any, target: Any) -> bool:
@@ -149,18 +165,26 @@ def _judge(source: Any, target: Any) -> str | None:
 
 
 def _judge_plain(source: Any, target: Any) -> str | None:
-    if isinstance(target, type) and source in _TOWER.get(target, ()) or source == target:
-        return None
-    if isinstance(target, type) and issubclass(bool, target) and source is bool:
-        return None
-    if source is bool and target in (float, complex):
+    if (isinstance(target, type) and source in _TOWER.get(target, ())) or source == target:
         return None
     try:
         fits = TypeHint(source).is_subhint(TypeHint(target))
     except (BeartypeException, TypeError, ValueError) as error:
+        if _same_generic(source, target):  # beartype raises on every NDArray, also inside list[...]
+            pairs = zip(typing.get_args(source), typing.get_args(target), strict=True)
+            return next((reason for mine, theirs in pairs if (reason := _judge(mine, theirs))), None)
         culprit = next((hint for hint in (source, target) if not _is_hint(hint)), source)
         return f"hfg cannot judge the type {describe(culprit)} ({type(error).__name__}); use a plainer type, or Any"
     return None if fits else f"{describe(source)} is no {describe(target)}"
+
+
+def _same_generic(source: Any, target: Any) -> bool:
+    origin = typing.get_origin(source)
+    return (
+        isinstance(origin, type)
+        and origin is typing.get_origin(target)
+        and len(typing.get_args(source)) == len(typing.get_args(target))
+    )
 
 
 def _is_hint(hint: Any) -> bool:
@@ -174,7 +198,9 @@ def _is_hint(hint: Any) -> bool:
 _NOT_ARRAYS: Final = "not arrays"
 
 
-def _judge_arrays(source: Any, source_layouts: tuple[Shape, ...], target: Any, target_layouts: tuple[Shape, ...]) -> str | None:
+def _judge_arrays(
+    source: Any, source_layouts: tuple[Shape, ...], target: Any, target_layouts: tuple[Shape, ...]
+) -> str | None:
     """Compare two arrays by dtype and layout; `_NOT_ARRAYS` if the target is none, or both are plain."""
     target_dtype = _dtype_of(target)
     if target_dtype is None:
@@ -198,17 +224,16 @@ def _subclass(source: type, target: Any) -> str | None:
 
 
 def _dtypes_meet(source: Any, target: Any) -> bool:
-    """Compare scalar classes; an open dtype (Any, np.generic, np.floating ...) fits what it may hold and is checked on the value."""
+    """Compare scalar classes.
+
+    An open dtype (Any, np.generic, np.floating ...) fits what it may hold and is checked on the value.
+    """
     source, target = (np.generic if dtype is Any else dtype for dtype in (source, target))
     if _is_union(source) or _is_union(target):
         sources = typing.get_args(source) if _is_union(source) else (source,)
         targets = typing.get_args(target) if _is_union(target) else (target,)
         return all(any(_dtypes_meet(one, other) for other in targets) for one in sources)
-    return issubclass(source, target) or issubclass(target, source) and _is_open(source)
-
-
-def _is_open(scalar: type) -> bool:
-    return bool(scalar.__subclasses__()) and scalar not in (np.float64, np.complex128)
+    return issubclass(source, target) or (issubclass(target, source) and source in _OPEN_DTYPES)
 
 
 def _dtype_of(hint: Any) -> Any:
@@ -239,7 +264,8 @@ def _open(hint: Any) -> tuple[Any, tuple[Shape, ...]]:
         elif type(typing.get_origin(hint)).__name__ == "TypeAliasType":
             hint = typing.get_origin(hint).__value__[typing.get_args(hint)]
         elif isinstance(hint, typing.TypeVar):
-            hint = typing.Union[hint.__constraints__] if hint.__constraints__ else hint.__bound__ or Any
+            constraints = hint.__constraints__
+            hint = typing.Union[constraints] if constraints else hint.__bound__ or Any  # noqa: UP007 - known at run time
         else:
             return hint, layouts
 

@@ -1,12 +1,12 @@
 """The ends of edges: declarations for class bodies, and the bound ports of one node.
 
-    inputs  outputs  events  slots  parameters  states     one file for each kind: declaration and bound port
-    automatic                                               the ports of rule A9
-    relays                                                  the inner sides of a subgraph's ports
-    observable                                              events as reactivex observables
-    base                                                    Port, and the directions Source and Target
+inputs  outputs  events  slots  parameters  states     one file for each kind: declaration and bound port
+automatic                                               the ports of rule A9
+relays                                                  the inner sides of a subgraph's ports
+observable                                              events as reactivex observables
+base                                                    Port, and the directions Source and Target
 
-    barrier, edges                                          what a run keeps of them: state machines, for the engine only
+barrier, edges                                          what a run keeps of them: state machines, for the engine only
 """
 
 from hfg.ports.base import Port, Relaying, Source, Target

@@ -1,4 +1,7 @@
-"""The ports that every node has without declaring them (rule A9): their names, and their declarations on `Node`. Stands on events and slots."""
+"""The ports that every node has without declaring them (rule A9).
+
+Their names, and their declarations on `Node`. Stands on events and slots.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,13 @@ from hfg.ports.slots import Slot
 
 __all__ = ["AUTOMATIC_EVENTS", "AUTOMATIC_SLOTS", "SUBGRAPH_EVENTS", "SUBGRAPH_SLOTS"]
 
-AUTOMATIC_EVENTS: Final[dict[str, Any]] = {"activated": None, "deactivated": None, "processed": None, "failed": NodeError, "timeout": None}
+AUTOMATIC_EVENTS: Final[dict[str, Any]] = {
+    "activated": None,
+    "deactivated": None,
+    "processed": None,
+    "failed": NodeError,
+    "timeout": None,
+}
 """Name and type of the events that the runner triggers."""
 
 AUTOMATIC_SLOTS: Final = ("enable", "disable", "activate", "deactivate", "reset")

@@ -1,8 +1,9 @@
 """What every port has in common: whose it is, its name, type, direction and path, and how it is connected.
 
-A port is *declared* in a class body (`Input`, `Output`, `Event`, `slot`, `Parameter`); the *bound* port of one node is another class (`InputPort`, ...),
-made when it is first asked for. `Source[T]` and `Target[T]` are what type checkers see of a direction: an edge goes from a `Source[T]` to a `Target[T]`.
-Stands on errors; knows nodes and graphs only by what they must offer.
+A port is *declared* in a class body (`Input`, `Output`, `Event`, `slot`, `Parameter`); the *bound* port of one node is
+another class (`InputPort`, ...), made when it is first asked for. `Source[T]` and `Target[T]` are what type checkers
+see of a direction: an edge goes from a `Source[T]` to a `Target[T]`. Stands on errors; knows nodes and graphs only by
+what they must offer.
 """
 
 from __future__ import annotations
@@ -39,12 +40,18 @@ class Source(Generic[T_co]):
 
     __slots__ = ()
 
-    def activates(self, target: Target[T_co]) -> Any:  # type: ignore[misc]  # a source never stores what it is connected to
-        """Connect with an active edge, the double line of the paper; the same as `graph.connect(self, target, active=True)`."""
+    def activates(self, target: Target[T_co]) -> Any:
+        """Connect with an active edge, the double line of the paper.
+
+        The same as `graph.connect(self, target, active=True)`.
+        """
         return graph_of(self, target).connect(self, target, active=True)
 
     def __rshift__(self, other: Other) -> Other:
-        """Connect to a target, or to the only free one of a node; gives back `other`, so that chains read from left to right."""
+        """Connect to a target, or to the only free one of a node.
+
+        Gives back `other`, so that chains read from left to right.
+        """
         finder = getattr(other, "_free_target", None)
         target = other if finder is None else finder()
         if not isinstance(target, Target):
@@ -67,7 +74,7 @@ class Port:
     kind: ClassVar[Kind]
 
     def __init__(self, node: Owner, name: str, type: Any) -> None:  # noqa: A002 - the word users know
-        self.node = node
+        self.node: Any = node
         self.name = name
         self.type = type
 
@@ -87,7 +94,8 @@ class Port:
 
     def _not_running(self, call: str) -> NotRunning:
         return NotRunning(
-            f'"{self.path}" cannot {call} outside a run: run the graph with hfg.run(graph), or try the node alone with hfg.testing.fire'
+            f'"{self.path}" cannot {call} outside a run: run the graph with hfg.run(graph), or try the node alone '
+            "with hfg.testing.fire"
         )
 
 
@@ -112,5 +120,6 @@ def graph_of(source: object, target: object) -> Any:
             return graph
     first, second = cast(Any, source), cast(Any, target)
     raise UsageError(
-        f'"{first.path}" and "{second.path}" belong to no graph yet: add their nodes with graph.add(...) before connecting them'
+        f'"{first.path}" and "{second.path}" belong to no graph yet: add their nodes with graph.add(...) before '
+        "connecting them"
     )

@@ -1,18 +1,18 @@
-"""Events: asynchronous sending, triggered at any moment of a firing or call (rules F3, F8); each is a reactivex Observable of its tokens.
+"""Events: asynchronous sending, triggered at any moment of a firing or call (rules F3, F8).
 
-A plain edge does not pass through reactivex: the runner puts signals into queues itself and tells subscribers only when there are any.
-Stands on `base` and `observable`.
+Each is a reactivex Observable of its tokens. A plain edge does not pass through reactivex: the runner puts signals into
+queues itself and tells subscribers only when there are any. Stands on `base` and `observable`.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Awaitable, Callable
-from typing import Any, ClassVar, Final, Generic, TypeVar, overload
+from typing import Any, ClassVar, Final, Generic, Self, TypeVar, overload
 
 from reactivex import abc
 from reactivex.disposable import Disposable
-from typing_extensions import Self, TypeForm
+from typing_extensions import TypeForm
 
 from hfg.ports.base import Kind, Owner, Port, Source
 from hfg.ports.observable import RunObservable
@@ -33,6 +33,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
 
     # Subscribers in order of subscription, or None; the runner looks here before it calls `_notify`.
     _observers: list[abc.ObserverBase[Token[T]]] | None = None
+    _inner: InnerTarget[T] | None = None
 
     def __init__(self, node: Owner, name: str, type: Any = None) -> None:  # noqa: A002
         Port.__init__(self, node, name, type)
@@ -40,11 +41,14 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         self._emit: Callable[[Any, int | None, float | None], None] = self._refuse
         self._emit_wait: Callable[[Any, int | None, float | None], Awaitable[None]] = self._refuse_wait
 
-    def trigger(self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+    def trigger(
+        self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None
+    ) -> None:
         """Send a signal at once to everything connected; never waits (rule F8).
 
         Args:
-          value: an event may be triggered without a value (rule T2); a received token passed on keeps its modifier and its stamp.
+          value: an event may be triggered without a value (rule T2); a received token passed on keeps its modifier and
+            its stamp.
           activity: an explicit modifier (-1, 0, +1) for active edges (rule A4); without one, rule A3 decides.
           stamp: in seconds; without one, rule T5 decides.
 
@@ -54,14 +58,21 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         """
         self._emit(value, activity, stamp)
 
-    async def trigger_wait(self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None) -> None:
-        """Send a signal and wait until every queue behind it has room again; for async code that triggers without end (rule F8)."""
+    async def trigger_wait(
+        self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None
+    ) -> None:
+        """Send a signal and wait until every queue behind it has room again.
+
+        For async code that triggers without end (rule F8).
+        """
         await self._emit_wait(value, activity, stamp)
 
     @property
     def inner(self) -> InnerTarget[T]:
         """Its side that looks into a subgraph."""
-        return self.__dict__.get("_inner") or self.__dict__.setdefault("_inner", inner_target(self))
+        if self._inner is None:
+            self._inner = inner_target(self)
+        return self._inner
 
     def _refuse(self, value: Any, activity: int | None, stamp: float | None) -> None:
         raise self._not_running("trigger")
@@ -83,7 +94,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         for observer in self._observers or ():
             try:
                 observer.on_next(token)
-            except Exception:  # noqa: BLE001 - the emitter must never see a subscriber's fault
+            except Exception:
                 _LOGGER.exception('a subscriber of "%s" failed and was dropped', self.path, extra={"path": self.path})
                 self._drop(observer)
 
@@ -93,8 +104,10 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         for observer in observers or ():
             try:
                 observer.on_completed()
-            except Exception:  # noqa: BLE001
-                _LOGGER.exception('a subscriber of "%s" failed as the event completed', self.path, extra={"path": self.path})
+            except Exception:
+                _LOGGER.exception(
+                    'a subscriber of "%s" failed as the event completed', self.path, extra={"path": self.path}
+                )
 
 
 class Event(Generic[T]):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Generic, TypeVar, overload
+from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
-from typing_extensions import Self, TypeForm
+from typing_extensions import TypeForm
 
+from hfg.errors import DeclarationError
 from hfg.ports.base import Kind, Owner, Port, Target
 from hfg.ports.relays import InnerSource, inner_source
 
@@ -37,13 +38,19 @@ class Input(Generic[T]):
 
     Args:
       type: what may arrive, any type hint.
-      optional: the node also fires when the input is not connected or holds nothing; `process` then gets `default` (rule P6).
+      optional: the node also fires when the input is not connected or holds nothing; `process` then gets `default`
+        (rule P6).
       default: what `process` gets when an optional input is absent.
     """
 
     kind: ClassVar[Kind] = "input"
 
     def __init__(self, type: TypeForm[T], *, optional: bool = False, default: T | None = None) -> None:  # noqa: A002
+        if default is not None and not optional:
+            raise DeclarationError(
+                f"an input with the default {default!r} must be optional: write hfg.Input(..., optional=True, "
+                f"default={default!r})"
+            )
         self.type: Any = type
         self.inferred = False  # read from a function, not written in a class body
         self.optional = optional

@@ -1,8 +1,8 @@
 """Observables that belong to a run: what is derived from an event keeps the run's scheduler and its guards.
 
-Without a scheduler an operator such as `debounce` of reactivex waits on a thread of its own, and in virtual time for ever. So `pipe`, and every operator
-method, which all go through `pipe`, give an observable that passes the scheduler of the run on when somebody subscribes.
-Stands on reactivex; knows no port.
+Without a scheduler an operator such as `debounce` of reactivex waits on a thread of its own, and in virtual time for
+ever. So `pipe`, and every operator method, which all go through `pipe`, give an observable that passes the scheduler of
+the run on when somebody subscribes. Stands on reactivex; knows no port.
 """
 
 from __future__ import annotations
@@ -24,17 +24,20 @@ T_co = TypeVar("T_co", covariant=True)
 class RunObservable(Observable[T_co]):
     """An observable whose subscribers get the scheduler of the run that its origin takes part in."""
 
-    # `super().__init__()` is left out on purpose: its lock costs 105 bytes for each event and is needed by few operators.
+    # `super().__init__()` is left out on purpose: its lock costs 105 bytes for each event and is needed by few
+    # operators.
 
     @functools.cached_property
     def lock(self) -> threading.RLock:  # type: ignore[override]
+        """Made when an operator asks for it."""
         return threading.RLock()
 
     @property
     def _origin(self) -> RunObservable[Any]:
         return self
 
-    # Both are set by the runner on the event; None outside a run. `_thread` is the identity of the thread on which the run decides.
+    # Both are set by the runner on the event; None outside a run. `_thread` is the identity of the thread on which the
+    # run decides.
     _scheduler: abc.SchedulerBase | None = None
     _thread: int | None = None
     path: Any
@@ -67,7 +70,10 @@ class RunObservable(Observable[T_co]):
         return _keep(super().pipe(*operators), self._origin) if operators else self
 
     def __await__(self) -> Generator[Any, None, NoReturn]:
-        raise TypeError(f'"{self._origin.path}" cannot be awaited: write `await run.wait_for(event)` inside `async with hfg.running(graph) as run`')
+        raise TypeError(
+            f'"{self._origin.path}" cannot be awaited: write `await run.wait_for(event)` inside `async with '
+            "hfg.running(graph) as run`"
+        )
 
 
 def _keep(result: Any, origin: RunObservable[Any]) -> Any:
@@ -88,5 +94,7 @@ class _Derived(RunObservable[T_co]):
     def _origin(self) -> RunObservable[Any]:
         return self._source
 
-    def _subscribe_core(self, observer: abc.ObserverBase[T_co], scheduler: abc.SchedulerBase | None = None) -> abc.DisposableBase:
+    def _subscribe_core(
+        self, observer: abc.ObserverBase[T_co], scheduler: abc.SchedulerBase | None = None
+    ) -> abc.DisposableBase:
         return self._observable.subscribe(observer, scheduler=scheduler)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Generic, TypeVar, overload
+from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
-from typing_extensions import Self, TypeForm
+from typing_extensions import TypeForm
 
 from hfg.ports.base import Kind, Owner, Port, Source
 from hfg.ports.relays import InnerTarget, inner_target

@@ -1,13 +1,16 @@
-"""Parameters: values set when a node is made and by tokens (rule P8), within limits. Stands on `base`, `types` and annotated-types."""
+"""Parameters: values set when a node is made and by tokens (rule P8), within limits.
+
+Stands on `base`, `types` and annotated-types.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any, ClassVar, Final, Generic, TypeVar, overload
+from typing import Any, ClassVar, Final, Generic, Self, TypeVar, cast, overload
 
 import annotated_types
 import msgspec
-from typing_extensions import Self, TypeForm
+from typing_extensions import TypeForm
 
 from hfg.errors import DeclarationError, UsageError
 from hfg.ports.base import Kind, Owner, Port, Relaying, Source, Target
@@ -55,7 +58,7 @@ class ParameterSpec(msgspec.Struct, frozen=True):
         for limit in self.limits:
             try:
                 wrong = _breaks(limit, value)
-            except Exception as error:  # a comparison that the value does not know, or the user's own predicate
+            except Exception as error:  # noqa: BLE001 - a comparison that the value does not know, or the user's own predicate
                 return f"cannot be compared with {limit!r} ({type(error).__name__}: {error}), got {value!r}"
             if wrong:
                 return f"{wrong}, got {value!r}"
@@ -127,12 +130,12 @@ class ParameterPort(Port, Source[T], Target[T]):
         Raises:
           ValueError: on setting, a limit is broken; the value stays.
         """
-        parameters: Mapping[str, T] = getattr(self.node, "_parameters")
+        parameters: Mapping[str, T] = self.node._parameters
         return parameters[self.name]
 
     @value.setter
     def value(self, value: T) -> None:
-        getattr(self.node, "_set_parameter")(self.name, value)
+        self.node._set_parameter(self.name, value)
 
 
 class Parameter(Generic[T]):
@@ -151,7 +154,13 @@ class Parameter(Generic[T]):
 
     @overload
     def __init__(
-        self, default: T, /, *limits: Any, unit: str | None = None, choices: Collection[T] | None = None, trigger: bool = False
+        self,
+        default: T,
+        /,
+        *limits: Any,
+        unit: str | None = None,
+        choices: Collection[object] | None = None,
+        trigger: bool = False,
     ) -> None: ...
     @overload
     def __init__(
@@ -160,12 +169,12 @@ class Parameter(Generic[T]):
         /,
         *limits: Any,
         unit: str | None = None,
-        choices: Collection[T] | None = None,
+        choices: Collection[object] | None = None,
         type: TypeForm[T],
         trigger: bool = False,
     ) -> None: ...
     @overload
-    def __init__(self: Parameter[None], *, trigger: bool) -> None: ...
+    def __init__(self: Parameter[None], /, *, trigger: bool) -> None: ...
     def __init__(
         self,
         default: Any = None,
@@ -178,7 +187,10 @@ class Parameter(Generic[T]):
     ) -> None:
         unknown = [limit for limit in limits if not limits_of([limit])]
         if unknown:
-            raise DeclarationError(f"{unknown[0]!r} is no limit for a parameter: use those of annotated_types, such as Interval(ge=0, le=1)")
+            raise DeclarationError(
+                f"{unknown[0]!r} is no limit for a parameter: use those of annotated_types, such as Interval(ge=0, "
+                "le=1)"
+            )
         if type is None and default is not None:
             type = default.__class__  # noqa: A001
         self.inferred = False  # read from a function, not written in a class body
@@ -200,16 +212,18 @@ class Parameter(Generic[T]):
     @overload
     def __get__(self, node: None, owner: Any) -> Self: ...
     @overload
-    def __get__(self, node: Relaying, owner: Any) -> ParameterPort[T]: ...  # type: ignore[overload-overlap]  # a subgraph is a node
+    def __get__(self, node: Relaying, owner: Any) -> ParameterPort[T]: ...
     @overload
     def __get__(self, node: object, owner: Any) -> T: ...
     def __get__(self, node: Any, owner: Any) -> Any:
         if node is None:
             return self
         if self.trigger:
-            raise UsageError(f'"{self.name}" is a trigger: write node.ports.slots["{self.name}"] or node.ports.events["{self.name}"]')
+            raise UsageError(
+                f'"{self.name}" is a trigger: write node.ports.slots["{self.name}"] or node.ports.events["{self.name}"]'
+            )
         if isinstance(node, Relaying):
-            return node._port("parameter", self.name)  # type: ignore[attr-defined]
+            return cast(Any, node)._port("parameter", self.name)
         return node._parameters[self.name]
 
     def __set__(self, node: Any, value: T) -> None:

@@ -1,6 +1,7 @@
-"""The inner sides of a subgraph's ports: what an input is to the graph in the box is a source, what an output is, a target (rule G1).
+"""The inner sides of a subgraph's ports (rule G1).
 
-`subgraph.person.inner` is made when it is first asked for. Stands on `base`.
+Seen from inside the box an input or slot is a source, and an output or event is a target. `subgraph.person.inner` is
+made when it is first asked for. Stands on `base`.
 """
 
 from __future__ import annotations
@@ -93,4 +94,6 @@ def inner_target(port: Port) -> InnerTarget[Any]:
 def _need_box(port: Port) -> None:
     # The owner may also be a root graph, whose boundary has two sides as well; only plain nodes have no inside.
     if hasattr(port.node, "_type") and not isinstance(port.node, Relaying):
-        raise UsageError(f'"{port.path}" has no inner side: only ports of an hfg.Subgraph look into a box; connect the port itself')
+        raise UsageError(
+            f'"{port.path}" has no inner side: only ports of an hfg.Subgraph look into a box; connect the port itself'
+        )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Generic, TypeVar, overload
+from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
-from typing_extensions import Self, TypeForm
+from typing_extensions import TypeForm
 
 from hfg.errors import UsageError
 from hfg.ports.base import Kind, Owner, Port, Target
@@ -29,7 +29,10 @@ UNSET: Any = _Unset()
 
 
 class SlotPort(Port, Target[T]):
-    """The slot of one node; calling it runs the handler, without a run and without its rules, for tests and for `super()`."""
+    """The slot of one node.
+
+    Calling it runs the handler, without a run and without its rules, for tests and for `super()`.
+    """
 
     __slots__ = ("_inner",)
 
@@ -42,7 +45,7 @@ class SlotPort(Port, Target[T]):
         Raises:
           UsageError: the slot has no handler of its own: an automatic one (rule A9), a trigger's or a subgraph's.
         """
-        handler = getattr(self.node, "_handler")(self.name)
+        handler = self.node._handler(self.name)
         if handler is None:
             raise UsageError(f'"{self.path}" has no handler to call: connect an event to it, or use run.trigger(slot)')
         return handler(*value)
@@ -85,7 +88,9 @@ class Slot(Generic[T]):
     def __get__(self, node: Any, owner: Any) -> Any:
         if node is None:
             return self
-        if self.handler is not None and node._type.declared.get(self.name) is not self:  # reached by super(): another slot has its place
+        if (
+            self.handler is not None and node._type.declared.get(self.name) is not self
+        ):  # reached by super(): another slot has its place
             return self.handler.__get__(node)
         return node._port("slot", self.name)
 
@@ -104,7 +109,7 @@ def slot(*, type: TypeForm[T]) -> Slot[T]: ...
 def slot(handler: Callable[..., Any] | None = None, /, *, type: Any = UNSET) -> Any:  # noqa: A002
     """Make a method the handler of a slot of the same name.
 
-    The annotation of its argument is the slot's type; annotated `hfg.Token[int]` it gets the token; without an argument it takes any signal.
-    `@hfg.slot(type=...)` says the type itself.
+    The annotation of its argument is the slot's type; annotated `hfg.Token[int]` it gets the token; without an argument
+    it takes any signal. `@hfg.slot(type=...)` says the type itself.
     """
     return Slot(handler, type)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
-
-from typing_extensions import Self
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar, overload
 
 from hfg.errors import DeclarationError
 
@@ -31,7 +29,9 @@ class State(Generic[T]):
         if "default" in named:
             default += (named.pop("default"),)
         if named or len(default) + (factory is not None) != 1:
-            raise DeclarationError("hfg.State takes either one default or factory=: write hfg.State(0) or hfg.State(factory=list)")
+            raise DeclarationError(
+                "hfg.State takes either one default or factory=: write hfg.State(0) or hfg.State(factory=list)"
+            )
         self.default = default
         self.factory = factory
         self.name = ""

@@ -1,4 +1,7 @@
-"""`node.ports`: the ports of one node as mappings from name to bound port, in order of declaration. Stands on `base`."""
+"""`node.ports`: the ports of one node as mappings from name to bound port, in order of declaration.
+
+Stands on `base`.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,9 @@ class PortView(Mapping[str, P_co], Generic[P_co]):
             port: P_co = self._node._port(self._kind, name)
             return port
         known = ", ".join(f'"{known}"' for known in self._specs) or "none"
-        raise NoSuchPort(f'node type {self._node._type.name} has no {self._kind} "{name}"; its {self._kind}s are {known}')
+        raise NoSuchPort(
+            f'node type {self._node._type.name} has no {self._kind} "{name}"; its {self._kind}s are {known}'
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._specs)
