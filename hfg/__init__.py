@@ -16,25 +16,35 @@ A graph is built (floors 0-3) without any engine; the engine runs what it finds 
 
 from hfg import errors
 from hfg.clock import now
+from hfg.engine import Report, Run, VirtualTimeLoop, run, run_async, running
 from hfg.errors import EndOfStream
 from hfg.functions import node
+from hfg.graph import Graph, Subgraph
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 from hfg.token import END, NO_MESSAGE, Token
 
 __all__ = [
     "END",
-    "NO_MESSAGE",
     "EndOfStream",
     "Event",
+    "Graph",
     "Input",
+    "NO_MESSAGE",
     "Node",
     "Output",
     "Parameter",
+    "Report",
+    "Run",
     "State",
+    "Subgraph",
     "Token",
+    "VirtualTimeLoop",
     "errors",
     "node",
     "now",
+    "run",
+    "run_async",
+    "running",
     "slot",
 ]

@@ -1,0 +1,67 @@
+"""Two thread groups with OpenCV work against one.
+
+Measured: wall seconds for 60 pictures of 1280 x 960 through a fork into two branches of blurs, once with both branches in one thread group and once in two;
+`cv2.setNumThreads(1)` in both, so that the groups alone give the parallelism.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import cv2
+import numpy as np
+
+import hfg
+
+UNIT = "s"
+PICTURES = 60
+
+
+@hfg.node
+def pictures(*, count: int = 10) -> Iterator[Any]:
+    """Make noise pictures, always the same."""
+    random = np.random.default_rng(1)
+    picture = random.integers(0, 255, (960, 1280, 3), dtype=np.uint8)
+    for _ in range(count):
+        yield picture
+
+
+@hfg.node
+def work(picture: Any) -> int:
+    """Keep a core busy for some milliseconds, without the interpreter's lock."""
+    for _ in range(4):
+        picture = cv2.GaussianBlur(picture, (15, 15), 3.0)
+    return int(picture[0, 0, 0])
+
+
+@hfg.node
+def join(left: int, right: int) -> None:
+    """Wait for both."""
+
+
+def seconds(groups: int) -> float:
+    """Run it once."""
+    cv2.setNumThreads(1)
+    graph = hfg.Graph("threads")
+    graph.group("left", threads=1)
+    graph.group("right", threads=1)
+    source = graph.add(pictures(count=PICTURES))
+    left = graph.add(work(), name="left", group="left")
+    right = graph.add(work(), name="right", group="right" if groups == 2 else "left")
+    both = graph.add(join())
+    for branch, name in ((left, "left"), (right, "right")):
+        graph.connect(source.out, branch.ports.inputs["picture"])
+        graph.connect(branch.out, both.ports.inputs[name])
+    began = time.perf_counter()
+    hfg.run(graph)
+    return time.perf_counter() - began
+
+
+CASES: dict[str, Callable[[], float]] = {"one thread group": lambda: seconds(1), "two thread groups": lambda: seconds(2)}
+
+
+def ratios(medians: dict[str, float]) -> list[str]:
+    """How much faster two are."""
+    return [f"two groups are {medians['one thread group'] / medians['two thread groups']:.2f} times as fast as one"]

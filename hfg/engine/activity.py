@@ -1,0 +1,155 @@
+"""What follows when A(v) changes: hooks, automatic events, time-outs, gates, subgraphs (rules A9, A11, A12, G2), and reset (A14).
+
+Only workers marked `watched` come here. Stands on `sending`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hfg.engine.core import Core
+from hfg.engine.scopes import Scope
+from hfg.engine.sending import automatic, block, consider, flush_automatic, set_active, touch, trigger, unblock
+from hfg.engine.worker import RATE, RESTING, Worker
+
+__all__ = ["changed", "gate_changed", "reset_activity", "scopes_changed"]
+
+
+def changed(worker: Worker, active: bool) -> None:
+    """A(v) has just become `active`."""
+    core = worker.core
+    automatic(worker, "activated" if active else "deactivated")
+    _time_out_later(worker, active)
+    gate_changed(worker.gates)
+    if worker.scopes:
+        touch(core, worker.scopes)
+    if worker.has_hooks:
+        _call_hook(worker, "on_activated" if active else "on_deactivated")
+    if not worker.busy:
+        flush_automatic(worker)
+
+
+def _call_hook(worker: Worker, name: str) -> None:
+    hook = worker.node._hook(name)
+    if hook is None:
+        return
+
+    def done(_result: Any, error: BaseException | None) -> None:
+        if error is not None:
+            from hfg.engine.errors import fail
+
+            fail(worker, f"{name}()", error, answer=False)
+
+    worker.core.host.execute_aside(worker, hook, done)
+
+
+def _time_out_later(worker: Worker, active: bool) -> None:
+    """A12: the time runs from the change from 0 to 1; the timer counts only if the event leads somewhere."""
+    if worker.active_timer is not None:
+        worker.active_timer.cancel()
+        worker.active_timer = None
+    limit = worker.active_for_s
+    if active and limit is not None and worker.timeout_leads_somewhere():
+
+        def over() -> None:
+            worker.active_timer = None
+            worker.right = False
+            event = worker.events["timeout"]
+            trigger(event, stamp=worker.core.now(), extend_right=False)
+            flush_automatic(worker)
+
+        worker.active_timer = worker.core.after(limit, over)
+
+
+def gate_changed(gates: Any) -> None:
+    """A11: sources rest while the state is inactive; the others look when they fire."""
+    for gate in gates:
+        for worker in gate.workers:
+            if worker.is_source:
+                _rest(worker, gate)
+
+
+def _rest(worker: Worker, gate: Any) -> None:
+    if worker.rate_timer is not None:
+        worker.rate_timer.cancel()
+        worker.rate_timer = None
+        worker.blocked &= ~RATE
+    if gate.state.active:
+        unblock(worker, RESTING)
+        consider(worker)
+    elif gate.idle_rate_hz is None:
+        block(worker, RESTING)
+    else:
+        worker.placed = False
+        consider(worker)  # throttled: it may have to wait now (D7)
+
+
+# --- subgraphs --------------------------------------------------------------------------------------------------------------------------
+
+
+def scopes_changed(core: Core) -> None:
+    """G2: derive A(subgraph) anew for all that were touched; inner ones first."""
+    while core.dirty_scopes:
+        scope = core.dirty_scopes.pop()
+        active = scope.derive()
+        if active == scope.active:
+            continue
+        scope.active = active
+        owner = scope.worker
+        if owner is not None:
+            # the scope's worker shows A(subgraph), but nothing is transferred by itself
+            owner.active = active
+            owner.node._active = active
+            automatic(owner, "activated" if active else "deactivated")
+            _time_out_later(owner, active)
+        gate_changed(scope.gates)
+        if owner is not None:
+            _flush_scope(scope)
+
+
+def _flush_scope(scope: Scope) -> None:
+    """Activity that leaves by these events is taken from everything inside (G2)."""
+    owner = scope.worker
+    assert owner is not None
+    before = owner.active
+    flush_automatic(owner)
+    if before and not owner.active:
+        deactivate_inside(scope)
+
+
+def deactivate_inside(scope: Scope) -> None:
+    """Take all activity from the inside: of nodes, and of tokens under way."""
+    for edge in scope.inner_edges:
+        strip(edge)
+    for worker in scope.members:
+        worker.right = False
+        set_active(worker, False, "slot")
+    touch(scope.members[0].core, (scope,)) if scope.members else None
+
+
+def strip(edge: Any) -> None:
+    """Set the modifiers of what lies on an edge to 0 (A14)."""
+    import msgspec
+
+    if hasattr(edge, "queue"):
+        for position, token in enumerate(edge.queue):
+            if token.activity:
+                edge.queue[position] = msgspec.structs.replace(token, activity=0)
+    elif edge.token is not None and edge.token.activity:
+        edge.token = msgspec.structs.replace(edge.token, activity=0)
+
+
+def reset_activity(core: Core) -> None:
+    """A14: all A(v) := 0, modifiers := 0, the right of A3 ends, then `start` is triggered."""
+    for edge in core.edges:
+        strip(edge)
+    for worker in core.workers:
+        worker.right = False
+        if worker.scope is None:
+            set_active(worker, False, "reset")
+    touch(core, core.scopes)
+    scopes_changed(core)
+    assert core.boundary is not None
+    start = core.boundary.events.get("start")
+    if start is not None:
+        trigger(start, explicit=1)

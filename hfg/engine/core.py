@@ -1,0 +1,123 @@
+"""The state of one run, shared by the modules that decide over it.
+
+`sending` says what leaves a node, `firing` what a node does next, `wiring` which edges are live, `quiet` what happens when nothing moves, `steps` how the
+common shapes go fast. None of them waits: time, threads and coroutines are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asyncio.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from hfg.engine.scopes import Scope
+from hfg.engine.worker import Worker
+from hfg.errors import HfgError
+from hfg.ports.edges import Edge
+from hfg.trace import TraceEvent
+
+__all__ = ["PENDING", "Core", "Host", "Timer"]
+
+
+class _Pending:
+    def __repr__(self) -> str:
+        return "PENDING"
+
+
+PENDING = _Pending()
+"""What an executor returns for code that waits: its result comes later."""
+
+
+class Timer(Protocol):
+    """A call that has not happened yet."""
+
+    def cancel(self) -> None:
+        """Forget it."""
+
+
+class Host(Protocol):
+    """What the deciding part of the engine needs from the waiting part."""
+
+    def now(self) -> float:
+        """Seconds on the run's clock."""
+
+    def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
+        """Call back at `when` on the run's clock; the timer counts as one that could start something (quiet waits for it)."""
+
+    def kick(self) -> None:
+        """Something was queued from outside the pump: see to it that it goes on."""
+
+    def execute(
+        self,
+        worker: Worker,
+        call: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        done: Callable[[Any, BaseException | None], None],
+    ) -> None:
+        """Run a node's code where it belongs; `done(result, error)` follows, at once or later on the loop."""
+
+    def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]) -> None:
+        """Run a hook of activity beside whatever the worker is doing."""
+
+    def drive(self, worker: Worker, coroutine: Any, done: Callable[[Any, BaseException | None], None]) -> None:
+        """Take a coroutine of the worker's code to its end."""
+
+    def begin(self, worker: Worker) -> None:
+        """The worker's code waits now."""
+
+    def late(
+        self, worker: Worker, done: Callable[[Any, BaseException | None], None]
+    ) -> Callable[[Any, BaseException | None], None]:
+        """What to call when code that waited is over."""
+
+    def interrupt(self, worker: Worker) -> None:
+        """Cancel or abandon the code of the worker that is under way (X2)."""
+
+    def quiet(self) -> None:
+        """Nothing runs, nothing can start and no timer is pending."""
+
+    def finish(self, outcome: str, error: HfgError | None) -> None:
+        """End the run; only the first call counts."""
+
+
+class Core:
+    """One run.
+
+    Attributes:
+      trace: receives every event of the run, or None: nobody listens and nothing is built (R7).
+      in_flight: firings, calls and hooks that wait or run in a thread.
+      timers: pending calls that could start something.
+      pumping: the loop group is being drained; what is queued now is reached without a kick.
+      current: the worker whose code runs on the loop, for the watchdog.
+    """
+
+    def __init__(self, host: Host) -> None:
+        self.host = host
+        self.now = host.now
+        self.workers: list[Worker] = []
+        self.edges: list[Edge] = []
+        self.scopes: list[Scope] = []
+        self.by_path: dict[str, Worker] = {}
+        self.boundary: Worker | None = None
+        self.trace: Callable[[TraceEvent], None] | None = None
+        self.debug = False
+        self.fast = True
+        self.in_flight = 0
+        self.timers = 0
+        self.pumping = False
+        self.current: Worker | None = None
+        self.started = False
+        self.over = False
+        self.errors: list[HfgError] = []
+        self.lost_activity = 0
+        self.dirty_scopes: list[Scope] = []
+        self.sources: list[Worker] = []
+        self.feeds: list[Worker] = []  # the graph's own inputs (P10)
+        self.readers: list[Worker] = []  # the graph's own outputs
+        self.piped: list[tuple[Any, tuple[Any, ...]]] = []  # edges with operators (P9)
+        self.inside: Any = None  # the iteration whose inside this is (G4)
+        self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
+        self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
+
+    def after(self, delay_s: float, callback: Callable[[], None]) -> Timer:
+        """Call back `delay_s` seconds from now."""
+        return self.host.call_at(self.now() + delay_s, callback)

@@ -1,0 +1,721 @@
+"""The part of a run that waits: the pump, timers, coroutines and threads (rules R1, R5, R6, X2, X3).
+
+What is to happen is decided in `firing`, `sending` and `quiet`; here it is made to happen on one event loop, without a task per hop. Stands on all of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import inspect
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from types import CoroutineType
+from typing import Any
+
+from hfg.clock import current_clock
+from hfg.engine import errors, lifecycle, plan, quiet, rx, steps, wiring
+from hfg.engine import ports as engine_ports
+from hfg.engine.carrier import Carrier
+from hfg.engine.core import PENDING, Core
+from hfg.engine.groups import Fifo, Group, Job, LoopGroup, ThreadGroup, make_policy
+from hfg.engine.sending import consider, discard, trigger
+from hfg.engine.virtual import VirtualTimeLoop
+from hfg.engine.watchdog import Watch, watchdog
+from hfg.engine.worker import STARTING, TORN_DOWN, RunningEvent, Worker
+from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
+from hfg.graph.flat import FlatGraph
+from hfg.token import Token
+from hfg.trace import RunEnded, RunStarted, TraceEvent
+
+__all__ = ["Engine", "Settings"]
+
+_LOGGER = logging.getLogger("hfg.engine")
+_SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
+_SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
+_VIRTUAL_SLICE_STEPS = 2048  # in virtual time a slice must not depend on how fast the machine is
+
+Done = Callable[[Any, BaseException | None], None]
+
+
+class Settings:
+    """How a run is to be done; the arguments of `hfg.run`."""
+
+    def __init__(
+        self,
+        *,
+        debug: bool = False,
+        policy: str | None = None,
+        seed: int | None = None,
+        trace: Callable[[TraceEvent], None] | None = None,
+        fast: bool = True,
+        until_s: float | None = None,
+        allow_idle: bool = False,
+        block_warning_s: float = 0.1,
+        teardown_limit_s: float = 5.0,
+    ) -> None:
+        self.debug = debug
+        self.policy = policy
+        self.seed = seed
+        self.trace = trace
+        self.fast = fast
+        self.until_s = until_s
+        self.allow_idle = allow_idle
+        self.block_warning_s = block_warning_s
+        self.teardown_limit_s = teardown_limit_s
+
+
+class _Timer:
+    """A pending call that keeps the run from being quiet."""
+
+    __slots__ = ("_callback", "_engine", "_handle")
+
+    def __init__(self, engine: Engine, when: float, callback: Callable[[], None]) -> None:
+        self._engine = engine
+        self._callback = callback
+        self._handle: asyncio.TimerHandle | None = engine.loop.call_at(when, self._run, context=engine.context)
+        engine.core.timers += 1
+
+    def _run(self) -> None:
+        self._handle = None
+        engine = self._engine
+        engine.core.timers -= 1
+        if not engine.core.over:
+            engine._guard(self._callback)
+            engine.kick()
+
+    def cancel(self) -> None:
+        if self._handle is not None:
+            self._handle.cancel()
+            self._handle = None
+            self._engine.core.timers -= 1
+            self._engine.kick()
+
+
+class Engine:
+    """Runs one flattened graph on the running event loop, once.
+
+    Attributes:
+      core: the state the deciding modules work on.
+      finished: done when the run is over and torn down; its result is the outcome, its exception what went wrong.
+      holds: people outside who may still bring something (R5).
+    """
+
+    def __init__(self, flat: FlatGraph, settings: Settings) -> None:
+        self.loop = asyncio.get_running_loop()
+        self.settings = settings
+        self.virtual = isinstance(self.loop, VirtualTimeLoop)
+        self._epoch = 0.0 if self.virtual else time.time() - self.loop.time()
+        self.context = contextvars.copy_context()
+        self.context.run(current_clock.set, self.now)
+        self.core = Core(self)
+        self._consumers: list[Callable[[TraceEvent], None]] = []
+        self.core.debug = settings.debug
+        self.core.fast = settings.fast
+        self.flat = flat
+        self.holds = 0
+        self.seen_ports: list[Any] = []
+        self._quiet_waiters: list[asyncio.Future[None]] = []
+        self._outcome: tuple[str, HfgError | None] | None = None
+        self.ending: asyncio.Event = asyncio.Event()
+        self._scheduled = False
+        self._set_up: list[Worker] = []
+        self._aside: set[asyncio.Task[None]] = set()
+        self._disposables: list[Callable[[], None]] = []
+        self._thread = threading.get_ident()
+        self._ready_groups: deque[ThreadGroup] = deque()
+        self._inbox_lock = threading.Lock()
+        self.scheduler = rx.RunScheduler(self)
+        self.groups = self._make_groups()
+        self._loop_group = self.groups["loop"]
+        self._watch: Watch | None = None
+        self._main_task: asyncio.Task[Any] | None = None
+        self.started_at = 0.0
+        self.leftover_threads: list[str] = []
+        self._zombies: set[Any] = set()  # carriers of given-up firings
+        self.ended_at: float | None = None
+        plan.build(self.core, flat, self.groups, loop=self._loop_group)
+        if settings.trace is not None:
+            self.add_consumer(settings.trace)
+
+    # --- time -----------------------------------------------------------------------------------------------------------------------
+
+    def now(self) -> float:
+        """Seconds on the run's clock."""
+        return self.loop.time() + self._epoch
+
+    def call_at(self, when: float, callback: Callable[[], None]) -> _Timer:
+        """See `Host`."""
+        return _Timer(self, when - self._epoch, callback)
+
+    # --- groups ---------------------------------------------------------------------------------------------------------------------
+
+    def _make_groups(self) -> dict[str, Group]:
+        groups: dict[str, Group] = {}
+        settings = self.settings
+        for name, spec in self.flat.groups.items():
+            seed = settings.seed if spec.seed is None else spec.seed
+            policy = make_policy(settings.policy or spec.policy, seed)
+            if spec.threads:
+                groups[name] = ThreadGroup(name, policy, self._ready_groups, self._deliver, self.context)
+            else:
+                groups[name] = LoopGroup(name, policy)
+        if "loop" not in groups:
+            groups["loop"] = LoopGroup("loop", make_policy(settings.policy or "fifo", settings.seed))
+        return groups
+
+    def _deliver(self, box: deque[Any]) -> None:
+        """From a thread: one wake-up for all that it has put into its box by then."""
+        try:
+            self.loop.call_soon_threadsafe(self._collect, box, context=self.context)
+        except RuntimeError:
+            pass  # the loop is closed: the run is over, nobody waits for this
+
+    def _collect(self, box: deque[Any]) -> None:
+        while box:
+            item = box.popleft()
+            if self.core.over and not isinstance(item, Job):
+                continue
+            self._guard(partial(item.owner, item) if isinstance(item, Job) else item)
+        self.kick()
+
+    def on_loop(self) -> bool:
+        """Whether the caller is on the run's own thread."""
+        return threading.get_ident() == self._thread
+
+    def from_any_thread(self, call: Callable[[], None]) -> None:
+        """Do this on the loop; calls of one thread keep their order."""
+        if self.on_loop():
+            call()
+        else:
+            self.loop.call_soon_threadsafe(call, context=self.context)
+
+    # --- the pump -------------------------------------------------------------------------------------------------------------------
+
+    def kick(self) -> None:
+        """Something may be queued: see to it that the pump runs."""
+        if not self._scheduled and not self.core.pumping:
+            self._scheduled = True
+            self.loop.call_soon(self._pump, context=self.context)
+
+    def _pump(self) -> None:
+        """Drain the loop group within a slice; a hop is a few function calls."""
+        self._scheduled = False
+        core = self.core
+        if core.over or not core.started:
+            return
+        policy = self._loop_group.policy
+        ready_groups = self._ready_groups
+        core.pumping = True
+        try:
+            if isinstance(policy, Fifo):
+                self._drain(policy, policy.popleft, ready_groups)
+            else:
+                self._drain(policy, policy.pop, ready_groups)
+        except Exception as error:
+            self._internal(error)
+        finally:
+            core.pumping = False
+            core.current = None
+        if core.over:
+            return
+        if len(policy) or ready_groups:
+            self.kick()
+        else:
+            self._settle()
+
+    def _internal(self, error: BaseException) -> None:
+        """A fault of ours must end the run, not hang it."""
+        problem = error if isinstance(error, HfgError) else EngineInternalError(f"{type(error).__name__}: {error}; please report this")
+        if problem is not error:
+            problem.__cause__ = error
+        self.finish("failed", problem)
+
+    def _guard(self, call: Callable[[], None]) -> None:
+        try:
+            call()
+        except Exception as error:
+            self._internal(error)
+
+    def _drain(self, policy: Any, pop: Callable[[], Worker], ready_groups: deque[ThreadGroup]) -> None:
+        core = self.core
+        steps = _VIRTUAL_SLICE_STEPS if self.virtual else _SLICE_STEPS
+        until = 0.0 if self.virtual else time.monotonic() + _SLICE_S
+        while True:
+            for _ in range(steps):
+                if ready_groups:
+                    ready_groups.popleft().dispatch()
+                if not policy:
+                    if ready_groups:
+                        continue
+                    return
+                worker = pop()
+                worker.step(worker)
+            if core.over or self.virtual or time.monotonic() >= until:
+                return
+
+    def _settle(self) -> None:
+        """The run queues are empty: is the graph quiet, and if so, what follows?"""
+        core = self.core
+        if core.in_flight and not quiet.only_futile_in_flight(core):
+            return
+        if core.timers:
+            return
+        self.quiet()
+
+    def quiet(self) -> None:
+        """Nothing runs, nothing can start, no timer is pending (F8, P9, F13, R5)."""
+        core = self.core
+        if quiet.grow(core):
+            return
+        for waiter in self._quiet_waiters:
+            if not waiter.done():
+                waiter.set_result(None)
+        self._quiet_waiters.clear()
+        if self.holds:
+            return
+        if quiet.complete_operators(core):
+            self.kick()
+            return
+        if core.timers:
+            return
+        if quiet.end_events(core):
+            self.kick()
+            return
+        stalled = quiet.stall(core)
+        self.finish("done" if stalled is None else "stalled", stalled)
+
+    async def wait_quiet(self) -> None:
+        """Wait until only something outside can change anything; returns at once if the run is over."""
+        if self.core.over:
+            return
+        waiter: asyncio.Future[None] = self.loop.create_future()
+        self._quiet_waiters.append(waiter)
+        self.kick()
+        await waiter
+
+    def hold(self) -> None:
+        """Somebody outside may still bring something: the run stays open (R5)."""
+        self.holds += 1
+
+    def unhold(self) -> None:
+        """One fewer."""
+        self.holds -= 1
+        self.kick()
+
+    # --- a node's code --------------------------------------------------------------------------------------------------------------
+
+    def execute(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+        """See `Host`."""
+        if worker.group.threaded and not inspect.iscoroutinefunction(call):
+            self._in_thread(worker, call, arguments, done)
+            return
+        core = self.core
+        core.current = worker
+        try:
+            result = call(*arguments)
+        except Exception as error:
+            core.current = None
+            done(None, error)
+            return
+        core.current = None
+        if type(result) is CoroutineType or (worker.is_async and hasattr(result, "__await__")):
+            self.drive(worker, result, done)
+        else:
+            done(result, None)
+
+    def drive(self, worker: Worker, coroutine: Any, done: Done) -> None:
+        """See `Host`."""
+        carrier = worker.carrier
+        if carrier is None:
+            carrier = worker.carrier = Carrier(self.loop, f"hfg {worker.path}", self.context)
+        self.core.current = worker
+        try:
+            result = carrier.start(coroutine, self.late(worker, done))
+        except Exception as error:
+            self.core.current = None
+            done(None, error)
+            return
+        self.core.current = None
+        if result is not PENDING:
+            done(result, None)
+            return
+        self.begin(worker)
+        self._limit(worker)
+
+    def _limit(self, worker: Worker) -> None:
+        """X2: the firing may not take longer than its limit."""
+        options = worker.options
+        if options is not None and options.max_duration_s is not None and worker.busy == "firing":
+            worker.limit_timer = self.core.after(options.max_duration_s, lambda: errors.time_out(worker))
+
+    def begin(self, worker: Worker) -> None:
+        """See `Host`."""
+        worker.in_flight = True
+        self.core.in_flight += 1
+
+    def late(self, worker: Worker, done: Done) -> Done:
+        """See `Host`."""
+        closing = self.core.over  # a hook of the teardown; what began before the end is not listened to after it
+
+        def over(result: Any, error: BaseException | None) -> None:
+            if worker.in_flight and (worker.carrier is carrier or carrier is None):
+                worker.in_flight = False
+                self.core.in_flight -= 1
+            elif self._zombies:
+                self._zombies.discard(carrier)
+            if self.core.over and not closing:
+                return
+            self._guard(lambda: done(result, error))
+            self.kick()
+
+        carrier = worker.carrier
+        return over
+
+    def _in_thread(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+        group: Any = worker.group
+        closing = self.core.over
+        self.begin(worker)
+        self.hold_clock()
+
+        def back(job: Job) -> None:
+            if job is not worker_job:
+                return
+            group.returned()
+            self.unhold_clock()
+            worker.in_flight = False
+            self.core.in_flight -= 1
+            if not self.core.over or closing:
+                done(job.result, job.error)
+
+        worker_job = Job(back, call, arguments, done)
+        worker.late = worker_job
+        group.submit(worker_job)
+        self._limit(worker)
+
+    def hold_clock(self) -> None:
+        """Work is in flight in a thread: virtual time stands still (R6)."""
+        if self.virtual:
+            self.loop.hold()  # type: ignore[attr-defined]
+
+    def unhold_clock(self) -> None:
+        """It is back."""
+        if self.virtual:
+            self.loop.unhold()  # type: ignore[attr-defined]
+
+    def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Done) -> None:
+        """See `Host`."""
+        try:
+            result = call()
+        except Exception as error:
+            done(None, error)
+            return
+        if type(result) is not CoroutineType:
+            done(result, None)
+            return
+        self.core.in_flight += 1
+
+        async def aside() -> None:
+            error: BaseException | None = None
+            try:
+                await result
+            except Exception as problem:
+                error = problem
+            finally:
+                self.core.in_flight -= 1
+            if not self.core.over:
+                done(None, error)
+                self.kick()
+
+        task = self.loop.create_task(aside(), context=self.context)
+        self._aside.add(task)
+        task.add_done_callback(self._aside.discard)
+
+    def interrupt(self, worker: Worker) -> None:
+        """See `Host`."""
+        if not worker.in_flight:
+            return
+        worker.in_flight = False
+        self.core.in_flight -= 1
+        group: Any = worker.group
+        if group.threaded:
+            job = worker.late
+            job.owner = lambda _job: None
+            self.unhold_clock()
+            group.abandon(f'"{worker.path}", firing {worker.firings}')
+        else:
+            carrier, worker.carrier = worker.carrier, None
+            worker.late = None
+            self._zombies.add(carrier)
+            carrier.cancel()
+
+    async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+        """Trigger, then wait until no `wait` queue behind the node's events is full (F8)."""
+        trigger(event, value, activity, stamp)
+        worker = event.worker
+        while worker.full_edges and not self.core.over:
+            waiter: asyncio.Future[None] = self.loop.create_future()
+            if worker.room_waiters is None:
+                worker.room_waiters = []
+            worker.room_waiters.append(lambda: waiter.done() or waiter.set_result(None))  # type: ignore[func-returns-value]
+            worker.waiting_room += 1
+            self.core.in_flight -= worker.in_flight  # it waits for us, not we for it
+            self.kick()
+            try:
+                await waiter
+            finally:
+                worker.waiting_room -= 1
+                self.core.in_flight += worker.in_flight
+
+    def adopt_event(self, port: Any) -> None:
+        """Give an event the run's scheduler and thread (ARCHITECTURE §3)."""
+        port._scheduler = self.scheduler
+        port._thread = self._thread
+        self.seen_ports.append(port)
+
+    # --- beginning and ending -------------------------------------------------------------------------------------------------------
+
+    async def start(self) -> None:
+        """Set up all nodes, trigger `start`, then let the sources go (A10)."""
+        core = self.core
+        self.started_at = self.now()
+        self._watch = watchdog.watch(core, self.settings.block_warning_s)
+        for worker in core.workers:
+            if worker.is_async or any(spec.is_async for spec in worker.type.slots.values()) if worker.type else False:
+                worker.carrier = Carrier(self.loop, f"hfg {worker.path}", self.context)
+        for edge in core.edges:
+            initial = getattr(edge, "initial", ())
+            if initial:
+                edge.queue.extend(Token(value, 0, self.now(), 0) for value in initial)
+        for worker in core.workers:
+            if worker.scope is None:
+                await self._set_up_one(worker)
+            if self._outcome is not None:
+                return
+        for worker in core.workers:
+            engine_ports.bind_automatic(worker)
+            plan.watch(worker)
+            wiring.rewire(worker)
+        for edge, operators in core.piped:
+            self._disposables.append(rx.pipe_edge(edge, operators, self.scheduler))
+        if self.settings.until_s is not None:
+            self.loop.call_at(self.loop.time() + self.settings.until_s, self._until)
+        if core.trace is not None:
+            core.trace(RunStarted(self.now()))
+        core.started = True
+        assert core.boundary is not None
+        start = core.boundary.events.get("start")
+        if start is not None:
+            trigger(start, explicit=1)
+        for worker in core.workers:
+            self._close_gate(worker)
+            worker.blocked &= ~STARTING
+            consider(worker)
+        for source, edge, operators in core.observables:
+            self._feed(source, edge, operators)
+        self.kick()
+
+    def _close_gate(self, worker: Worker) -> None:
+        if worker.gate is not None and worker.is_source:
+            from hfg.engine.activity import gate_changed
+
+            gate_changed([worker.gate])
+
+    async def _set_up_one(self, worker: Worker) -> None:
+        waiter: asyncio.Future[HfgError | None] = self.loop.create_future()
+        self._set_up.append(worker)
+        lifecycle.set_up(worker, lambda error: waiter.done() or waiter.set_result(error))  # type: ignore[func-returns-value,arg-type]
+        error = waiter.result() if waiter.done() else await waiter
+        if error is not None:
+            self.finish("failed", error)
+
+    def _feed(self, source: Any, edge: Any, operators: tuple[Any, ...]) -> None:
+        """An outside observable holds the run open until it completes (R5)."""
+        self.hold()
+        open_ = [True]
+
+        def over(error: BaseException | None) -> None:
+            if open_[0]:
+                open_[0] = False
+                if error is not None:
+                    problem = NodeError(edge.target.path, f'the observable that feeds "{edge.label}"', error)
+                    problem.__cause__ = error
+                    self.finish("failed", problem)
+                self.unhold()
+
+        self._disposables.append(
+            rx.feed_from_observable(source, edge, operators, self.scheduler, self.from_any_thread, over)
+        )
+
+    @property
+    def teardown_limit_s(self) -> float:
+        """X3: how long one node may take; short when somebody wants to leave."""
+        limit = self.settings.teardown_limit_s
+        return min(limit, 1.0) if self._outcome is not None and self._outcome[0] == "cancelled" else limit
+
+    def _until(self) -> None:
+        self.finish("until", None)
+
+    def finish(self, outcome: str, error: HfgError | None) -> None:
+        """See `Host`."""
+        if self._outcome is not None:
+            return
+        self._outcome = (outcome, error)
+        self.core.over = True
+        self.ended_at = self.now()
+        for worker in self.core.workers:
+            worker.blocked |= TORN_DOWN
+        for waiter in self._quiet_waiters:
+            if not waiter.done():
+                waiter.set_result(None)
+        self._quiet_waiters.clear()
+        self.ending.set()
+
+
+
+    async def close(self) -> tuple[str, HfgError | None]:
+        """Tear everything down, in reverse order of setup, each within its time limit (X3); gives back how the run ended."""
+        if self._outcome is None:
+            self.finish("cancelled", None)
+        assert self._outcome is not None
+        core = self.core
+        outcome, error = self._outcome
+        for dispose in self._disposables:
+            dispose()
+        await self._cancel_code()
+        problems: list[NodeError] = []
+        for worker in reversed(self._set_up):
+            problem = await self._tear_down_one(worker)
+            if problem is not None:
+                problems.append(problem)
+        for worker in core.workers:
+            engine_ports.release_ports(worker)
+            for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
+                if timer is not None:
+                    timer.cancel()
+        for edge in core.edges:
+            if edge.untaken and error is None and outcome in ("stopped", "until", "cancelled"):
+                discard(edge, "stopped")
+        await self._end_threads()
+        carriers = [worker.carrier for worker in core.workers if worker.carrier is not None] + list(self._zombies)
+        for carrier in carriers:
+            carrier.cancel()
+        if carriers:
+            await asyncio.wait([carrier.task for carrier in carriers], timeout=self.teardown_limit_s)
+        if self._watch is not None:
+            watchdog.forget(self._watch)
+        core.errors.extend(problems)
+        if problems and error is None:
+            error, outcome = TeardownError(problems), "failed"
+        self._outcome = (outcome, error)
+        if core.trace is not None:
+            core.trace(RunEnded(self.now(), outcome))
+        return outcome, error
+
+    async def _cancel_code(self) -> None:
+        """Cancel what still waits; threads get their time to come back."""
+        carriers = []
+        for worker in self.core.workers:
+            if worker.in_flight and worker.carrier is not None:
+                worker.ticket += 1
+                worker.carrier.cancel()
+                carriers.append(worker)
+        for task in self._aside:
+            task.cancel()
+        limit = self.teardown_limit_s
+        until = time.monotonic() + limit
+        while any(worker.in_flight for worker in carriers) and time.monotonic() < until:
+            await asyncio.sleep(0)
+        for worker in carriers:
+            if worker.in_flight:
+                problem = NodeError(worker.path, f"firing {worker.firings}", f"it was cancelled and did not end within {limit:g} s")
+                self.core.errors.append(problem)
+                worker.carrier = None
+
+    async def _tear_down_one(self, worker: Worker) -> NodeError | None:
+        if worker.node is None or worker.in_flight:
+            return None
+        if worker.generator is None and worker.node._hook("teardown") is None:
+            return None
+        waiter: asyncio.Future[NodeError | None] = self.loop.create_future()
+        lifecycle.tear_down(worker, lambda error: waiter.done() or waiter.set_result(error))  # type: ignore[func-returns-value,arg-type]
+        if waiter.done():
+            return waiter.result()
+        limit = self.teardown_limit_s
+        try:
+            return await asyncio.wait_for(waiter, limit)
+        except TimeoutError:
+            return NodeError(worker.path, "teardown()", f"it took longer than {limit:g} s and was given up")
+
+    async def _end_threads(self) -> None:
+        groups = [group for group in self.groups.values() if isinstance(group, ThreadGroup)]
+        threads = [(group.name, thread) for group in groups if (thread := group.stop()) is not None]
+        until = time.monotonic() + self.teardown_limit_s
+        for name, thread in threads:
+            while thread.is_alive() and time.monotonic() < until:
+                await asyncio.sleep(0)
+                thread.join(0.001)
+            if thread.is_alive():
+                self.leftover_threads.append(f'thread of group "{name}"')
+        for group in groups:
+            self.leftover_threads.extend(what for what, thread in group.abandoned if thread.is_alive())
+
+    @property
+    def outcome(self) -> str:
+        """How the run ended; "running" while it does."""
+        return "running" if self._outcome is None else self._outcome[0]
+
+    @property
+    def error(self) -> HfgError | None:
+        """What the run failed with, if it did."""
+        return None if self._outcome is None else self._outcome[1]
+
+    def watch_task(self, task: asyncio.Task[Any] | None) -> None:
+        """Whose cancellation means that somebody wants to leave, even while a node blocks the loop."""
+        self._main_task = task
+
+    # --- the trace ------------------------------------------------------------------------------------------------------------------
+
+    def add_consumer(self, consumer: Callable[[TraceEvent], None]) -> Callable[[], None]:
+        """Let a consumer see every event from now on; gives back what removes it. One that raises is logged and removed (R7)."""
+
+        def guarded(event: TraceEvent) -> None:
+            try:
+                consumer(event)
+            except Exception:
+                _LOGGER.exception("a consumer of the trace failed and was removed")
+                remove()
+
+        def remove() -> None:
+            if guarded in self._consumers:
+                self._consumers.remove(guarded)
+                self._listen()
+
+        self._consumers.append(guarded)
+        self._listen()
+        return remove
+
+    def _listen(self) -> None:
+        """Nobody listens: nothing is built (R7). One: it is called. Several: one after the other."""
+        consumers = tuple(self._consumers)
+        core = self.core
+        before = core.trace
+        if not consumers:
+            core.trace = None
+        elif len(consumers) == 1:
+            core.trace = consumers[0]
+        else:
+
+            def tell(event: TraceEvent) -> None:
+                for consumer in consumers:
+                    consumer(event)
+
+            core.trace = tell
+        if core.started and (before is None) != (core.trace is None):
+            for worker in core.workers:
+                steps.choose(worker)
+

@@ -1,0 +1,104 @@
+"""What becomes of a failure in a node's code: stop, skip, disable or restart (rules X1, X2).
+
+Stands on `sending`; the firing and calling modules bring failures here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hfg.engine import firing, lifecycle
+from hfg.engine.sending import automatic, block, put_outputs, report_error, unblock
+from hfg.engine.worker import BACKOFF, TORN_DOWN, Worker
+from hfg.errors import EndOfStream, FiringTimeout, HfgError, NodeError, QueueLimit
+
+__all__ = ["apply_policy", "fail", "fail_call", "time_out"]
+
+
+def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
+    """Wrap what was raised so that it names the path and the firing (X1)."""
+    if isinstance(error, NodeError):
+        return error
+    cause: BaseException | str = error
+    if isinstance(error, EndOfStream) and not worker.is_source:
+        cause = "EndOfStream was raised, but only a source can end its stream: return None for silence"
+    problem = NodeError(worker.path, what, cause)
+    problem.__cause__ = error
+    return problem
+
+
+def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> None:
+    """A firing (`answer`: it still owes its outputs) or something beside one has failed."""
+    if isinstance(error, QueueLimit):
+        worker.core.host.finish("failed", error)
+        return
+    worker.failed += 1
+    apply_policy(worker, as_node_error(worker, what, error), answer=answer)
+
+
+def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
+    """A slot call has failed: with every policy but `stop` it is counted, for it owes no outputs."""
+    worker.calls_failed += 1
+    problem = as_node_error(worker, f"slot {slot}, call {worker.call_number}", error)
+    apply_policy(worker, problem, answer=False, then=lambda: firing.finish_call(worker, "failed"))
+
+
+def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any = None) -> None:
+    """X1: the node's policy decides."""
+    core = worker.core
+    policy = worker.options.on_error if worker.options is not None else "stop"
+    if policy == "restart" and worker.restarts >= worker.options.restart_limit:
+        policy = "stop"
+    report_error(worker, problem.what, problem.__cause__ or problem, policy)
+    worker.written = None
+    if policy == "stop":
+        core.host.finish("failed", problem)
+        return
+    core.errors.append(problem)
+    automatic(worker, "failed", problem)
+    if answer and policy != "disable":
+        put_outputs(worker, None)
+    if policy == "restart":
+        worker.restarts += 1
+        block(worker, BACKOFF)
+    if answer:
+        firing.finish_firing(worker, "failed")
+    elif then is not None:
+        then()
+    elif not worker.busy:
+        from hfg.engine.sending import flush_automatic
+
+        flush_automatic(worker)
+    if policy == "disable":
+        lifecycle.disable(worker)
+    elif policy == "restart":
+        _restart(worker)
+
+
+def _restart(worker: Worker) -> None:
+    """Teardown, wait, setup; the wait doubles with each restart."""
+    core = worker.core
+    delay = worker.options.restart_backoff_s * 2 ** (worker.restarts - 1)
+
+    def torn_down() -> None:
+        core.after(delay, lambda: lifecycle.set_up(worker, up))
+
+    def up(error: HfgError | None) -> None:
+        if error is not None:
+            core.host.finish("failed", error)
+        elif not worker.blocked & TORN_DOWN:
+            unblock(worker, BACKOFF)
+
+    lifecycle.tear_down(worker, lambda _error: torn_down())
+
+
+def time_out(worker: Worker) -> None:
+    """X2: the firing has taken longer than `max_duration_s`: it is given up, its late result ignored."""
+    worker.limit_timer = None
+    limit = worker.options.max_duration_s
+    what = f"firing {worker.firings}"
+    worker.ticket += 1
+    worker.core.host.interrupt(worker)
+    problem = FiringTimeout(worker.path, what, f"it took longer than max_duration_s = {limit:g} s and was given up")
+    worker.failed += 1
+    apply_policy(worker, problem, answer=True)

@@ -1,0 +1,529 @@
+"""What a node does next: a firing, a slot call, its end (rules F1-F4, F9, F11, F12, P6, P8, A6, A11, T5).
+
+The general way; `steps` has shorter ones for the common shapes, which fall back to this one. Stands on `sending`; a node's code is run by the host.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hfg.activity.rules import after_receipt
+from hfg.engine import builtin_slots, errors
+from hfg.engine.sending import (
+    automatic,
+    consider,
+    derive_scopes,
+    flush_automatic,
+    freed,
+    put_outputs,
+    queue,
+    receive,
+    release,
+    send_end,
+    touch,
+)
+from hfg.engine.worker import CALLS_BLOCKED, ENDED, UNREADY, Worker
+from hfg.errors import EndOfStream, UsageError
+from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
+from hfg.token import END, NO_MESSAGE, Marker, Token
+from hfg.trace import (
+    CallEnded,
+    CallStarted,
+    FiringEnded,
+    FiringStarted,
+    ParameterSet,
+    TokenDropped,
+    TokenTaken,
+)
+from hfg.types import accepts, describe
+
+__all__ = ["await_call", "complete_firing", "finish_call", "finish_firing", "idle_again", "source_ended", "step", "write"]
+
+
+def step(worker: Worker) -> None:
+    """Do the next piece of work on the agenda of a worker that was taken from its run queue."""
+    worker.queued = False
+    if worker.busy:
+        return
+    calls = worker.calls
+    if worker.placed and not (calls and worker.ahead):
+        if worker.ready_hook is None:
+            fire(worker)
+        else:
+            _ask_ready(worker)
+    elif calls and not worker.blocked & CALLS_BLOCKED:
+        call(worker)
+
+
+def _ask_ready(worker: Worker) -> None:
+    """F1: the node's own `ready()` is asked last."""
+    hook = worker.ready_hook
+    assert hook is not None
+    worker.busy = "asking"
+
+    def answered(ready: Any, error: BaseException | None) -> None:
+        worker.busy = ""
+        if error is not None:
+            errors.fail(worker, "ready()", error, answer=False)
+            idle_again(worker, asked=True)
+        elif ready and worker.placed:
+            fire(worker)
+        elif worker.placed:
+            worker.placed = False
+            worker.blocked |= UNREADY
+            idle_again(worker, asked=True)
+        else:
+            idle_again(worker)
+
+    worker.core.host.execute(worker, hook, (), answered)
+
+
+def idle_again(worker: Worker, *, asked: bool = False) -> None:
+    """A firing, call or question is over: see what is next."""
+    worker.busy = ""
+    if not asked:
+        worker.blocked &= ~UNREADY
+    if worker.placed:
+        queue(worker)
+    else:
+        consider(worker)
+    if worker.calls and not worker.blocked & CALLS_BLOCKED:
+        queue(worker)
+
+
+# --- firing -----------------------------------------------------------------------------------------------------------------------------
+
+
+def fire(worker: Worker) -> None:
+    """Take one token from every live input and decide by F4 what becomes of them."""
+    core = worker.core
+    worker.placed = False
+    worker.busy = "firing"
+    worker.firings += 1
+    worker.ticket += 1
+    worker.special = False
+    edges = worker.live_inputs
+    tokens = [_take(edge) for edge in edges]
+    worker.tokens = tokens
+    worker.taken = tuple(edge for edge in edges if type(edge) is SyncEdge)
+    now = core.now()
+    worker.stamp = now if worker.is_source else _newest_stamp(tokens, now)
+    modifiers = [token.activity for token in tokens if token.activity]
+    kind = _kind(worker, edges, tokens, modifiers)
+    if core.trace is not None:
+        core.trace(FiringStarted(now, worker.path, worker.firings, kind))
+        for edge, token in zip(edges, tokens, strict=True):
+            core.trace(TokenTaken(now, edge.label, token))
+    for edge in edges:
+        if type(edge) is EventEdge:
+            freed(edge)
+            if not edge.live and not edge.queue:
+                _rewire(worker)
+        elif type(edge) is DelayEdge and edge.held and len(edge.queue) <= edge.delay:
+            release((edge,))
+    if modifiers:
+        if worker.scopes:
+            touch(core, worker.scopes)
+        receive(worker, modifiers)
+        derive_scopes(core)
+    _set_parameters(worker, edges, tokens)
+    if kind == "end":
+        _end(worker, edges, tokens)
+    elif kind == "silent":
+        worker.silent += 1
+        put_outputs(worker, None)
+        finish_firing(worker, "silent")
+    else:
+        options = worker.options
+        if options.max_rate_hz:
+            worker.next_start = now + 1.0 / options.max_rate_hz
+        worker.gate_next = now
+        _run_process(worker, edges, tokens)
+
+
+def _rewire(worker: Worker) -> None:
+    from hfg.engine.wiring import rewire
+
+    rewire(worker)
+
+
+def _take(edge: Any) -> Token[Any]:
+    """Remove the oldest token (rule F3); its place is freed by the caller once the firing is on record."""
+    barrier = edge.target.inputs
+    if type(edge) is SyncEdge:
+        token = edge.token
+        edge.token = None
+        barrier.missing += 1
+    else:
+        token = edge.queue.popleft()
+        if not edge.queue:
+            barrier.missing += 1
+        elif type(edge.queue[0].value) is Marker:
+            edge.target.special = True
+    return token  # type: ignore[no-any-return]
+
+
+def _newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
+    """T5: the newest stamp of the values it took, else of all it took."""
+    values = [token.stamp for token in tokens if type(token.value) is not Marker]
+    return max(values or [token.stamp for token in tokens], default=now)
+
+
+def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]], modifiers: Sequence[int]) -> Any:
+    """F4: "end", "silent" or "process"; a closed gate makes it silent (A11)."""
+    end = silent = has_value = has_mandatory = False
+    for edge, token in zip(edges, tokens, strict=True):
+        value = token.value
+        if value is END:
+            edge.ended = True
+            end = end or edge.mandatory
+        elif value is NO_MESSAGE:
+            silent = silent or edge.mandatory
+        else:
+            has_value = True
+        has_mandatory = has_mandatory or edge.mandatory
+    if end or (any(token.value is END for token in tokens) and _all_ended(worker)):
+        return "end"
+    if any(edge.ended for edge in edges):
+        _rewire(worker)
+    if silent or (edges and not has_mandatory and not has_value):
+        return "silent"
+    gate = worker.gate
+    if gate is not None and not worker.is_source:
+        state = gate.state
+        state_active = after_receipt(worker.active, modifiers) if state is worker else state.active
+        if not state_active and not _idle_turn(worker, gate.idle_rate_hz):
+            return "silent"
+    return "process"
+
+
+def _idle_turn(worker: Worker, idle_rate_hz: float | None) -> bool:
+    """A11: a throttled node runs its function as often as the idle rate allows."""
+    return idle_rate_hz is not None and worker.core.now() >= worker.gate_next + 1.0 / idle_rate_hz
+
+
+def _all_ended(worker: Worker) -> bool:
+    """F4(1): every live input has ended; edges with initial tokens do not count, and one other must have."""
+    live = [edge for edge in worker.in_edges if edge.live and not (type(edge) is EventEdge and edge.target_kind == "parameter")]
+    counted = [edge for edge in live if not getattr(edge, "initial", ())]
+    return bool(counted) and all(edge.ended for edge in counted)
+
+
+def _set_parameters(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+    """P8: a token sets the parameter when it is taken, also in a silent firing."""
+    for edge, token in zip(edges, tokens, strict=True):
+        if edge.target_kind == "parameter" and type(token.value) is not Marker:
+            set_parameter(worker, edge.port_name, token.value)
+
+
+def set_parameter(worker: Worker, name: str, value: Any) -> None:
+    """Give a parameter a value that came by a token; one out of its limits is an error of the node (X1)."""
+    try:
+        worker.node._set_parameter(name, value)
+    except Exception as error:
+        errors.fail(worker, f"parameter {name}", error, answer=False)
+        return
+    if worker.core.trace is not None:
+        worker.core.trace(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))
+
+
+def _arguments(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:
+    """One argument per declared input: the value, the token if asked for, the default if absent (P6)."""
+    arguments = list(worker.unset)
+    for edge, token in zip(edges, tokens, strict=True):
+        if edge.target_kind == "input" and type(token.value) is not Marker:
+            arguments[edge.position] = token if worker.wants_token[edge.position] else token.value
+    return arguments
+
+
+def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+    arguments = tuple(_arguments(worker, edges, tokens))
+    iteration = worker.iteration
+    if iteration is not None:
+        iteration.begin(arguments)
+        return
+    kind = worker.type.process_kind
+    call: Any = worker.process
+    if kind in ("generator", "async generator"):
+        if worker.generator is None:
+            worker.generator = call(*arguments)
+        call, arguments = (next if kind == "generator" else anext), (worker.generator,)
+    ticket = worker.ticket
+
+    def done(result: Any, error: BaseException | None) -> None:
+        if worker.ticket != ticket:
+            return  # X2: it came too late, its firing was given up
+        if error is None:
+            complete_firing(worker, result)
+        elif worker.is_source and isinstance(error, (StopIteration, StopAsyncIteration, EndOfStream)):
+            source_ended(worker)
+        else:
+            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+
+    worker.core.host.execute(worker, call, arguments, done)
+
+
+def complete_firing(worker: Worker, result: Any) -> None:
+    """The process function ran to its end: its outputs leave together (F3)."""
+    try:
+        written = merge(worker, result)
+    except Exception as error:
+        errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+        return
+    put_outputs(worker, written)
+    if "processed" in worker.events:
+        automatic(worker, "processed")
+    finish_firing(worker, "done")
+
+
+def merge(worker: Worker, result: Any) -> list[Any] | None:
+    """Join what was returned with what was sent; both for one output is writing twice (F3)."""
+    written = worker.written
+    node_type = worker.type
+    if result is not None:
+        if node_type.result == "none":
+            if worker.out_names and len(worker.out_names) > len(node_type.parameters):
+                raise TypeError(f"process returned {describe(type(result))}, but it writes its outputs with send(): return None")
+        else:
+            values = worker.node._split(result)
+            if written is None:
+                written = [None] * len(worker.out_edges)
+            for position, value in enumerate(values):
+                if value is None:
+                    continue
+                if written[position] is not None:
+                    raise UsageError(f'output "{worker.path}.{worker.out_names[position]}" was written twice in one firing: return or send, once')
+                written[position] = _entry(value)
+    if worker.core.debug and written is not None:
+        for position, name in enumerate(node_type.outputs):
+            entry = written[position]
+            hint = node_type.outputs[name].type
+            if entry is not None and not accepts(entry[0], hint):
+                raise TypeError(f'output "{worker.path}.{name}" is declared {describe(hint)}, got {describe(type(entry[0]))}: {entry[0]!r:.80}')
+    if node_type is not None and node_type.parameters:
+        written = _add_parameters(worker, written)
+    return written
+
+
+def _add_parameters(worker: Worker, written: list[Any] | None) -> list[Any]:
+    """P8: a connected parameter sends its value with each firing that is not silent."""
+    if written is None:
+        written = [None] * len(worker.out_edges)
+    for position in range(len(worker.type.outputs), len(worker.out_names)):
+        written[position] = (worker.node._parameters[worker.out_names[position]], None, None)
+    return written
+
+
+def _entry(value: Any) -> tuple[Any, int | None, float | None]:
+    if type(value) is Token:
+        return (value.value, value.activity, value.stamp)
+    return (value, None, None)
+
+
+def write(worker: Worker, position: int, value: Any, activity: int | None, stamp: float | None) -> None:
+    """A node's code writes to an output: it leaves when the firing is over (F3).
+
+    Raises:
+      UsageError: outside a firing (also in a slot handler, F9), or twice in one firing.
+    """
+    path = f"{worker.path}.{worker.out_names[position]}"
+    if worker.busy not in ("firing", "ending"):
+        where = "in a slot handler" if worker.busy == "call" else "outside a firing"
+        raise UsageError(f'output "{path}" was written {where}: outputs belong to process() and end(); trigger an event instead')
+    if value is None:
+        return
+    if worker.written is None:
+        worker.written = [None] * len(worker.out_edges)
+    if worker.written[position] is not None:
+        raise UsageError(f'output "{path}" was written twice in one firing: it takes one token, merge the values or use an event')
+    if type(value) is Token:
+        activity = value.activity if activity is None else activity
+        stamp = value.stamp if stamp is None else stamp
+        value = value.value
+    worker.written[position] = (value, activity, stamp)
+
+
+def finish_firing(worker: Worker, outcome: Any) -> None:
+    """The firing is over: release what it took (F5), then the automatic events, then the next piece of work."""
+    core = worker.core
+    _cancel_limit(worker)
+    if core.trace is not None:
+        core.trace(FiringEnded(core.now(), worker.path, worker.firings, outcome))
+    taken = worker.taken
+    worker.written = None
+    worker.tokens = []
+    if worker.outputs.missing:
+        worker.held = True
+        if taken:
+            release([edge for edge in taken if not edge.sequential])
+    elif taken:
+        release(taken)
+    flush_automatic(worker)
+    worker.right = False
+    worker.stamp = None
+    idle_again(worker)
+
+
+def _cancel_limit(worker: Worker) -> None:
+    if worker.limit_timer is not None:
+        worker.limit_timer.cancel()
+        worker.limit_timer = None
+
+
+# --- the end of a node ------------------------------------------------------------------------------------------------------------------
+
+
+def source_ended(worker: Worker) -> None:
+    """F2: the generator returned or the code raised EndOfStream; what the firing wrote before stays unsent."""
+    worker.written = None
+    _end(worker, (), ())
+
+
+def _end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+    """F4(1): `end()` is called, what it writes leaves as one full firing, END follows (F12 begins here)."""
+    core = worker.core
+    for edge, token in zip(edges, tokens, strict=True):
+        if type(token.value) is not Marker:
+            edge.dropped += 1
+            if core.trace is not None:
+                core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
+    worker.blocked |= ENDED
+    worker.deferred = []
+    _cancel_limit(worker)
+    for edge in worker.in_edges:
+        drain_left(edge)
+    hook = worker.node._hook("end") if worker.node is not None else None
+    if hook is None:
+        _ended(worker, None, None)
+        return
+    worker.busy = "ending"
+    core.host.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
+
+
+def drain_left(edge: Any) -> None:
+    """F12: what still lies on an input of an ended node is processed without a firing."""
+    from hfg.trace import TokenDrained
+
+    if type(edge) is EventEdge and edge.target_kind == "parameter":
+        return
+    worker: Worker = edge.target
+    core = worker.core
+    for token in edge.clear():
+        edge.drained += 1
+        if core.trace is not None:
+            core.trace(TokenDrained(core.now(), edge.label, token))
+        if token.activity and worker.deferred is not None:
+            worker.deferred.append(token.activity)
+    if type(edge) is EventEdge:
+        freed(edge)
+    elif edge.held:
+        release((edge,))
+
+
+def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
+    core = worker.core
+    worker.busy = "firing"
+    if error is not None:
+        worker.written = None
+        errors.fail(worker, "end()", error, answer=False)
+    written = worker.written
+    worker.written = None
+    wrote = written is not None and any(entry is not None for entry in written)
+    if wrote:
+        put_outputs(worker, written)
+    if core.trace is not None:
+        core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended"))
+    taken = worker.taken
+    worker.taken = ()
+    release(taken)
+    if worker.outputs.missing:
+        worker.pending_end = True
+    else:
+        send_end(worker)
+    flush_automatic(worker)
+    worker.right = False
+    worker.stamp = None
+    idle_again(worker)
+
+
+# --- slot calls -------------------------------------------------------------------------------------------------------------------------
+
+
+def call(worker: Worker) -> None:
+    """Take the oldest waiting slot token and run its handler (F9)."""
+    core = worker.core
+    assert worker.calls is not None
+    edge = worker.calls.popleft()
+    if worker.placed and worker.ahead:
+        worker.ahead -= 1
+    if type(edge) is SyncEdge:
+        token = edge.token
+        edge.token = None
+        assert token is not None
+    else:
+        token = edge.queue.popleft()
+    worker.busy = "call"
+    worker.call_number += 1
+    worker.ticket += 1
+    worker.call_edge = edge
+    worker.stamp = token.stamp
+    name = edge.port_name
+    if core.trace is not None:
+        now = core.now()
+        core.trace(CallStarted(now, worker.path, worker.call_number, name, edge.label))
+        core.trace(TokenTaken(now, edge.label, token))
+    if type(edge) is EventEdge:
+        freed(edge)
+    if token.activity:
+        if worker.scopes:
+            touch(core, worker.scopes)
+        receive(worker, (token.activity,))
+        derive_scopes(core)
+    if edge.target_kind == "parameter":
+        set_parameter(worker, name, token.value)
+        finish_call(worker, "done")
+        return
+    handler = worker.handlers.get(name)
+    if handler is None:
+        builtin_slots.run(worker, name, token, lambda: finish_call(worker, "done"))
+        return
+    ticket = worker.ticket
+
+    def done(_result: Any, error: BaseException | None) -> None:
+        if worker.ticket != ticket:
+            return
+        if error is None:
+            finish_call(worker, "done")
+        else:
+            errors.fail_call(worker, name, error)
+
+    core.host.execute(worker, handler, (token,), done)
+
+
+def await_call(worker: Worker, name: str, coroutine: Any) -> None:
+    """A handler of a short step turned out to wait."""
+
+    def done(_result: Any, error: BaseException | None) -> None:
+        if error is None:
+            finish_call(worker, "done")
+        else:
+            errors.fail_call(worker, name, error)
+
+    worker.core.host.drive(worker, coroutine, done)
+
+
+def finish_call(worker: Worker, outcome: Any) -> None:
+    """The call is over: an O->S token is processed (F6), the automatic events follow."""
+    core = worker.core
+    if core.trace is not None:
+        core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
+    edge = worker.call_edge
+    worker.call_edge = None
+    if type(edge) is SyncEdge:
+        release((edge,))
+    flush_automatic(worker)
+    worker.right = False
+    worker.stamp = None
+    idle_again(worker)
+

@@ -1,0 +1,144 @@
+"""Beginning, ending, disabling and enabling single nodes (rules F10, A9 reset, X1 restart).
+
+Stands on `sending` and `wiring`; hooks are run by the host, one after another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from hfg.engine import wiring
+from hfg.engine.sending import block, consider, discard, release, unblock
+from hfg.engine.worker import DISABLED, ENDED, Worker
+from hfg.errors import NodeError
+from hfg.ports.edges import EventEdge
+from hfg.trace import NodeEnabled
+
+__all__ = ["disable", "enable", "reset", "set_up", "tear_down"]
+
+Then = Callable[[NodeError | None], None]
+
+
+def _run_hook(worker: Worker, name: str, then: Then) -> None:
+    hook = worker.node._hook(name) if worker.node is not None else None
+    if hook is None:
+        then(None)
+        return
+
+    def done(_result: Any, error: BaseException | None) -> None:
+        if error is None:
+            then(None)
+            return
+        problem = NodeError(worker.path, f"{name}()", error)
+        problem.__cause__ = error
+        then(problem)
+
+    worker.core.host.execute(worker, hook, (), done)
+
+
+def set_up(worker: Worker, then: Then) -> None:
+    """Give the node fresh state and run its `setup()`; `then(error)` follows."""
+    if worker.node is None:
+        then(None)
+        return
+    worker.node._reset_states()
+    worker.generator = None
+    wiring.bind_ports(worker)
+    _run_hook(worker, "setup", then)
+
+
+def tear_down(worker: Worker, then: Then) -> None:
+    """Close the node's generator and run its `teardown()`."""
+    if worker.node is None:
+        then(None)
+        return
+    generator, worker.generator = worker.generator, None
+
+    def closed(_result: Any, error: BaseException | None) -> None:
+        if error is not None:
+            problem = NodeError(worker.path, "closing its generator", error)
+            problem.__cause__ = error
+            _run_hook(worker, "teardown", lambda later: then(later or problem))
+        else:
+            _run_hook(worker, "teardown", then)
+
+    if generator is None:
+        closed(None, None)
+    else:
+        close = getattr(generator, "close", None) or generator.aclose
+        worker.core.host.execute(worker, close, (), closed)
+
+
+def disable(worker: Worker) -> None:
+    """F10: discard what lies on its edges, and let producers neither send to it nor wait for it."""
+    if worker.blocked & DISABLED:
+        return
+    core = worker.core
+    block(worker, DISABLED)
+    if core.trace is not None:
+        core.trace(NodeEnabled(core.now(), worker.path, False))
+    settle_disabled(worker)
+
+
+def settle_disabled(worker: Worker) -> None:
+    """The node, or a subgraph around it, was disabled: empty its edges and rewire its neighbours."""
+    incoming = [edge for edge in worker.edges_in() if not (edge.port_name == "enable" and edge.target_kind == "slot")]
+    outgoing = [edge for edges in worker.out_edges for edge in edges]
+    untaken = [edge for edge in outgoing if edge.untaken]
+    for edge in (*incoming, *outgoing):
+        discard(edge, "disabled")
+    wiring.refresh(worker)
+    # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
+    worker.taken = ()
+    release([edge for edge in (*incoming, *untaken) if type(edge) is not EventEdge and edge.held])
+
+
+def enable(worker: Worker, then: Callable[[], None]) -> None:
+    """F10: the node starts afresh; A(v) is kept."""
+    core = worker.core
+    if not worker.blocked & DISABLED:
+        then()
+        return
+
+    def up(error: NodeError | None) -> None:
+        if error is not None:
+            core.host.finish("failed", error)
+            return
+        worker.blocked &= ~(DISABLED | ENDED)
+        worker.pending_end = False
+        worker.deferred = None
+        for edge in worker.in_edges:
+            edge.ended = False
+        if core.trace is not None:
+            core.trace(NodeEnabled(core.now(), worker.path, True))
+        wiring.refresh(worker)
+        consider(worker)
+        then()
+
+    set_up(worker, up)
+
+
+def reset(worker: Worker, then: Callable[[], None]) -> None:
+    """The slot `reset`: teardown, setup, not ended; tokens and A(v) stay (A9)."""
+    core = worker.core
+
+    def up(error: NodeError | None) -> None:
+        if error is not None:
+            core.host.finish("failed", error)
+            return
+        worker.pending_end = False
+        worker.deferred = None
+        for edge in worker.in_edges:
+            edge.ended = False
+        unblock(worker, ENDED)
+        wiring.refresh(worker)
+        then()
+
+    def down(error: NodeError | None) -> None:
+        if error is not None:
+            core.host.finish("failed", error)
+            return
+        set_up(worker, up)
+
+    tear_down(worker, down)

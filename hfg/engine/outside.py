@@ -1,0 +1,200 @@
+"""How code outside a graph brings tokens in and takes them out (rules P10, F8): feeds, readers, taps, signals.
+
+Stands on `engine`. Everything here is for the event loop of the run, except `Feed.send_from_thread`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from types import TracebackType
+from typing import Any
+
+from hfg.engine.engine import Engine
+from hfg.engine.sending import enqueue, put_outputs, release
+from hfg.engine.worker import ENDED, Worker
+from hfg.errors import NotRunning, UsageError
+from hfg.ports.edges import EventEdge
+from hfg.token import END, NO_MESSAGE, Marker, Token
+from hfg.types import accepts, describe
+
+__all__ = ["Feed", "read", "signal"]
+
+
+class Feed:
+    """Brings tokens into a graph input; while it is open it holds the run open (R5).
+
+    Leaving the block sends END behind the last token, unless `end=False` or an exception leaves it.
+    """
+
+    def __init__(self, engine: Engine, worker: Worker, hint: Any, *, end: bool) -> None:
+        self._engine = engine
+        self._worker = worker
+        self._hint = hint
+        self._end = end
+        self._open = False
+        self._lock = asyncio.Lock()
+
+    async def __aenter__(self) -> Feed:
+        _check_running(self._engine)
+        if self._worker.blocked & ENDED:
+            raise UsageError(f'graph input "{self._worker.port_name}" has ended: an earlier feed was closed; open that one with end=False to feed it again')
+        self._open = True
+        self._engine.hold()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None) -> None:
+        self._open = False
+        try:
+            if kind is None and self._end and not self._engine.core.over:
+                async with self._lock:
+                    await self._free()
+                    if not self._engine.core.over:
+                        self._worker.blocked |= ENDED
+                        self._put(END, None, None)
+        finally:
+            self._engine.unhold()
+
+    async def send(self, value: Any, *, activity: int | None = None, stamp: float | None = None) -> None:
+        """Send one token and wait until the graph has processed it (P10).
+
+        Raises:
+          NotRunning: the feed is closed, or the run ended before the token was processed.
+          TypeError: the value is not of the input's type.
+        """
+        if not self._open:
+            raise NotRunning(f'the feed of "{self._worker.port_name}" is closed: use it inside "async with run.feed(...)"')
+        if type(value) is not Token and not isinstance(value, Marker) and not accepts(value, self._hint):
+            raise TypeError(f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got {describe(type(value))}: {value!r:.80}')
+        async with self._lock:
+            await self._free()
+            _check_running(self._engine)
+            self._put(value, activity, stamp)
+            await self._free()
+        _check_running(self._engine)
+
+    def send_from_thread(self, value: Any, *, activity: int | None = None, stamp: float | None = None) -> concurrent.futures.Future[None]:
+        """Send from any other thread, in order; the future is done when the token is processed."""
+        return asyncio.run_coroutine_threadsafe(self.send(value, activity=activity, stamp=stamp), self._engine.loop)
+
+    def _put(self, value: Any, activity: int | None, stamp: float | None) -> None:
+        if value is None:
+            value = NO_MESSAGE
+        if type(value) is Token:
+            activity = value.activity if activity is None else activity
+            stamp = value.stamp if stamp is None else stamp
+            value = value.value
+        put_outputs(self._worker, [(value, activity, stamp)])
+        self._engine.kick()
+
+    async def _free(self) -> None:
+        """Wait until the input's edges are free, or the run is over."""
+        await until(self._engine, self._worker.outputs.when_complete)
+
+
+async def until(engine: Engine, when: Callable[[Callable[[], None]], None]) -> None:
+    """Wait for a barrier, or for the end of the run."""
+    waiter: asyncio.Future[None] = engine.loop.create_future()
+    when(lambda: waiter.done() or waiter.set_result(None))  # type: ignore[func-returns-value,arg-type,return-value]
+    if waiter.done():
+        return
+    ending = asyncio.ensure_future(engine.ending.wait())
+    try:
+        await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        ending.cancel()
+        waiter.cancel()
+
+
+def _check_running(engine: Engine) -> None:
+    if engine.core.over:
+        raise NotRunning("the run is over: nothing can be brought into it any more")
+
+
+def take(worker: Worker) -> Token[Any]:
+    """Take the token that lies before a reader; its place is free at once."""
+    edge = worker.live_inputs[0]
+    token: Token[Any]
+    if isinstance(edge, EventEdge):
+        from hfg.engine.sending import freed
+
+        token = edge.queue.popleft()
+        if not edge.queue:
+            worker.inputs.missing += 1
+        freed(edge)
+    else:
+        token = edge.token
+        edge.token = None
+        worker.inputs.missing += 1
+        release((edge,))
+    worker.placed = False
+    return token
+
+
+async def read(engine: Engine, worker: Worker) -> AsyncIterator[Any]:
+    """Give out the values of a graph output, with back-pressure, until END or the end of the run (P10)."""
+    if not worker.live_inputs:
+        raise UsageError(f'graph output "{worker.port_name}" is not connected: nothing will come out of it')
+    while True:
+        if worker.inputs.missing:
+            await until(engine, worker.inputs.when_complete)
+            if worker.inputs.missing:
+                return
+        token = take(worker)
+        engine.kick()
+        if token.value is END:
+            return
+        if token.value is not NO_MESSAGE:
+            yield token.value
+
+
+def collect(engine: Engine, worker: Worker, values: list[Any]) -> None:
+    """Read a graph output into a list, for runs that nobody reads."""
+
+    def step(_worker: Worker) -> None:
+        worker.queued = worker.placed = False
+        while worker.live_inputs and not worker.inputs.missing:
+            token = take(worker)
+            if type(token.value) is not Marker:
+                values.append(token.value)
+        engine.kick()
+
+    worker.process = step
+
+
+class _Tapped:
+    """What a tap keeps: the newest tokens, bounded; it never slows the graph."""
+
+    def __init__(self, size: int) -> None:
+        self.tokens: deque[Token[Any]] = deque(maxlen=size)
+        self.wake = asyncio.Event()
+
+
+async def signal(engine: Engine, worker: Worker, slot: str, value: Any, activity: int | None, stamp: float | None) -> None:
+    """Bring a signal into a slot from outside, as if by an edge that is active; waits while its queue is full (F8).
+
+    The signal takes its place behind all that wait already.
+    """
+    from hfg.engine.plan import prepare_slot
+
+    _check_running(engine)
+    edge = worker.core.outside.get((worker.index, slot))
+    if edge is None:
+        edge = prepare_slot(worker, slot)
+    while len(edge.queue) >= edge.capacity:
+        waiter: asyncio.Future[None] = engine.loop.create_future()
+        outside = edge.source
+        if outside.room_waiters is None:
+            outside.room_waiters = []
+        outside.room_waiters.append(lambda: waiter.done() or waiter.set_result(None))  # noqa: B023
+        await until(engine, lambda done: waiter.add_done_callback(lambda _: done()))  # noqa: B023
+        _check_running(engine)
+    explicit = activity or 0
+    if type(value) is Token:
+        explicit = value.activity if activity is None else activity
+        stamp = value.stamp if stamp is None else stamp
+        value = value.value
+    enqueue(edge, value, explicit, engine.now() if stamp is None else stamp)
+    engine.kick()

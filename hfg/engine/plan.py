@@ -1,0 +1,294 @@
+"""From a flattened graph to running nodes and edges (rule G1): everything a token needs is found here, once.
+
+Stands on `graph.flat`, `worker` and `wiring`.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any
+
+from hfg.engine.core import Core
+from hfg.engine.groups import Group
+from hfg.engine.scopes import Gate, Scope
+from hfg.engine.wiring import is_live, rewire
+from hfg.engine.worker import DISABLED, STARTING, RunningEvent, Worker
+from hfg.errors import GraphError
+from hfg.graph.flat import FlatEdge, FlatGraph, FlatNode
+from hfg.ports.edges import DelayEdge, Edge, EventEdge, SyncEdge
+
+__all__ = ["build", "prepare_slot", "watch"]
+
+
+def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Group) -> None:
+    """Make the workers and edges of a run; nothing is set up and nothing lies on the edges yet."""
+    for flat_scope in flat.scopes:
+        parent = core.scopes[flat_scope.parent] if flat_scope.parent is not None else None
+        core.scopes.append(Scope(flat_scope.index, flat_scope.path, parent))
+    workers: list[Worker] = []
+    for flat_node in flat.nodes:
+        worker = _worker(core, flat_node, groups)
+        workers.append(worker)
+        core.by_path[worker.path] = worker
+    core.workers = list(workers)
+    for flat_scope, scope in zip(flat.scopes, core.scopes, strict=True):
+        owner = Worker(core, len(core.workers), flat_scope.path, flat_scope.subgraph, None, loop)
+        owner.scope = scope
+        owner.silent_code = True
+        owner.active_for_s = flat_scope.options.active_for_s
+        owner.own_enabled = flat_scope.options.enabled
+        scope.enabled = flat_scope.options.enabled
+        scope.worker = owner
+        core.workers.append(owner)
+        core.by_path[owner.path] = owner
+        scope.members = [workers[index] for index in flat_scope.members]
+        for member in scope.members:
+            member.around += (scope,)
+    boundary = core.boundary = Worker(core, len(core.workers), "", None, None, loop)
+    core.workers.append(boundary)
+    ends = _Ends(core, workers, boundary, loop)
+    for flat_edge in flat.edges:
+        _edge(core, flat_edge, ends)
+    for worker in core.workers:
+        if not worker.own_enabled or any(not scope.enabled for scope in worker.around):
+            worker.blocked |= DISABLED
+    for flat_gate in flat.gates:
+        state = core.scopes[-2 - flat_gate.by] if flat_gate.by < 0 else workers[flat_gate.by]
+        gate = Gate(state, flat_gate.idle_rate_hz)
+        target = flat_gate.target
+        gate.workers = list(core.scopes[-2 - target].members) if target < 0 else [workers[target]]
+        for worker in gate.workers:
+            worker.gate = gate
+            worker.paced = worker.paced or worker.is_source
+        state.gates.append(gate)
+    _mark_scopes(core)
+    for edge in core.edges:
+        edge.live = is_live(edge)
+    core.sources = [worker for worker in workers if worker.is_source]
+
+
+class _Ends:
+    """Finds the worker at the end of an edge; the graph's own inputs and outputs each have one."""
+
+    def __init__(self, core: Core, workers: list[Worker], boundary: Worker, loop: Group) -> None:
+        self.core = core
+        self.workers = workers
+        self.boundary = boundary
+        self.loop = loop
+        self.feeds: dict[str, Worker] = {}
+        self.readers: dict[str, Worker] = {}
+
+    def of(self, end: Any) -> Worker:
+        if end.node >= 0:
+            return self.workers[end.node]
+        if end.node < -1:
+            owner = self.core.scopes[-2 - end.node].worker
+            assert owner is not None
+            return owner
+        if end.kind == "output":
+            return self._outside(self.feeds, end.name, self.core.feeds)
+        if end.kind == "input":
+            return self._outside(self.readers, end.name, self.core.readers)
+        if end.kind == "observable":
+            return self._outside({}, end.name, [])
+        return self.boundary
+
+    def _outside(self, known: dict[str, Worker], name: str, listed: list[Worker]) -> Worker:
+        worker = known.get(name)
+        if worker is None:
+            worker = known[name] = Worker(self.core, len(self.core.workers), "", None, None, self.loop)
+            worker.port_name = name
+            self.core.workers.append(worker)
+            listed.append(worker)
+            if known is self.feeds:
+                worker.wired_out = ((),)
+                worker.out_names = (name,)
+            else:
+                worker.is_boundary_output = known is self.readers
+        return worker
+
+
+# What all nodes of a type share.
+_shared: dict[Any, tuple[tuple[Any, ...], tuple[bool, ...], tuple[str, ...], tuple[str, ...]]] = {}
+
+
+def _worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) -> Worker:
+    node = flat_node.node
+    options = flat_node.options
+    group = groups[options.group or "loop"]
+    worker = Worker(core, flat_node.index, flat_node.path, node, options, group)
+    node_type = worker.type
+    shared = _shared.get(node_type)
+    if shared is None:
+        inputs = node_type.inputs.values()
+        shared = _shared[node_type] = (
+            tuple(spec.default for spec in inputs),
+            tuple(spec.token for spec in inputs),
+            tuple(spec.name for spec in inputs if not spec.optional),
+            tuple(node_type.outputs),
+        )
+    worker.unset, worker.wants_token, worker.mandatory_ports, worker.out_names = shared
+    worker.wired_out = ((),) * len(worker.out_names)
+    worker.is_source = node_type.is_source
+    worker.is_async = node_type.process_kind.startswith("async")
+    worker.silent_code = node_type.is_function
+    worker.active_for_s = options.active_for_s
+    worker.paced = bool(options.max_rate_hz)
+    worker.own_enabled = options.enabled
+    if worker.is_source:
+        worker.blocked |= STARTING
+    if node_type.process_kind != "none":
+        worker.process = node._process_call()
+    if not worker.silent_code:
+        worker.ready_hook = node._hook("ready")
+        worker.has_hooks = node._hook("on_activated") is not None or node._hook("on_deactivated") is not None
+    if flat_node.iteration is not None:
+        from hfg.engine.iteration import Iteration
+
+        worker.iteration = Iteration(worker, flat_node.iteration, groups, groups["loop"])
+        worker.process = worker.iteration.begin
+        worker.is_source = False
+        worker.blocked &= ~STARTING
+    if group.threaded and _waits(worker):
+        raise GraphError(
+            f'node "{worker.path}" is async, but its group "{group.name}" is a thread: async code runs on the loop; leave out group=, or make the '
+            f"function a plain one"
+        )
+    return worker
+
+
+def _waits(worker: Worker) -> bool:
+    return worker.is_async or any(spec.is_async for spec in worker.type.slots.values())
+
+
+def _edge(core: Core, flat: FlatEdge, ends: _Ends) -> None:
+    source = ends.of(flat.source)
+    target = ends.of(flat.target)
+    index = len(core.edges)
+    edge: Any
+    by_event = flat.source.kind in ("event", "observable")
+    if by_event:
+        edge = EventEdge(index, flat.label, flat.active, flat.capacity, flat.overflow, flat.capacity_limit, flat.initial)
+    elif flat.initial:
+        edge = DelayEdge(index, flat.label, flat.active, flat.initial)
+    else:
+        edge = SyncEdge(index, flat.label, flat.active)
+        edge.sequential = _sequential(source, target)
+    edge.source, edge.target = source, target
+    edge.via = tuple(core.scopes[scope] for scope in flat.via)
+    edge.port_name = flat.target.name
+    core.edges.append(edge)
+    _into(edge, target, flat)
+    if flat.source.kind == "observable":
+        core.observables.append((flat.source.port, edge, flat.through))
+        source.out_edges = ()
+    elif by_event:
+        event = source.events.get(flat.source.name)
+        if event is None:
+            port = flat.source.port if source.node is not None or flat.source.name == "start" else None
+            event = source.events[flat.source.name] = RunningEvent(source, flat.source.name, port)
+        event.edges = tuple(sorted((*event.edges, edge), key=lambda one: (one.target_kind == "input", one.index)))
+        if flat.through:
+            core.piped.append((edge, flat.through))
+    else:
+        _out_of(edge, source, flat)
+
+
+def _sequential(source: Worker, target: Worker) -> bool:
+    """F5: the consumer's mode; `auto` is sequential within a group."""
+    release = target.options.release if target.options is not None else "pipelined"
+    if release == "auto":
+        return source.group is target.group
+    return bool(release == "sequential")
+
+
+def _into(edge: Edge, target: Worker, flat: FlatEdge) -> None:
+    kind = flat.target.kind
+    if kind == "slot":
+        edge.target_kind = "slot"
+        _handler(target, flat.target.name)
+    elif kind == "parameter":
+        edge.target_kind = "parameter"
+    if kind == "slot":
+        target.slot_edges += (edge,)
+        return
+    if kind == "input" and target.type is not None:
+        edge.position = list(target.type.inputs).index(flat.target.name)
+        edge.mandatory = not target.type.inputs[flat.target.name].optional
+    elif kind == "input":
+        edge.mandatory = True
+    else:
+        edge.position = len(target.type.inputs) + list(target.type.parameters).index(flat.target.name)
+    target.in_edges = tuple(sorted((*target.in_edges, edge), key=lambda one: one.position))
+
+
+def _handler(target: Worker, name: str) -> None:
+    """Look the slot's code up once."""
+    if target.node is None or target.scope is not None or name in target.handlers or name not in target.type.slots:
+        return
+    if not target.handlers:
+        target.handlers, target.plain_handlers = {}, {}
+    target.handlers[name] = target.node._slot_call(name)
+    spec = target.type.slots[name]
+    if spec.takes_value and not spec.token and not inspect.iscoroutinefunction(target.node._handler(name)):
+        target.plain_handlers[name] = target.node._handler(name)
+
+
+def prepare_slot(worker: Worker, name: str) -> EventEdge:
+    """Make the edge by which signals come into a slot from outside the graph; it counts as active (P10, A4)."""
+    core = worker.core
+    edge = EventEdge(len(core.edges), f"outside -> {worker.path}.{name}" if worker.path else f"outside -> {name}", True)
+    edge.source = Worker(core, len(core.workers), "", None, None, worker.group)
+    edge.target = worker
+    edge.target_kind = "slot"
+    edge.port_name = name
+    worker.slot_edges += (edge,)
+    _handler(worker, name)
+    core.edges.append(edge)
+    core.outside[worker.index, name] = edge
+    if core.started:
+        rewire(worker)
+    return edge
+
+
+def _out_of(edge: Edge, source: Worker, flat: FlatEdge) -> None:
+    name = flat.source.name
+    if name not in source.out_names or flat.source.kind == "parameter" and name not in source.out_names[len(source.type.outputs) :]:
+        source.out_names = (*source.out_names, name)  # a parameter's output is made when it is first connected (P8)
+        source.wired_out = (*source.wired_out, ())
+    names = source.out_names
+    position = names.index(name) if flat.source.kind != "parameter" else len(names) - 1 - names[::-1].index(name)
+    wired = list(source.wired_out)
+    wired[position] = (*wired[position], edge)
+    source.wired_out = tuple(wired)
+
+
+def _mark_scopes(core: Core) -> None:
+    """Find out whose activity somebody cares about; the others cost nothing."""
+    for scope in core.scopes:
+        owner = scope.worker
+        assert owner is not None
+        interesting = bool(scope.gates) or owner.active_for_s is not None or any(
+            name in owner.events for name in ("activated", "deactivated", "timeout")
+        )
+        if interesting:
+            scope.watched = True
+            inside = {member.index for member in scope.members}
+            scope.inner_edges = [edge for edge in core.edges if edge.source.index in inside and edge.target.index in inside]
+            for member in scope.members:
+                member.scopes += (scope,)
+    for worker in core.workers:
+        watch(worker)
+
+
+def watch(worker: Worker) -> None:
+    """Derive whether changes of its activity have consequences beyond the flag."""
+    worker.watched = bool(
+        worker.has_hooks
+        or worker.scopes
+        or worker.gates
+        or worker.active_for_s is not None
+        or "activated" in worker.events
+        or "deactivated" in worker.events
+    )

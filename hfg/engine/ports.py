@@ -1,0 +1,87 @@
+"""Lets the ports of a node lead into the run: what `send` and `trigger` do while its graph runs (rules F3, F8, A4).
+
+Bound at each setup. Stands on `sending` and `firing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from hfg.engine import firing, plan, steps
+from hfg.engine.sending import trigger
+from hfg.engine.worker import RunningEvent, Worker
+from hfg.ports.automatic import AUTOMATIC_EVENTS
+from hfg.ports.events import EventPort
+
+__all__ = ["bind", "bind_automatic", "bind_event", "release_ports"]
+
+
+def bind(worker: Worker) -> None:
+    """Install the run's functions on all ports through which the node's code can send."""
+    node = worker.node
+    node_type = worker.type
+    if node is None or worker.silent_code:
+        return
+    ports = node.ports
+    for position, name in enumerate(node_type.outputs):
+        ports.outputs[name]._emit = partial(firing.write, worker, position)
+    for name in node_type.events:
+        bind_event(worker, name)
+
+
+def bind_event(worker: Worker, name: str) -> RunningEvent:
+    """Make the running event of a declared or automatic event, and let the port trigger it."""
+    event = worker.events.get(name)
+    if event is None:
+        event = worker.events[name] = RunningEvent(worker, name, None)
+    port = event.port = worker.node.ports.events[name]
+    host: Any = worker.core.host
+    emit: Callable[[Any, int | None, float | None], None] = steps.emitter(event)
+    if worker.group.threaded:
+        emit = partial(_from_thread, worker, event)
+    port._emit = emit
+    port._emit_wait = partial(host.trigger_wait, event)
+    host.adopt_event(port)
+    if name in AUTOMATIC_EVENTS and worker.core.started:
+        plan.watch(worker)
+        steps.choose(worker)
+    return event
+
+
+def bind_automatic(worker: Worker) -> None:
+    """Let the automatic events of a node, subgraph or graph that have edges or subscribers be triggered and listened to."""
+    if worker.node is None:
+        return
+    made = [port for port in worker.node.__dict__.values() if isinstance(port, EventPort) and port.name in AUTOMATIC_EVENTS]
+    for port in made:
+        if port.name in worker.events or port._observers:
+            bind_event(worker, port.name)
+
+
+def _from_thread(worker: Worker, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+    """F3: a signal from a thread leaves at the loop's next pass, in order and before the outputs of its firing."""
+    host: Any = worker.core.host
+    if host.on_loop():
+        trigger(event, value, activity, stamp)
+    else:
+        worker.group.signal(partial(trigger, event, value, activity, stamp))  # type: ignore[attr-defined]
+
+
+def release_ports(worker: Worker) -> None:
+    """The run is over: what the ports led to is gone, their subscribers are told."""
+    node = worker.node
+    if node is None:
+        return
+    node._active = False
+    for event in worker.events.values():
+        port = event.port
+        if port is not None:
+            port._emit = port._refuse
+            port._emit_wait = port._refuse_wait
+            port._complete()
+    if not worker.silent_code:
+        for name in worker.type.outputs:
+            port = node.ports.outputs[name]
+            port._emit = port._refuse

@@ -1,0 +1,165 @@
+"""What happens when nothing moves: queues grow, events end, the run ends or has stalled (rules F8, F13, P9, R5).
+
+Decides only; `run` asks when it sees that no code runs, no worker is queued and no timer is pending. Stands on `sending`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hfg.engine.core import Core
+from hfg.engine.sending import block, enqueue, freed, put_outputs
+from hfg.engine.worker import CALLS_BLOCKED, DISABLED, ENDED, FULL, FUTILE, RESTING, UNREADY, UNWIRED, Worker
+from hfg.errors import QueueLimit, Stalled
+from hfg.ports.edges import EventEdge
+from hfg.token import END
+from hfg.trace import QueueGrown
+
+__all__ = ["complete_operators", "end_events", "grow", "node_ended", "only_futile_in_flight", "stall"]
+
+
+def grow(core: Core) -> bool:
+    """F8: if only full queues hold nodes back, the smallest of them gets one more place."""
+    if any(reader.inputs_ready() for reader in core.readers):
+        return False  # somebody outside holds a node back: growing would not help, only fill memory
+    held = [worker for worker in core.workers if _held_by_queue_alone(worker)]
+    full = [edge for worker in held for edge in worker.event_edges() if edge.full]
+    if not full:
+        return False
+    edge = min(full, key=lambda one: (one.capacity, one.index))
+    if edge.capacity_limit is not None and edge.capacity >= edge.capacity_limit:
+        core.host.finish(
+            "failed",
+            QueueLimit(
+                f'queue of "{edge.label}" holds {len(edge.queue)} signals, nothing else can move, and its capacity_limit = '
+                f"{edge.capacity_limit} forbids it to grow: raise the limit or let the consumer take more than it is sent"
+            ),
+        )
+        return True
+    edge.capacity += 1
+    edge.grown += 1
+    if core.trace is not None:
+        core.trace(QueueGrown(core.now(), edge.label, edge.capacity))
+    freed(edge)
+    core.host.kick()
+    return True
+
+
+def _held_by_queue_alone(worker: Worker) -> bool:
+    if not worker.blocked & FULL:
+        return False
+    if worker.waiting_room:
+        return True
+    if worker.calls and worker.blocked & CALLS_BLOCKED == FULL:
+        return True
+    return worker.blocked == FULL and not worker.inputs.missing and not worker.outputs.missing
+
+
+def complete_operators(core: Core) -> bool:
+    """P9: before the run ends each event with operators completes, so that they give out what they hold."""
+    edges = [edge for edge in core.edges if type(edge) is EventEdge and edge.complete is not None]
+    return any([complete_edge(edge) for edge in edges])
+
+
+def complete_edge(edge: EventEdge) -> bool:
+    """Complete the operators of one edge; whether anything came out."""
+    complete, edge.complete = edge.complete, None
+    if complete is None:
+        return False
+    before = edge.sent
+    complete()
+    return edge.sent != before
+
+
+def end_events(core: Core) -> bool:
+    """F13: all live event edges into inputs whose queue is empty get END, at the same moment and once; graph inputs that nobody feeds likewise."""
+    edges = [
+        edge
+        for edge in core.edges
+        if type(edge) is EventEdge
+        and edge.target_kind == "input"
+        and edge.live
+        and not edge.end_sent
+        and not edge.queue
+        and not edge.target.blocked & ENDED
+    ]
+    feeds = [feed for feed in core.feeds if not feed.blocked & ENDED and not feed.outputs.missing]
+    now = core.now()
+    for edge in edges:
+        edge.end_sent = True
+        enqueue(edge, END, 0, now)
+    for feed in feeds:
+        feed.blocked |= ENDED
+        put_outputs(feed, [(END, None, None)])
+    return bool(edges or feeds)
+
+
+def node_ended(worker: Worker) -> None:
+    """A node is over: its operators complete (P9), and sources that only feed the dead are futile when no other is left (R5)."""
+    core = worker.core
+    if not worker.slot_edges:
+        for edge in worker.event_edges():
+            complete_edge(edge)
+    sources = [one for one in core.sources if not one.blocked & (ENDED | DISABLED)]
+    if sources and all(_feeds_only_ended(source) for source in sources):
+        for source in sources:
+            block(source, FUTILE)
+            if source.rate_timer is not None:
+                source.rate_timer.cancel()
+                source.rate_timer = None
+
+
+def _feeds_only_ended(source: Worker) -> bool:
+    edges = [edge for edge in source.all_out_edges() if edge.live]
+    return bool(edges) and all(edge.target.blocked & ENDED for edge in edges)
+
+
+def only_futile_in_flight(core: Core) -> bool:
+    """R5: a source that feeds only ended nodes does not keep the run alive, even while it waits."""
+    busy = [worker for worker in core.workers if worker.in_flight]
+    return bool(busy) and all(worker.blocked & FUTILE for worker in busy)
+
+
+def stall(core: Core) -> Stalled | None:
+    """R5: say who waits for what, if a source is blocked or tokens lie where they can never be taken."""
+    reasons: list[str] = []
+    stuck: dict[int, list[Any]] = {}
+    for edge in core.edges:
+        if edge.untaken and (edge.live or edge.source.blocked & DISABLED) and not edge.target.blocked & (DISABLED | ENDED):
+            stuck.setdefault(edge.target.index, [edge.target]).append(edge)
+    for target, *edges in stuck.values():
+        lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
+        reasons.append(f'"{target.path}" {_waits_for(target)}, while tokens lie on {lies}')
+    for source in core.sources:
+        if not source.blocked & (ENDED | DISABLED | RESTING | FUTILE):
+            reasons.append(f'source "{source.path}" has not ended and {_waits_for(source)}')
+    if not reasons:
+        return None
+    shown = "; ".join(reasons[:5]) + (f"; and {len(reasons) - 5} more" if len(reasons) > 5 else "")
+    return Stalled(
+        f"the run has stalled: {shown}. Nothing can change this from inside: connect or end what is missing, or run with allow_idle=True "
+        f"if something outside will"
+    )
+
+
+def _waits_for(worker: Worker) -> str:
+    if worker.is_boundary_output:
+        return f'graph output "{worker.port_name}" is not read'
+    blocked = worker.blocked
+    if blocked & UNWIRED:
+        fed = {edge.port_name for edge in worker.live_inputs}
+        names = [name for name in worker.mandatory_ports if name not in fed]
+        if names:
+            return "waits for its unconnected input " + ", ".join(f'"{name}"' for name in names)
+        return "has no process function" if worker.process is None else "has no live input"
+    if blocked & UNREADY:
+        return "says by ready() that it is not ready"
+    if blocked & FULL:
+        return "is held back by a full queue"
+    if worker.inputs.missing:
+        names = [edge.port_name for edge in worker.live_inputs if not edge.untaken]
+        return "waits for " + ", ".join(f'"{name}"' for name in names)
+    if worker.outputs.missing:
+        edges = [edge.label for edge in worker.all_out_edges() if getattr(edge, "held", False)]
+        return "waits until its token is processed on " + ", ".join(f'"{label}"' for label in edges[:3])
+    return "cannot move"

@@ -1,0 +1,477 @@
+"""Running a graph: `run`, `run_async`, `running`, and what one can do with a run from outside (ARCHITECTURE §1, rules R1, R5, R6, P10).
+
+Stands on `engine` and `outside`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
+from typing import Any, Literal
+
+from hfg.engine import outside
+from hfg.engine.engine import Engine, Settings
+from hfg.engine.report import Report, edge_reports, node_reports
+from hfg.engine.sending import set_active, trigger
+from hfg.engine.virtual import VirtualTimeLoop
+from hfg.engine.worker import Worker
+from hfg.errors import CheckFailed, GraphError, HfgError, NodeError, NotRunning, RunError, UsageError
+from hfg.graph import Graph, Subgraph
+from hfg.graph.flat import flatten
+from hfg.nodetype import Node
+from hfg.token import Token
+from hfg.trace import ParameterSet, TokenSent, TraceEvent
+
+__all__ = ["Run", "run", "run_async", "running"]
+
+Clock = Literal["real", "virtual"]
+
+
+class Run:
+    """A graph that runs; made by `running`."""
+
+    def __init__(self, graph: Graph, engine: Engine) -> None:
+        self.graph = graph
+        self._engine = engine
+        self._outputs: dict[str, list[Any]] = {}
+        self._held = False
+        self._done: asyncio.Future[None] | None = None
+
+    # --- bringing in and taking out --------------------------------------------------------------------------------------------------
+
+    async def trigger(self, port: Any, value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+        """Send a signal into a slot, or trigger an event as its node would; waits while a queue is full (F8).
+
+        Args:
+          port: a slot or an event of a node in the graph.
+          value: of the port's type; a token passed on keeps its modifier and stamp.
+          activity: the modifier; into a slot it acts as over an active edge.
+          stamp: seconds on the run's clock; now, if not given.
+        """
+        if port.kind == "slot":
+            worker = self._worker(port.node)
+            await outside.signal(self._engine, worker, port.name, value, activity, stamp)
+            return
+        if port.kind != "event":
+            raise UsageError(f'"{port.path}" is an {port.kind}: run.trigger is for slots and events; give tokens to a graph input with run.feed')
+        from hfg.engine.ports import bind_event
+
+        event = bind_event(self._worker(port.node), port.name)
+        await self._engine.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
+
+    def feed(self, port: Any, *, end: bool = True) -> outside.Feed:
+        """Open a feed into a graph input; use it with `async with`, which holds the run open and sends END at its end unless `end=False`."""
+        name = getattr(port, "name", port)
+        for worker in self._engine.core.feeds:
+            if worker.port_name == name:
+                return outside.Feed(self._engine, worker, getattr(port, "type", Any), end=end)
+        if name in self.graph.inputs:
+            raise UsageError(f'graph input "{name}" is not connected: graph.connect(graph.inputs["{name}"], ...) before the run')
+        raise UsageError(f'"{name}" is no input of graph "{self.graph.name}": it has {_names(self.graph.inputs)}')
+
+    def read(self, port: Any) -> AsyncIterator[Any]:
+        """Read a graph output, value by value and lossless: a reader that does not read holds the graph back (P10)."""
+        name = getattr(port, "name", port)
+        for worker in self._engine.core.readers:
+            if worker.port_name == name:
+                return outside.read(self._engine, worker)
+        raise UsageError(f'"{name}" is no connected output of graph "{self.graph.name}": it has {_names(self.graph.outputs)}')
+
+    async def tap(self, port: Any, *, size: int = 100) -> AsyncIterator[Token[Any]]:
+        """Look at an output, event or input: tokens as they are sent; the oldest of more than `size` that were not looked at are skipped."""
+        engine = self._engine
+        edges = [edge for edge in engine.core.edges if self._touches(edge, port)]
+        labels = {edge.label for edge in edges}
+        kept = outside._Tapped(size)
+        first = edges[0].label if edges and port.kind != "input" else None
+
+        def look(event: TraceEvent) -> None:
+            if isinstance(event, TokenSent) and event.edge in labels and (first is None or event.edge == first):
+                kept.tokens.append(event.token)
+                kept.wake.set()
+
+        remove = self.trace(look)
+        try:
+            while True:
+                while kept.tokens:
+                    yield kept.tokens.popleft()
+                if engine.core.over:
+                    return
+                kept.wake.clear()
+                waits = [asyncio.ensure_future(kept.wake.wait()), asyncio.ensure_future(engine.ending.wait())]
+                try:
+                    await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+                finally:
+                    for wait in waits:
+                        wait.cancel()
+        finally:
+            remove()
+
+    def _touches(self, edge: Any, port: Any) -> bool:
+        source, target = edge.label.split(" -> ", 1)
+        path = port.path
+        return path in (target.split(" #")[0],) if port.kind in ("input", "slot") else bool(source == path)
+
+    def trace(self, consumer: Callable[[TraceEvent], None]) -> Callable[[], None]:
+        """Let a consumer see every event of the run from now on (R7); gives back what removes it."""
+        return self._engine.add_consumer(consumer)
+
+    def set(self, parameter: Any, value: Any) -> None:
+        """Set a parameter of a node between its firings (P8).
+
+        Raises:
+          ValueError: the value is out of the parameter's limits; nothing is changed.
+        """
+        parameter.node._set_parameter(parameter.name, value)
+        core = self._engine.core
+        if core.trace is not None:
+            core.trace(ParameterSet(core.now(), parameter.node.place.path, parameter.name, value))
+
+    # --- waiting ---------------------------------------------------------------------------------------------------------------------
+
+    async def wait_for(self, event: Any) -> Token[Any]:
+        """Wait for the next signal of an event.
+
+        Raises:
+          NotRunning: the run ended without one.
+        """
+        waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
+        from hfg.engine.ports import bind_event
+
+        bind_event(self._worker(event.node), event.name)
+        subscription = event.subscribe(lambda token: waiter.done() or waiter.set_result(token))
+        ending = asyncio.ensure_future(self._engine.ending.wait())
+        try:
+            await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
+            if waiter.done():
+                return waiter.result()
+            raise NotRunning(f'the run ended before "{event.path}" was triggered')
+        finally:
+            ending.cancel()
+            waiter.cancel()
+            subscription.dispose()
+
+    async def wait_quiet(self) -> None:
+        """Wait until nothing runs, nothing can start and no timer is pending (SEMANTICS, "quiet")."""
+        await self._engine.wait_quiet()
+        self._raise_failure()
+
+    async def wait_inputs(self, node: Node) -> None:
+        """Wait for the node's input barrier: every live input holds a token."""
+        await self._barrier(node, "inputs")
+
+    async def wait_outputs(self, node: Node) -> None:
+        """Wait for the node's output barrier: every token it sent is processed."""
+        await self._barrier(node, "outputs")
+
+    async def _barrier(self, node: Node, which: str) -> None:
+        from hfg.engine import steps
+
+        worker = self._worker(node)
+        neighbours = [edge.source for edge in worker.in_edges] + [edge.target for edge in worker.all_out_edges()]
+        for one in (worker, *neighbours):
+            one.observed = True
+            steps.choose(one)
+        await outside.until(self._engine, getattr(worker, which).when_complete)
+
+    async def wait_finished(self) -> Report:
+        """Let the run end by itself (R5), wait for that and give back the report.
+
+        Raises:
+          RunError: the run failed, stalled or was aborted.
+        """
+        self._release()
+        await self._engine.ending.wait()
+        await self._close()
+        return self.report()
+
+    # --- looking ---------------------------------------------------------------------------------------------------------------------
+
+    def active(self) -> list[str]:
+        """The paths of all active nodes, in order of adding."""
+        return [worker.path for worker in self._engine.core.workers if worker.active and worker.scope is None and worker.node is not None]
+
+    def statistics(self) -> Report:
+        """What the run has done so far."""
+        return self.report()
+
+    def now(self) -> float:
+        """Seconds on the run's clock."""
+        return self._engine.now()
+
+    def wake(self, node: Node) -> None:
+        """Ask a node's `ready()` again (F1)."""
+        from hfg.engine.sending import unblock
+        from hfg.engine.worker import UNREADY
+
+        unblock(self._worker(node), UNREADY)
+        self._engine.kick()
+
+    def stop(self) -> None:
+        """End the run well, as the graph's slot `stop` does."""
+        self._engine.finish("stopped", None)
+
+    def reset_activity(self) -> None:
+        """Take all activity away and trigger `start` again (A14)."""
+        from hfg.engine.activity import reset_activity
+
+        reset_activity(self._engine.core)
+        self._engine.kick()
+
+    def report(self) -> Report:
+        """What the run has done; final once it is over."""
+        engine = self._engine
+        core = engine.core
+        nodes = node_reports(core)
+        outcome = engine.outcome
+        return Report(
+            outcome=outcome,
+            duration_s=engine.ended_at - engine.started_at if engine.ended_at is not None else engine.now() - engine.started_at,
+            firings=sum(node.firings for node in nodes.values()),
+            nodes=nodes,
+            edges=edge_reports(core),
+            outputs=dict(self._outputs),
+            errors=[str(error) for error in core.errors],
+            lost_activity=core.lost_activity,
+        )
+
+    # --- inside ----------------------------------------------------------------------------------------------------------------------
+
+    def _worker(self, node: Any) -> Worker:
+        place = getattr(node, "place", None)
+        if node is self.graph or place is None or (place.path == "" and node is not None):
+            worker = self._engine.core.boundary
+        else:
+            worker = self._engine.core.by_path.get(place.path)
+            if worker is not None and worker.node is not node:
+                worker = None
+        if worker is None:
+            raise UsageError(f"{node!r} is no node of this run: its graph is another one, or it was never added")
+        return worker
+
+    def _hold(self) -> None:
+        self._held = True
+        self._engine.hold()
+
+    def _release(self) -> None:
+        if self._held:
+            self._held = False
+            self._engine.unhold()
+
+    async def _close(self) -> None:
+        if self._done is None:
+            self._done = self._engine.loop.create_future()
+            try:
+                await self._engine.close()
+            finally:
+                self._done.set_result(None)
+        elif not self._done.done():
+            await asyncio.shield(self._done)
+        self._raise_failure()
+
+    def _raise_failure(self) -> None:
+        error = self._engine.error
+        if error is not None:
+            if isinstance(error, RunError):
+                error.report = self.report()  # type: ignore[attr-defined]
+            raise error
+
+
+def _names(ports: Any) -> str:
+    return ", ".join(f'"{name}"' for name in ports) or "none"
+
+
+def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
+    """Check the graph and make its running form; nothing has happened yet."""
+    if not isinstance(graph, Graph):
+        raise UsageError(f"a Graph can run, not {type(graph).__name__}: write hfg.run(graph)")
+    if graph._run is not None:
+        raise UsageError(f'graph "{graph.name}" runs already: a graph has one run at a time; build a second graph')
+    loop = asyncio.get_running_loop()
+    if clock == "virtual" and not isinstance(loop, VirtualTimeLoop):
+        raise UsageError(
+            'clock="virtual" needs a loop in virtual time: hfg.run(graph, clock="virtual"), or '
+            "asyncio.Runner(loop_factory=hfg.VirtualTimeLoop).run(main()) around the whole program"
+        )
+    problems = graph.check()
+    if any(problem.severity == "error" for problem in problems):
+        raise CheckFailed(problems)
+    flat = flatten(graph)
+    if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
+        _refuse_endless(flat)
+    engine = Engine(flat, settings)
+    run = Run(graph, engine)
+    graph._run = run
+    return run
+
+
+def _refuse_endless(flat: Any) -> None:
+    """R6: a function without inputs that has no rate never lets virtual time pass; a generator may end, so it is given a chance."""
+    for node in flat.nodes:
+        kind = type(node.node)._type
+        if kind.is_source and kind.process_kind == "function" and not node.options.max_rate_hz and node.iteration is None:
+            gated = any(gate.target == node.index for gate in flat.gates)
+            names = getattr(getattr(node.node._process_call(), "__code__", None), "co_names", ("EndOfStream",))
+            if not gated and node.node._hook("ready") is None and "EndOfStream" not in names:
+                raise GraphError(
+                    f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time would stand still for ever: give it '
+                    f"max_rate_hz=, or let it raise hfg.EndOfStream"
+                )
+
+
+async def _run_to_end(graph: Graph, clock: Clock, settings: Settings) -> Report:
+    run = _prepare(graph, clock, settings)
+    engine = run._engine
+    try:
+        for worker in engine.core.readers:
+            outside.collect(engine, worker, run._outputs.setdefault(worker.port_name, []))
+        engine.watch_task(asyncio.current_task())
+        if settings.allow_idle:
+            engine.hold()
+        await engine.start()
+        await engine.ending.wait()
+    finally:
+        try:
+            await run._engine.close()
+        finally:
+            graph._run = None
+    run._raise_failure()
+    return run.report()
+
+
+async def run_async(
+    graph: Graph,
+    *,
+    clock: Clock | None = None,
+    until_s: float | None = None,
+    debug: bool = False,
+    policy: str | None = None,
+    seed: int | None = None,
+    trace: Callable[[TraceEvent], None] | None = None,
+    allow_idle: bool = False,
+    block_warning_s: float = 0.1,
+    fast: bool = True,
+) -> Report:
+    """Run a graph to its end in the running event loop; see `run` for the arguments.
+
+    Cancelling it tears the run down.
+    """
+    settings = Settings(
+        debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, allow_idle=allow_idle, block_warning_s=block_warning_s
+    )
+    return await _run_to_end(graph, clock or "real", settings)
+
+
+def run(
+    graph: Graph,
+    *,
+    clock: Clock = "real",
+    until_s: float | None = None,
+    debug: bool = False,
+    policy: str | None = None,
+    seed: int | None = None,
+    trace: Callable[[TraceEvent], None] | None = None,
+    allow_idle: bool = False,
+    block_warning_s: float = 0.1,
+    fast: bool = True,
+) -> Report:
+    """Run a graph to its end; blocks until then.
+
+    Args:
+      graph: it is checked first; a graph has one run at a time, and each run starts fresh.
+      clock: "real", or "virtual": as fast as the machine can, with the same values and stamps each time (R6).
+      until_s: end the run after so many seconds on its clock.
+      debug: check every value against the type of its port.
+      policy: for all groups, in place of their own: "fifo", "priority", "random" (R2).
+      seed: of the policy "random".
+      trace: receives every event of the run (R7); one that raises is removed.
+      allow_idle: a quiet graph does not end; it waits for subscribers, `stop` or Ctrl-C.
+      block_warning_s: after how long a firing on the loop group is warned about; 0 for never.
+      fast: take short ways for common shapes; outcomes do not differ.
+
+    Returns:
+      How it went; `outcome` is "done", "stopped" or "until".
+
+    Raises:
+      CheckFailed: the graph has errors; nothing was started.
+      RunError: a node failed (`NodeError`), the graph stalled (`Stalled`) or aborted itself (`Aborted`).
+      UsageError: called inside a running event loop, or the graph runs already.
+    """
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        pass
+    else:
+        raise UsageError("hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`")
+    settings = Settings(
+        debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, allow_idle=allow_idle, block_warning_s=block_warning_s
+    )
+    factory = VirtualTimeLoop if clock == "virtual" else None
+    with asyncio.Runner(loop_factory=factory) as runner:
+        return runner.run(_run_to_end(graph, clock, settings))
+
+
+@asynccontextmanager
+async def running(
+    graph: Graph,
+    *,
+    clock: Clock | None = None,
+    until_s: float | None = None,
+    debug: bool = False,
+    policy: str | None = None,
+    seed: int | None = None,
+    trace: Callable[[TraceEvent], None] | None = None,
+    block_warning_s: float = 0.1,
+    fast: bool = True,
+) -> AsyncIterator[Run]:
+    """Run a graph as long as the block lasts; the block holds the run open until it calls `wait_finished`.
+
+    Leaving the block stops the run and tears it down. A failure of the run cancels what the block waits for and comes out here.
+    """
+    settings = Settings(debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, block_warning_s=block_warning_s)
+    run = _prepare(graph, clock or "real", settings)
+    engine = run._engine
+    body = asyncio.current_task()
+    assert body is not None
+    cancelled_by_us = False
+
+    async def guard() -> None:
+        nonlocal cancelled_by_us
+        await engine.ending.wait()
+        if engine.error is not None and run._done is None:
+            cancelled_by_us = True
+            body.cancel()
+
+    watcher: asyncio.Task[None] | None = None
+    try:
+        run._hold()
+        await engine.start()
+        if engine.error is None:
+            watcher = asyncio.create_task(guard(), name=f"hfg guard of {graph.name}")
+            yield run
+    except asyncio.CancelledError:
+        if not cancelled_by_us:
+            raise
+        body.uncancel()
+    finally:
+        if watcher is not None:
+            watcher.cancel()
+        if engine.outcome == "running":
+            engine.finish("stopped", None)
+        try:
+            await asyncio.shield(_quietly(run._close()))
+        finally:
+            graph._run = None
+    run._raise_failure()
+
+
+async def _quietly(closing: Coroutine[Any, Any, None]) -> None:
+    """The failure of the run is raised by whoever waits for it, not by its clean-up."""
+    try:
+        await closing
+    except HfgError:
+        pass
+
+
+_ = (NodeError, Subgraph, set_active, trigger)

@@ -1,0 +1,62 @@
+"""Subgraphs at run time (rule G2) and gates (rule A11): what depends on the activity of something else.
+
+A scope is a dissolved subgraph that somebody watches: it has an automatic event with an edge, `active_for_s`, or gates a node. Its activity is derived,
+never stored by a token. Stands on `worker`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hfg.engine.worker import Worker
+
+__all__ = ["Gate", "Scope"]
+
+
+class Scope:
+    """A subgraph whose activity matters.
+
+    Attributes:
+      worker: its automatic ports live on a worker of their own, which never fires.
+      members: the running nodes inside, nested ones too.
+      inner_edges: the edges with both ends inside.
+      active: A(subgraph) as last derived.
+    """
+
+    __slots__ = ("active", "enabled", "gates", "index", "inner_edges", "members", "parent", "path", "watched", "worker")
+
+    def __init__(self, index: int, path: str, parent: Scope | None) -> None:
+        self.index = index
+        self.path = path
+        self.parent = parent
+        self.members: list[Worker] = []
+        self.inner_edges: list[Any] = []
+        self.worker: Worker | None = None
+        self.active = False
+        self.enabled = True
+        self.watched = False
+        self.gates: list[Gate] = []
+
+    def derive(self) -> bool:
+        """Whether an inner node is active or a token with +1 lies untaken inside (G2)."""
+        return any(worker.active for worker in self.members) or any(
+            token.activity > 0 for edge in self.inner_edges for token in edge.contents()
+        )
+
+
+class Gate:
+    """Work coupled to the activity of a state node or subgraph (A11).
+
+    Attributes:
+      state: who must be active.
+      idle_rate_hz: how many firings a second run while it is not; None suspends.
+      workers: the gated running nodes.
+    """
+
+    __slots__ = ("idle_rate_hz", "state", "workers")
+
+    def __init__(self, state: Worker | Scope, idle_rate_hz: float | None) -> None:
+        self.state = state
+        self.idle_rate_hz = idle_rate_hz
+        self.workers: list[Worker] = []

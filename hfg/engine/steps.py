@@ -1,0 +1,377 @@
+"""Shorter ways for the common shapes: a closure per worker in which everything that cannot change between two edits is a local (figures in docs/speed.md).
+
+A step is only a shortening: under every condition it does not cover it hands over to `firing.step`, whose outcome it must equal (property: engine = oracle
+with `fast` on and off). A worker's step is chosen anew whenever its wiring or somebody's interest in the trace changes. Stands on `firing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import CoroutineType
+from typing import Any
+
+from hfg.engine import errors, firing
+from hfg.engine.core import PENDING
+from hfg.engine.sending import add_call, block, consider, flush_automatic, freed, outputs_free, release, trigger
+from hfg.engine.worker import CALLS_BLOCKED, FULL, RunningEvent, Worker
+from hfg.errors import EndOfStream
+from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.token import Token
+
+__all__ = ["choose", "emitter"]
+
+Step = Callable[[Worker], None]
+
+
+def choose(worker: Worker) -> None:
+    """Give the worker the shortest step that is right for its present shape."""
+    core = worker.core
+    if worker.is_boundary_output:
+        worker.step = worker.process or _leave_lying
+        return
+    worker.step = firing.step
+    if worker.iteration is None and core.inside is not None:
+        worker.step = core.inside.step
+    if not core.fast or core.trace is not None or core.debug or worker.node is None or worker.group.threaded:
+        return
+    if worker.gate is not None or worker.iteration is not None or worker.ready_hook is not None or worker.observed:
+        return
+    options = worker.options
+    if options.max_rate_hz or options.max_duration_s or worker.scopes or worker.watched or worker.type.parameters and _parameters_wired(worker):
+        return
+    if worker.slot_edges and not worker.in_edges and not worker.is_source:
+        worker.step = _call_step(worker)
+        return
+    if worker.slot_edges or "processed" in worker.events:
+        return
+    outs = [edge for edges in worker.out_edges for edge in edges]
+    if any(type(edge) is not SyncEdge or edge.target_kind != "input" for edge in outs):
+        return
+    if len(outs) > 1 or (worker.type.result == "fields"):
+        return
+    if worker.is_source:
+        if worker.type.process_kind == "generator" and len(outs) == 1 and worker.process is not None:
+            worker.step = _generator_step(worker, outs[0])
+        return
+    if len(worker.in_edges) == 1 and len(worker.live_inputs) == 1 and len(worker.unset) == 1 and not worker.wants_token[0]:
+        edge = worker.live_inputs[0]
+        if type(edge) is SyncEdge and edge.target_kind == "input" and edge.mandatory and worker.type.process_kind in ("function", "async"):
+            if outs and worker.type.result != "single" and worker.silent_code:
+                return
+            worker.step = _through_step(worker, edge, outs[0] if outs else None)
+
+
+def _leave_lying(worker: Worker) -> None:
+    """A graph output: its token lies there until somebody reads it (P10)."""
+    worker.queued = False
+
+
+def _parameters_wired(worker: Worker) -> bool:
+    return len(worker.out_names) > len(worker.type.outputs) or any(edge.target_kind == "parameter" for edge in worker.in_edges)
+
+
+def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step:
+    """One input, at most one output edge: the shape of a pipeline."""
+    core = worker.core
+    node = worker.node
+    process: Any = worker.process
+    inputs = worker.inputs
+    outputs = worker.outputs
+    producer: Worker = taken.source
+    producer_outputs = producer.outputs
+    sequential = taken.sequential
+    silent_code = worker.silent_code  # it cannot send by itself, so nobody needs to know that it runs
+    is_async = worker.type.process_kind == "async"
+    start = worker.carrier.start if is_async else None
+    general = firing.step
+    target: Worker | None = given.target if given is not None else None
+    target_inputs = target.inputs if target is not None else None
+    target_outputs = target.outputs if target is not None else None
+    carries = given is not None and given.active
+    only = (taken,)
+
+    def later(result: Any, error: BaseException | None) -> None:
+        if error is None:
+            firing.complete_firing(worker, result)
+        else:
+            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+
+    def step(worker: Worker) -> None:
+        if worker.special or not worker.placed or inputs.missing or worker.busy:
+            general(worker)
+            return
+        worker.queued = worker.placed = False
+        token = taken.token
+        taken.token = None
+        inputs.missing = 1
+        if token.activity:  # type: ignore[union-attr]
+            active = token.activity > 0  # type: ignore[union-attr]
+            worker.active = active
+            node._active = active
+        worker.firings += 1
+        core.current = worker
+        if silent_code:
+            try:
+                result = process(token.value)  # type: ignore[union-attr]
+            except Exception as error:
+                worker.busy = "firing"
+                worker.stamp = token.stamp  # type: ignore[union-attr]
+                worker.taken = only
+                errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+                return
+        else:
+            worker.busy = "firing"
+            worker.stamp = token.stamp  # type: ignore[union-attr]
+            worker.taken = only
+            try:
+                result = process(token.value)  # type: ignore[union-attr]
+            except Exception as error:
+                errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+                return
+            if worker.written is not None or worker.right:
+                if not is_async:
+                    firing.complete_firing(worker, result)
+                    return
+        if is_async:
+            worker.busy = "firing"
+            worker.taken = only
+            worker.stamp = token.stamp  # type: ignore[union-attr]
+            if type(result) is CoroutineType:
+                try:
+                    result = start(result, worker.late or _late(worker, later))  # type: ignore[misc]
+                except Exception as error:
+                    errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+                    return
+                if result is PENDING:
+                    core.host.begin(worker)
+                    return
+            if worker.written is not None or worker.right:
+                firing.complete_firing(worker, result)
+                return
+        if given is None:
+            worker.busy = ""
+            worker.stamp = None
+            if worker.calls or worker.events_due:
+                worker.taken = only
+                firing.finish_firing(worker, "done")
+                return
+            # the sink's firing is over: what it took is processed
+            taken.held = False
+            producer_outputs.missing = missing = producer_outputs.missing - 1
+            if not missing:
+                _outputs_done(producer)
+            return
+        if result is None or type(result) is Token:
+            worker.busy = "firing"
+            worker.stamp = token.stamp  # type: ignore[union-attr]
+            worker.taken = only
+            firing.complete_firing(worker, result)
+            return
+        worker.busy = ""
+        given.sent = number = given.sent + 1
+        if carries and worker.active:
+            worker.active = node._active = False
+            given.token = Token(result, 1, token.stamp, number)  # type: ignore[union-attr]
+        else:
+            given.token = Token(result, 0, token.stamp, number)  # type: ignore[union-attr]
+        given.held = True
+        outputs.missing = 1
+        worker.stamp = None
+        target_inputs.missing = missing = target_inputs.missing - 1  # type: ignore[union-attr]
+        if not missing:
+            if target.blocked or target_outputs.missing or target.placed or target.calls is not None or target.paced:  # type: ignore[union-attr]
+                consider(target)  # type: ignore[arg-type]
+            else:
+                target.placed = True  # type: ignore[union-attr]
+                if not target.queued and not target.busy:  # type: ignore[union-attr]
+                    target.queued = True  # type: ignore[union-attr]
+                    target.push(target)  # type: ignore[union-attr]
+        if sequential:
+            worker.held = True
+            worker.taken = only
+        else:
+            release(only)
+
+    return step
+
+
+def _late(worker: Worker, later: Callable[[Any, BaseException | None], None]) -> Any:
+    worker.late = worker.core.host.late(worker, later)
+    return worker.late
+
+
+def _outputs_done(worker: Worker) -> None:
+    """All its tokens are processed: the short form of `sending.release`, up a chain and without recursion."""
+    while True:
+        if worker.outputs.waiters is not None or worker.pending_end or len(worker.taken) > 1:
+            release(outputs_free(worker))
+            return
+        upstream: Any = None
+        if worker.held:
+            worker.held = False
+            taken = worker.taken
+            if taken and taken[0].sequential:
+                upstream = taken[0]
+        if not worker.inputs.missing and not worker.blocked and not worker.placed:
+            consider(worker)
+        if upstream is None or not upstream.held:
+            return
+        upstream.held = False
+        worker = upstream.source
+        outputs = worker.outputs
+        outputs.missing -= 1
+        if outputs.missing:
+            return
+
+
+def _generator_step(worker: Worker, given: SyncEdge) -> Step:
+    """A generator with one output edge."""
+    core = worker.core
+    node = worker.node
+    process: Any = worker.process
+    outputs = worker.outputs
+    target: Worker = given.target
+    target_inputs = target.inputs
+    general = firing.step
+    now = core.now
+    carries = given.active
+
+    def step(worker: Worker) -> None:
+        if not worker.placed or worker.special or worker.busy or (worker.active and carries):
+            general(worker)
+            return
+        generator = worker.generator
+        if generator is None:
+            generator = worker.generator = process()
+        worker.queued = worker.placed = False
+        worker.firings += 1
+        core.current = worker
+        stamp = worker.stamp = now()
+        worker.busy = "firing"
+        try:
+            value = next(generator)
+        except (StopIteration, EndOfStream):
+            firing.source_ended(worker)
+            return
+        except Exception as error:
+            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+            return
+        if value is None or type(value) is Token or worker.written is not None or worker.active or worker.right or worker.calls:
+            firing.complete_firing(worker, value)
+            return
+        worker.busy = ""
+        worker.stamp = None
+        given.sent = number = given.sent + 1
+        given.token = Token(value, 0, stamp, number)
+        given.held = True
+        outputs.missing = 1
+        target_inputs.missing = missing = target_inputs.missing - 1
+        if not missing:
+            consider(target)
+
+    _ = node
+    return step
+
+
+def _call_step(worker: Worker) -> Step:
+    """A node that lives by its slots."""
+    core = worker.core
+    node = worker.node
+    general = firing.step
+    handlers = worker.plain_handlers
+
+    def step(worker: Worker) -> None:
+        calls = worker.calls
+        if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
+            general(worker)
+            return
+        edge = calls[0]
+        handler = handlers.get(edge.port_name)
+        if handler is None or type(edge) is not EventEdge:
+            general(worker)
+            return
+        worker.queued = False
+        calls.popleft()
+        queue = edge.queue
+        token = queue.popleft()
+        worker.call_number += 1
+        if edge.full and len(queue) < edge.capacity:
+            freed(edge)
+        if token.activity:
+            active = token.activity > 0
+            worker.active = active
+            node._active = active
+        core.current = worker
+        worker.busy = "call"
+        worker.stamp = token.stamp
+        try:
+            result = handler(token.value)
+        except Exception as error:
+            worker.call_edge = edge
+            worker.ticket += 1
+            errors.fail_call(worker, edge.port_name, error)
+            return
+        if type(result) is CoroutineType:
+            worker.call_edge = edge
+            firing.await_call(worker, edge.port_name, result)
+            return
+        worker.busy = ""
+        worker.stamp = None
+        worker.right = False
+        if worker.events_due:
+            flush_automatic(worker)
+        if calls and not worker.queued and not worker.blocked & CALLS_BLOCKED:
+            worker.queued = True
+            worker.push(worker)
+
+    return step
+
+
+def emitter(event: RunningEvent) -> Callable[[Any, int | None, float | None], None]:
+    """What a port's `trigger` does: the short way for one plain edge into a slot that nobody watches, else `sending.trigger`."""
+    worker = event.worker
+    core = worker.core
+    general = trigger
+    edges = event.edges
+    if not core.fast or len(edges) != 1:
+        return lambda value, activity, stamp: general(event, value, activity, stamp)
+    edge = edges[0]
+    target: Worker = edge.target
+    if edge.target_kind != "slot" or edge.overflow != "wait" or edge.pipeline is not None:
+        return lambda value, activity, stamp: general(event, value, activity, stamp)
+    port = event.port
+    queue = edge.queue
+    carries = edge.active
+
+    def emit(value: Any, activity: int | None, stamp: float | None) -> None:
+        if (
+            activity is not None
+            or stamp is not None
+            or not core.pumping
+            or not edge.live
+            or core.trace is not None
+            or port._observers
+            or type(value) is Token
+            or (carries and (worker.active or worker.right))
+        ):
+            general(event, value, activity, stamp)
+            return
+        stamp = worker.stamp
+        if stamp is None:
+            stamp = core.now()
+        edge.sent = number = edge.sent + 1
+        queue.append(Token(value, 0, stamp, number))
+        if len(queue) >= edge.capacity and not edge.full:
+            edge.full = True
+            worker.full_edges += 1
+            block(worker, FULL)
+        calls = target.calls
+        if calls is None:
+            add_call(target, edge)
+            return
+        calls.append(edge)
+        if not target.queued and not target.busy and not target.blocked & CALLS_BLOCKED:
+            target.queued = True
+            target.push(target)
+
+    return emit

@@ -1,0 +1,93 @@
+"""The automatic slots of a dissolved subgraph: enable, disable, deactivate, reset for everything inside (rules F10, G2).
+
+Stands on `lifecycle` and `activity`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from hfg.engine import lifecycle, wiring
+from hfg.engine.activity import deactivate_inside, scopes_changed
+from hfg.engine.scopes import Scope
+from hfg.engine.sending import block, consider
+from hfg.engine.worker import DISABLED, Worker
+from hfg.errors import NodeError
+from hfg.trace import NodeEnabled
+
+__all__ = ["disable_scope", "enable_scope", "run_slot"]
+
+
+def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
+    """Do to everything inside what the slot says."""
+    if name == "deactivate":
+        deactivate_inside(scope)
+        if scope.members:
+            scopes_changed(scope.members[0].core)
+        then()
+    elif name == "disable":
+        then()
+        disable_scope(scope)
+    elif name == "enable":
+        enable_scope(scope, then)
+    else:
+        _each(scope.members, lifecycle.reset, then)
+
+
+def _each(
+    workers: Sequence[Worker], action: Callable[[Worker, Callable[[], None]], None], then: Callable[[], None]
+) -> None:
+    """One after the other, in order of adding."""
+    rest = iter(workers)
+
+    def step() -> None:
+        worker = next(rest, None)
+        if worker is None:
+            then()
+        else:
+            action(worker, step)
+
+    step()
+
+
+def disable_scope(scope: Scope) -> None:
+    """Disable the subgraph: its nodes are disabled by it, their own flags and activity stay (G2)."""
+    if not scope.enabled or scope.worker is None:
+        return
+    scope.enabled = False
+    core = scope.worker.core
+    if core.trace is not None:
+        core.trace(NodeEnabled(core.now(), scope.path, False))
+    for worker in scope.members:
+        if not worker.blocked & DISABLED:
+            block(worker, DISABLED)
+            lifecycle.settle_disabled(worker)
+    wiring.refresh_via(scope)
+
+
+def enable_scope(scope: Scope, then: Callable[[], None]) -> None:
+    """Enable the subgraph: the nodes that were not disabled themselves start afresh."""
+    if scope.enabled or scope.worker is None:
+        then()
+        return
+    scope.enabled = True
+    core = scope.worker.core
+    if core.trace is not None:
+        core.trace(NodeEnabled(core.now(), scope.path, True))
+    wiring.refresh_via(scope)
+
+    def one(worker: Worker, done: Callable[[], None]) -> None:
+        if worker.own_enabled and all(around.enabled for around in worker.around):
+            lifecycle.enable(worker, done)
+        else:
+            done()
+
+    def finished() -> None:
+        for worker in scope.members:
+            consider(worker)
+        then()
+
+    _each(scope.members, one, finished)
+
+
+_ = NodeError

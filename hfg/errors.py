@@ -1,0 +1,150 @@
+"""Everything hfg raises: one tree, one sentence each.
+
+    HfgError
+    ├── DeclarationError      a node type cannot be what it says (raised where it is declared)
+    ├── GraphError            the structure is wrong (raised where it is built, or by a check)
+    │   ├── ConnectionError   an edge that rules P1-P9 refuse
+    │   └── CheckFailed       a check found errors; `problems` holds all of them
+    ├── UsageError            a call at the wrong moment (a port outside a run, a second run, ...)
+    │   └── NotRunning        the run that the call needs has not begun or is over
+    ├── TargetError           a TARGET of the command line that cannot be found or imported
+    ├── RunError              a run that did not end well
+    │   ├── NodeError         a node's own code failed; `__cause__` is its exception (rule X1)
+    │   │   └── FiringTimeout a firing took longer than its `max_duration_s` (rule X2)
+    │   ├── Stalled           quiet, and something is left that can never move (rule R5)
+    │   ├── Aborted           the graph's slot `abort` was called (rule A10)
+    │   ├── QueueLimit        a queue would have grown over its `capacity_limit` (rule F8)
+    │   └── TeardownError     nodes failed while they were torn down (rule X3)
+    ├── QueueOverflow         policy `error`: the queue is full, nothing of the trigger was sent (rule P5)
+    ├── EndOfStream           raised *by* a source to say that it has ended (rule F2)
+    └── EngineInternalError   a fault of hfg, never of the user
+
+A class exists when somebody would catch it apart from its neighbours. Each message names the path in the graph, what was expected, what was found, and
+what to do. Stands on nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hfg.problem import Problem
+
+__all__ = [
+    "Aborted",
+    "CheckFailed",
+    "ConnectionError",
+    "DeclarationError",
+    "EndOfStream",
+    "EngineInternalError",
+    "FiringTimeout",
+    "GraphError",
+    "HfgError",
+    "NodeError",
+    "NotRunning",
+    "QueueLimit",
+    "QueueOverflow",
+    "RunError",
+    "Stalled",
+    "TargetError",
+    "TeardownError",
+    "UsageError",
+]
+
+
+class HfgError(Exception):
+    """Whatever hfg raises on purpose."""
+
+
+class DeclarationError(HfgError):
+    """A node type, port or parameter is declared in a way that cannot work."""
+
+
+class GraphError(HfgError):
+    """The structure of a graph is wrong; unlike `DeclarationError` the types themselves are fine."""
+
+
+class ConnectionError(GraphError):  # noqa: A001 - the paper's word; always used as hfg.errors.ConnectionError
+    """An edge was refused; nothing was changed."""
+
+
+class CheckFailed(GraphError):
+    """A check found errors; nothing was started.
+
+    Attributes:
+      problems: every finding, warnings too, in the order of the check.
+    """
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        errors = [problem for problem in self.problems if problem.severity == "error"]
+        count = "1 error" if len(errors) == 1 else f"{len(errors)} errors"
+        super().__init__(f"the graph has {count}:\n" + "\n".join(f"  {problem}" for problem in errors))
+
+
+class UsageError(HfgError):
+    """A call that is right elsewhere, made where or when it cannot work."""
+
+
+class NotRunning(UsageError):
+    """The call needs a run that has begun and is not over."""
+
+
+class TargetError(HfgError):
+    """What `hfg run TARGET` names cannot be found, imported or is no graph."""
+
+
+class RunError(HfgError):
+    """A run did not end well."""
+
+
+class NodeError(RunError):
+    """The code of a node failed; the exception it raised is the `__cause__`.
+
+    Attributes:
+      path: the node's path in the graph.
+      what: where in its life it failed: "firing 3", "slot look, call 2", "setup" ...
+    """
+
+    def __init__(self, path: str, what: str, cause: BaseException | str) -> None:
+        self.path = path
+        self.what = what
+        reason = cause if isinstance(cause, str) else f"{type(cause).__name__}: {cause}"
+        super().__init__(f'node "{path}" failed in {what}: {reason}')
+
+
+class FiringTimeout(NodeError):
+    """A firing took longer than its node's `max_duration_s`; it was cancelled or abandoned."""
+
+
+class Stalled(RunError):
+    """Nothing can move any more, yet a source has not ended or tokens are left."""
+
+
+class Aborted(RunError):
+    """The graph said so itself: its slot `abort` was called."""
+
+
+class QueueLimit(RunError):
+    """Only a longer queue could go on, and its `capacity_limit` forbids it."""
+
+
+class TeardownError(RunError):
+    """One or more nodes failed while they were torn down; `errors` holds each."""
+
+    def __init__(self, errors: Sequence[NodeError]) -> None:
+        self.errors = tuple(errors)
+        super().__init__("; ".join(str(error) for error in errors))
+
+
+class QueueOverflow(HfgError):
+    """A trigger found a full queue with policy `error`; nothing of it was sent."""
+
+
+class EndOfStream(HfgError):  # noqa: N818 - a signal, not a fault
+    """Raise it in a source to say that nothing more will come."""
+
+
+class EngineInternalError(HfgError):
+    """A fault of hfg: please report it, with the trace if you have one."""

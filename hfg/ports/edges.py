@@ -1,0 +1,209 @@
+"""The edges of a running graph: what lies on them and who may put more (rules P4, P5, P7).
+
+Three state machines: a synchronous edge with one place, one with initial tokens (a delay), and an event edge with a queue. They hold tokens and count;
+the engine moves them. `source` and `target` are the engine's workers, opaque here. Stands on `token`; never waits.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Literal
+
+from hfg.token import Token
+
+__all__ = ["DelayEdge", "Edge", "EventEdge", "Overflow", "SyncEdge"]
+
+Overflow = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
+
+
+class Edge:
+    """What all edges of a run have.
+
+    Attributes:
+      index: its place in the order of creation.
+      label: "source -> target", as traces and reports name it.
+      active: whether it carries activity, A(e) (rule A1).
+      target_kind: what it leads into: "input", "slot", or "parameter".
+      position: which input of the target's node type; inputs first, then parameters.
+      mandatory: whether it feeds a mandatory input (F4's m).
+      sent, dropped, drained: counts for the report; `sent` is also the number of the newest token.
+      live: whether both ends are enabled (SEMANTICS, "live edge").
+      ended: the consumer has taken END from it and waits for it no more (F4).
+      via: the scopes (subgraphs) whose relays it passes; all must be enabled.
+    """
+
+    __slots__ = (
+        "active",
+        "drained",
+        "dropped",
+        "ended",
+        "index",
+        "label",
+        "live",
+        "mandatory",
+        "port_name",
+        "position",
+        "sent",
+        "source",
+        "target",
+        "target_kind",
+        "via",
+    )
+
+    def __init__(self, index: int, label: str, active: bool) -> None:
+        self.index = index
+        self.label = label
+        self.active = active
+        self.source: Any = None
+        self.target: Any = None
+        self.target_kind = "input"
+        self.port_name = ""
+        self.position = 0
+        self.mandatory = False
+        self.sent = 0
+        self.dropped = 0
+        self.drained = 0
+        self.live = True
+        self.ended = False
+        self.via: tuple[Any, ...] = ()
+
+    @property
+    def untaken(self) -> int:
+        """How many tokens lie on it."""
+        raise NotImplementedError
+
+    def clear(self) -> list[Token[Any]]:
+        """Take away what lies on it, oldest first."""
+        raise NotImplementedError
+
+    def contents(self) -> list[Token[Any]]:
+        """What lies on it, oldest first, without taking it."""
+        raise NotImplementedError
+
+
+class SyncEdge(Edge):
+    """From an output, one place (P4).
+
+    Attributes:
+      token: the untaken token, or None.
+      held: from the sending until it counts as processed (F5): the producer's place is occupied.
+      sequential: released when the consumer's outputs are processed, not when its firing is over (F5).
+    """
+
+    __slots__ = ("held", "sequential", "token")
+
+    def __init__(self, index: int, label: str, active: bool) -> None:
+        super().__init__(index, label, active)
+        self.token: Token[Any] | None = None
+        self.held = False
+        self.sequential = True
+
+    @property
+    def untaken(self) -> int:
+        return 0 if self.token is None else 1
+
+    def clear(self) -> list[Token[Any]]:
+        token, self.token = self.token, None
+        return [] if token is None else [token]
+
+    def contents(self) -> list[Token[Any]]:
+        return [] if self.token is None else [self.token]
+
+
+class DelayEdge(Edge):
+    """From an output into an input, with initial tokens: the delay of synchronous data flow (P7).
+
+    Attributes:
+      queue: untaken tokens, at most `delay` + 1.
+      delay: how many initial tokens it began with.
+      held: the producer's token counts as unprocessed, for more than `delay` tokens lie here.
+    """
+
+    __slots__ = ("delay", "held", "initial", "queue")
+
+    def __init__(self, index: int, label: str, active: bool, initial: tuple[Any, ...]) -> None:
+        super().__init__(index, label, active)
+        self.queue: deque[Token[Any]] = deque()
+        self.initial = initial
+        self.delay = len(initial)
+        self.held = False
+
+    @property
+    def untaken(self) -> int:
+        return len(self.queue)
+
+    def clear(self) -> list[Token[Any]]:
+        tokens = list(self.queue)
+        self.queue.clear()
+        return tokens
+
+    def contents(self) -> list[Token[Any]]:
+        return list(self.queue)
+
+
+class EventEdge(Edge):
+    """From an event: a first-in first-out queue with a capacity and an overflow policy (P5).
+
+    Attributes:
+      queue: untaken tokens.
+      capacity: places; grows only by rule F8.
+      capacity_limit: the most it may grow to, or None.
+      overflow: what happens to a token too many.
+      full: a `wait` edge that holds `capacity` or more: its source starts nothing new (F8).
+      grown: how often F8 made it longer.
+      pipeline: feeds a token to the operators on the edge (P9), or None.
+      complete: tells the operators that no more comes, or None.
+      end_sent: END has been put on it (F13, once an edge).
+    """
+
+    __slots__ = (
+        "capacity",
+        "capacity_limit",
+        "complete",
+        "end_sent",
+        "full",
+        "grown",
+        "initial",
+        "overflow",
+        "pipeline",
+        "queue",
+    )
+
+    def __init__(
+        self,
+        index: int,
+        label: str,
+        active: bool,
+        capacity: int = 16,
+        overflow: Overflow = "wait",
+        capacity_limit: int | None = None,
+        initial: tuple[Any, ...] = (),
+    ) -> None:
+        super().__init__(index, label, active)
+        self.queue: deque[Token[Any]] = deque()
+        self.capacity = 1 if overflow == "latest" else capacity
+        self.capacity_limit = capacity_limit
+        self.overflow: Overflow = overflow
+        self.full = False
+        self.grown = 0
+        self.initial = initial
+        self.end_sent = False
+        self.pipeline: Callable[[Token[Any]], None] | None = None
+        self.complete: Callable[[], None] | None = None
+
+    @property
+    def untaken(self) -> int:
+        return len(self.queue)
+
+    def clear(self) -> list[Token[Any]]:
+        tokens = list(self.queue)
+        self.queue.clear()
+        return tokens
+
+    def contents(self) -> list[Token[Any]]:
+        return list(self.queue)
+
+    def overflows(self) -> bool:
+        """Whether one more token is one too many for a policy that drops or refuses (P5)."""
+        return self.overflow != "wait" and len(self.queue) >= self.capacity

@@ -1,0 +1,53 @@
+"""What flows along an edge: a value or a marker, with its activity modifier, stamp and number (rules T1-T5).
+
+A token never changes; fan-out shares its value. Stands on nothing and knows neither ports nor nodes.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import Final, Generic, TypeVar
+
+import msgspec
+
+__all__ = ["END", "NO_MESSAGE", "Marker", "Token"]
+
+T_co = TypeVar("T_co", covariant=True)
+
+
+class Marker(enum.Enum):
+    """What a token holds in place of a value (rule T3, T4); compare with `is`."""
+
+    NO_MESSAGE = "NO_MESSAGE"
+    END = "END"
+
+    def __repr__(self) -> str:
+        return self.value
+
+
+NO_MESSAGE: Final = Marker.NO_MESSAGE
+"""Nothing this time; on synchronous edges only."""
+
+END: Final = Marker.END
+"""Nothing any more."""
+
+
+class Token(msgspec.Struct, Generic[T_co], frozen=True):
+    """One token.
+
+    Attributes:
+      value: what was sent, or a `Marker`.
+      activity: the modifier a of the paper (eq. 8): +1 activates, -1 deactivates, 0 changes nothing.
+      stamp: seconds on the run's clock (rule T5).
+      sequence: its number on its edge, from 1; 0 if it took none (initial tokens, signals seen before any edge).
+    """
+
+    value: T_co
+    activity: int = 0
+    stamp: float = 0.0
+    sequence: int = 0
+
+    @property
+    def is_marker(self) -> bool:
+        """Whether it carries no value."""
+        return type(self.value) is Marker

@@ -1,0 +1,192 @@
+"""The events of a run: everything observable, as typed values (rule R7).
+
+One stream for recorders, taps, statistics, monitors and the studio. Every event has `time`, in seconds on the run's clock. Nodes are named by their path
+("fetch/go_to"; the graph's own boundary is ""), ports by "path.port", edges by "source -> target" as the plan names them after subgraphs are dissolved.
+Stands on `token`; knows nobody who emits or listens.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import msgspec
+
+from hfg.token import Token
+
+__all__ = [
+    "ActivityChanged",
+    "ActivityLost",
+    "CallEnded",
+    "CallStarted",
+    "ErrorRaised",
+    "EventTriggered",
+    "FiringEnded",
+    "FiringStarted",
+    "NodeEnabled",
+    "NodeEnded",
+    "ParameterSet",
+    "QueueGrown",
+    "RunEnded",
+    "RunStarted",
+    "StructureChanged",
+    "TokenDrained",
+    "TokenDropped",
+    "TokenProcessed",
+    "TokenSent",
+    "TokenTaken",
+    "TraceEvent",
+]
+
+
+class TraceEvent(msgspec.Struct, frozen=True, tag=True):
+    """Something happened at `time` (seconds on the run's clock)."""
+
+    time: float
+
+
+class RunStarted(TraceEvent, frozen=True):
+    """All nodes are set up; `start` is about to be triggered."""
+
+
+class RunEnded(TraceEvent, frozen=True):
+    """Nothing moves any more; `outcome` as in the run's report."""
+
+    outcome: str
+
+
+class FiringStarted(TraceEvent, frozen=True):
+    """The tokens of firing `number` (from 1, per node, silent ones counted) are taken.
+
+    `kind`: the function is run ("process"), is not ("silent", F4), or the node ends ("end", its hook is called).
+    """
+
+    node: str
+    number: int
+    kind: Literal["process", "silent", "end"]
+
+
+class FiringEnded(TraceEvent, frozen=True):
+    """The firing is over and its outputs have left.
+
+    `outcome`: "done", "silent", "ended", "failed" (X1), "abandoned" (X2, a disabled node).
+    """
+
+    node: str
+    number: int
+    outcome: Literal["done", "silent", "ended", "failed", "abandoned"]
+
+
+class CallStarted(TraceEvent, frozen=True):
+    """Slot call `number` (from 1, per node) of `slot` begins with the token that came over `edge`."""
+
+    node: str
+    number: int
+    slot: str
+    edge: str
+
+
+class CallEnded(TraceEvent, frozen=True):
+    """The slot call is over."""
+
+    node: str
+    number: int
+    outcome: Literal["done", "failed", "abandoned"]
+
+
+class TokenSent(TraceEvent, frozen=True):
+    """A token, marker or not, was put on an edge and took the edge's next number."""
+
+    edge: str
+    token: Token[Any]
+
+
+class TokenTaken(TraceEvent, frozen=True):
+    """A firing or call removed the token from its edge."""
+
+    edge: str
+    token: Token[Any]
+
+
+class TokenProcessed(TraceEvent, frozen=True):
+    """The producer's place on a synchronous edge is free again (F5)."""
+
+    edge: str
+
+
+class TokenDropped(TraceEvent, frozen=True):
+    """A token was discarded and counted: "overflow" (P5), "disabled" (F10), "ended" (F4), "removed" (R4), "stopped" (left when the run ended)."""
+
+    edge: str
+    token: Token[Any]
+    reason: Literal["overflow", "disabled", "ended", "removed", "stopped"]
+
+
+class TokenDrained(TraceEvent, frozen=True):
+    """A token for a node that has ended was processed at once (F12); a marker into a slot likewise (T4)."""
+
+    edge: str
+    token: Token[Any]
+
+
+class EventTriggered(TraceEvent, frozen=True):
+    """An event was triggered; the token is the signal before any edge gave it a number."""
+
+    event: str
+    token: Token[Any]
+
+
+class ActivityChanged(TraceEvent, frozen=True):
+    """A(node) changed: by a token (A6), by sending (A5), by a slot (A7), by reset (A14), or was given back (A8)."""
+
+    node: str
+    active: bool
+    cause: Literal["token", "sent", "slot", "reset", "returned"]
+
+
+class ActivityLost(TraceEvent, frozen=True):
+    """A token with +1 was discarded and its sender is gone (A8)."""
+
+    edge: str
+
+
+class NodeEnded(TraceEvent, frozen=True):
+    """The node has sent END on all outputs and fires no more (F12)."""
+
+    node: str
+
+
+class NodeEnabled(TraceEvent, frozen=True):
+    """The node, or the subgraph, was enabled or disabled (F10)."""
+
+    node: str
+    enabled: bool
+
+
+class ErrorRaised(TraceEvent, frozen=True):
+    """A node's code failed, or a subscriber or operator did; `policy` is what is done about it (X1)."""
+
+    node: str
+    what: str
+    error: str
+    policy: str
+
+
+class ParameterSet(TraceEvent, frozen=True):
+    """A parameter has a new value, by a token (P8) or from outside."""
+
+    node: str
+    parameter: str
+    value: Any
+
+
+class QueueGrown(TraceEvent, frozen=True):
+    """Rule F8 gave a queue one more place."""
+
+    edge: str
+    capacity: int
+
+
+class StructureChanged(TraceEvent, frozen=True):
+    """The graph was edited while it ran (R4)."""
+
+    change: str
