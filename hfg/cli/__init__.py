@@ -9,8 +9,8 @@
     interrupt   Ctrl-C
     show        sentences, tracebacks, tables, JSON
 
-Exit codes: 0 success; 1 a run or check that failed, also by `abort`, a stall or Ctrl-C; 2 wrong use. What a verb reports
-goes to standard output, everything else to standard error. `import hfg` does not import any of this.
+Exit codes: 0 success; 1 a run or check that failed, also by `abort`, a stall or Ctrl-C; 2 wrong use. A verb reports to
+standard output, everything else goes to standard error. `import hfg` does not import any of this.
 """
 
 from hfg.cli.app import main

@@ -14,7 +14,7 @@ __all__ = ["check"]
 
 
 def check(
-    target: Annotated[str, typer.Argument(metavar="TARGET", help="module:graph, file.py or file.py:graph")],
+    target: Annotated[str, typer.Argument(help="module:graph, file.py or file.py:graph")],
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:

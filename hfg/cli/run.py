@@ -36,7 +36,7 @@ class Clock(StrEnum):
 
 
 def run(
-    target: Annotated[str, typer.Argument(metavar="TARGET", help="module:graph, file.py or file.py:graph")],
+    target: Annotated[str, typer.Argument(help="module:graph, file.py or file.py:graph")],
     clock: Annotated[Clock, typer.Option(help="virtual: as fast as the machine can, the same each time.")] = Clock.real,
     until: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="End the run at this time on its clock.")

@@ -34,6 +34,7 @@ _MACHINERY = (
     "typer",
 )
 _LONGEST_VALUE = 200
+_WIDTH_OF_A_FILE = 200
 _debug = False
 
 
@@ -113,7 +114,8 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]], *, 
         drawn.add_column(column, justify="right" if numbers else "left", overflow="fold")
     for row in rows:
         drawn.add_row(*(cell.replace("[", "\\[") for cell in row))
-    Console(stderr=to_stderr, soft_wrap=not sys.stderr.isatty()).print(drawn)
+    stream = sys.stderr if to_stderr else sys.stdout
+    Console(file=stream, width=None if stream.isatty() else _WIDTH_OF_A_FILE).print(drawn)
 
 
 def report(name: str, result: Report, verbosity: int) -> None:

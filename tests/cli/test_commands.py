@@ -1,0 +1,236 @@
+"""The verbs as their user meets them: exit codes, what is told where, options."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hfg.cli import main
+
+GRAPH = '''
+"""A graph for tests of the command line."""
+from collections.abc import Iterator
+from typing import Annotated
+
+from annotated_types import Interval
+
+import hfg
+
+
+@hfg.node
+def numbers(*, count: int = 3) -> Iterator[int]:
+    """Count from zero."""
+    yield from range(count)
+
+
+@hfg.node
+def half(number: int, *, divisor: Annotated[int, Interval(ge=0, le=9)] = 2, label: str = "half") -> float:
+    print(label, number)
+    return number / divisor
+
+
+@hfg.node
+def pair(left: float, right: float) -> None: ...
+
+
+graph = hfg.Graph("halves")
+source = graph.add(numbers(), max_rate_hz=1)
+node = graph.add(half())
+graph.connect(source.out, node.number)
+
+
+def unsound() -> hfg.Graph:
+    graph = hfg.Graph("unsound")
+    first, second = graph.add(half()), graph.add(half())
+    graph.connect(first.out, second.number)
+    graph.connect(second.out, first.number)
+    return graph
+
+
+def aborting() -> hfg.Graph:
+    graph = hfg.Graph("aborting")
+    graph.connect(graph.add(numbers()).processed, graph.abort)
+    return graph
+'''
+
+
+class Shown:
+    """What a command left behind."""
+
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+
+
+class Command:
+    """Runs the command in this process."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self._capsys = capsys
+
+    def __call__(self, *arguments: str) -> Shown:
+        code = main(arguments)
+        out, err = self._capsys.readouterr()
+        return Shown(code, out, err)
+
+
+@pytest.fixture
+def hfg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Command]:
+    """Give the command, in a folder with `halves.py`."""
+    (tmp_path / "halves.py").write_text(GRAPH, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    yield Command(capsys)
+    sys.modules.pop("halves", None)
+
+
+TARGET = "halves.py:graph"
+VIRTUAL = ("--clock", "virtual")
+
+
+def test_a_run_that_ends_well(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL)
+    assert (shown.code, shown.out) == (0, "half 0\nhalf 1\nhalf 2\n")
+    assert 'graph "halves": done after' in shown.err
+
+
+def test_verbose_tells_of_nodes_and_twice_of_edges(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "-v")
+    assert "firings" in shown.err
+    assert "numbers.out -> half.number" not in shown.err
+    assert "numbers.out -> half.number" in hfg("run", TARGET, *VIRTUAL, "-vv").err
+
+
+def test_json_has_standard_output_for_itself(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--json")
+    report = json.loads(shown.out)
+    assert (report["outcome"], report["nodes"]["half"]["failed"]) == ("done", 0)
+    assert "half 2" in shown.err
+
+
+def test_until_ends_the_run(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--until", "1.5", "--json")
+    assert shown.code == 0
+    assert json.loads(shown.out)["outcome"] == "until"
+
+
+def test_param_is_a_literal_or_a_text(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--param", "half.label=42", "--param", "numbers.count=1")
+    assert (shown.code, shown.out) == (0, "42 0\n")
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("half.divisor=10", 'parameter "half.divisor" must be <= 9, got 10'),
+        ("half.divisor=x", 'parameter "half.divisor" must be of type int'),
+        ("half.nothing=1", 'node "half" has no parameter "nothing"; it has divisor, label'),
+        ("nobody.divisor=1", 'has no node "nobody"'),
+        ("divisor=1", "sets nothing"),
+        ("half.divisor", "sets nothing"),
+    ],
+)
+def test_param_that_does_not_fit(hfg: Command, setting: str, sentence: str) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--param", setting)
+    assert (shown.code, shown.out) == (2, "")
+    assert sentence in shown.err
+
+
+def test_trace_holds_every_event_as_a_line(hfg: Command) -> None:
+    assert hfg("run", TARGET, *VIRTUAL, "--trace", "run.jsonl").code == 0
+    events = [json.loads(line) for line in Path("run.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert {"RunStarted", "FiringStarted", "TokenSent", "RunEnded"} <= {event["type"] for event in events}
+
+
+def test_trace_that_cannot_be_written(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--trace", "no/such/folder.jsonl")
+    assert (shown.code, shown.err.count("\n")) == (2, 1)
+
+
+def test_a_node_that_fails_shows_the_users_frames_and_a_sentence(hfg: Command) -> None:
+    shown = hfg("run", TARGET, *VIRTUAL, "--param", "half.divisor=0")
+    assert shown.code == 1
+    assert "return number / divisor" in shown.err
+    assert "hfg/engine" not in shown.err
+    assert (
+        shown.err.strip().splitlines()[-1] == 'hfg: node "half" failed in firing 1: ZeroDivisionError: division by zero'
+    )
+
+
+def test_debug_shows_our_frames_too(hfg: Command) -> None:
+    assert "hfg/engine" in hfg("run", TARGET, *VIRTUAL, "--param", "half.divisor=0", "--debug").err
+
+
+def test_a_graph_that_aborts_itself_is_a_failed_run(hfg: Command) -> None:
+    assert hfg("run", "halves.py:aborting", *VIRTUAL).code == 1
+
+
+def test_a_run_refuses_an_unsound_graph(hfg: Command) -> None:
+    shown = hfg("run", "halves.py:unsound")
+    assert shown.code == 1
+    assert "error at" in shown.err
+    assert "Traceback" not in shown.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("run", "nowhere.py"), "nowhere.py: does not exist"),
+        (("run", TARGET, "--nonsense"), "--nonsense"),
+        (("run", TARGET, "--clock", "slow"), "slow"),
+        (("run", TARGET, "--until", "-1"), "not negative"),
+        (("run", TARGET, "--policy", "whim"), "whim"),
+        (("run",), "TARGET"),
+        (("walk",), "walk"),
+        (("check", "nowhere.py"), "nowhere.py: does not exist"),
+        (("nodes", "nowhere.py"), "nowhere.py: does not exist"),
+    ],
+)
+def test_wrong_use_is_code_2_and_one_sentence(hfg: Command, arguments: tuple[str, ...], sentence: str) -> None:
+    shown = hfg(*arguments)
+    assert (shown.code, shown.out) == (2, "")
+    assert sentence in shown.err
+    assert shown.err.startswith("hfg: ")
+    assert shown.err.count("\n") == 1
+
+
+def test_target_that_fails_shows_its_own_frames(hfg: Command) -> None:
+    Path("broken.py").write_text("def ask():\n    return 1 / 0\n\n\nask()\n", encoding="utf-8")
+    shown = hfg("run", "broken.py")
+    assert shown.code == 2
+    assert "return 1 / 0" in shown.err
+    assert "importlib" not in shown.err
+    assert "hfg/cli" not in shown.err
+
+
+def test_check_finds_nothing_in_a_sound_graph(hfg: Command) -> None:
+    shown = hfg("check", TARGET)
+    assert (shown.code, shown.out.splitlines()[-1]) == (0, 'graph "halves": no errors, no warnings')
+
+
+def test_check_tells_each_error(hfg: Command) -> None:
+    shown = hfg("check", "halves.py:unsound")
+    assert shown.code == 1
+    assert "error at" in shown.out
+    problems = json.loads(hfg("check", "halves.py:unsound", "--json").out)
+    assert "error" in {problem["severity"] for problem in problems}
+
+
+def test_nodes_of_a_file(hfg: Command) -> None:
+    shown = hfg("nodes", "halves.py")
+    assert shown.code == 0
+    assert "halves:numbers" in shown.out
+    kinds = {kind["name"]: kind for kind in json.loads(hfg("nodes", "halves.py", "--json").out)}
+    assert kinds["numbers"]["source"]
+    assert [port["name"] for port in kinds["half"]["inputs"]] == ["number"]
+    assert kinds["half"]["parameters"][0]["default"] == 2
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("run", "--help"), ("check", "--help"), ("nodes", "--help"), ()])
+def test_every_verb_explains_itself(hfg: Command, arguments: tuple[str, ...]) -> None:
+    shown = hfg(*arguments)
+    assert shown.code == 0
+    assert "Usage" in shown.out
