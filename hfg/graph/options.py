@@ -1,0 +1,265 @@
+"""What is said about a node, an edge or a group besides its ends: frozen data, checked when it is given.
+
+Equal options are one object: ten thousand nodes with nothing special share theirs. Stands on errors; knows neither
+nodes nor ports.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable
+from typing import Any, Final, Literal, TypeAlias, TypeVar
+
+import msgspec
+
+from hfg import errors
+from hfg.errors import GraphError, HfgError
+
+__all__ = [
+    "EdgeOptions",
+    "GroupSpec",
+    "NodeOptions",
+    "OnError",
+    "Overflow",
+    "Policy",
+    "Release",
+    "edge_options",
+    "group_spec",
+    "node_options",
+]
+
+OnError: TypeAlias = Literal["stop", "skip", "disable", "restart"]
+Release: TypeAlias = Literal["auto", "sequential", "pipelined"]
+Overflow: TypeAlias = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
+Policy: TypeAlias = Literal["fifo", "priority", "random"]
+
+ON_ERROR: Final[tuple[OnError, ...]] = ("stop", "skip", "disable", "restart")
+RELEASE: Final[tuple[Release, ...]] = ("auto", "sequential", "pipelined")
+OVERFLOW: Final[tuple[Overflow, ...]] = ("wait", "drop_oldest", "drop_newest", "latest", "error")
+POLICY: Final[tuple[Policy, ...]] = ("fifo", "priority", "random")
+DEFAULT_CAPACITY: Final = 16
+
+Options = TypeVar("Options")
+
+
+class NodeOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """How a node runs; nothing of it belongs to its type.
+
+    Attributes:
+      group: where it runs; None is the group of the subgraph around it, at last "loop".
+      priority: higher first, in a group with policy "priority" (rule R2).
+      max_rate_hz: at most so many firings a second (rule F11).
+      on_error: what follows when its code fails (rule X1); the next two are for "restart".
+      max_duration_s: the time limit of a firing (rule X2).
+      release: when the tokens it takes count as processed (rule F5).
+      active_for_s: `timeout` is triggered after so long an activity (rule A12).
+      deadline_s: relative to the stamp of its oldest token (rule R2).
+      enabled: whether it is at the start of a run.
+      iterate_over: names of a subgraph's inputs that take collections (rule G4).
+    """
+
+    group: str | None = None
+    priority: int = 0
+    max_rate_hz: float | None = None
+    on_error: OnError = "stop"
+    restart_limit: int = 5
+    restart_backoff_s: float = 0.1
+    max_duration_s: float | None = None
+    release: Release = "auto"
+    active_for_s: float | None = None
+    deadline_s: float | None = None
+    enabled: bool = True
+    iterate_over: tuple[str, ...] = ()
+
+
+class EdgeOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """How an edge transports; all but `active` and `initial` are for event edges (rules P4, P5).
+
+    Attributes:
+      active: it also transports activity: the double line of the paper, A(e) = 1.
+      capacity: how many untaken signals its queue holds.
+      overflow: what happens to more of them; "wait" loses none (rule F8).
+      capacity_limit: how far "wait" may let the queue grow; None without end.
+      through: reactivex operators before the queue (rule P9).
+      initial: values that lie on it at the start (rule P7).
+    """
+
+    active: bool = False
+    capacity: int = DEFAULT_CAPACITY
+    overflow: Overflow = "wait"
+    capacity_limit: int | None = None
+    through: tuple[Any, ...] = ()
+    initial: tuple[Any, ...] = ()
+
+    @property
+    def for_events(self) -> str | None:
+        """The first thing said that only an event edge can have, as written in the call; None if there is none."""
+        if self.through:
+            return "through=[...]"
+        if self.overflow != "wait":
+            return f'overflow="{self.overflow}"'
+        if self.capacity != DEFAULT_CAPACITY:
+            return f"capacity={self.capacity}"
+        return None if self.capacity_limit is None else f"capacity_limit={self.capacity_limit}"
+
+
+class GroupSpec(msgspec.Struct, frozen=True):
+    """Where nodes run, and who of them comes first (rules R1, R2).
+
+    Attributes:
+      threads: 0 is the event loop, 1 a thread of the group's own.
+      policy: who runs next when several can.
+      seed: for "random"; None is the run's.
+    """
+
+    name: str
+    threads: int = 0
+    policy: Policy = "fifo"
+    seed: int | None = None
+
+
+PLAIN: Final = EdgeOptions()
+ACTIVE: Final = EdgeOptions(active=True)
+
+
+def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
+    """Check the options of a node and give the object shared by all that have the same.
+
+    Raises:
+      GraphError: a value is out of its range; the message begins with `where`.
+    """
+    _need_choice(where, "on_error", given["on_error"], ON_ERROR, GraphError)
+    _need_choice(where, "release", given["release"], RELEASE, GraphError)
+    for name in ("max_rate_hz", "max_duration_s", "active_for_s", "deadline_s"):
+        _need_positive(where, name, given[name])
+    for name in ("priority", "restart_limit"):
+        _need_whole(where, name, given[name], None if name == "priority" else 0, GraphError)
+    if not _is_number(given["restart_backoff_s"]) or given["restart_backoff_s"] < 0:
+        raise GraphError(
+            f"{where}: restart_backoff_s must be seconds from 0 on, got {given['restart_backoff_s']!r}; "
+            "0 restarts at once"
+        )
+    if type(given["enabled"]) is not bool:
+        raise GraphError(f"{where}: enabled must be True or False, got {given['enabled']!r}")
+    group = given["group"]
+    if group is not None and (type(group) is not str or not group):
+        raise GraphError(
+            f"{where}: group must be the name of a group, got {group!r}; "
+            'declare it with graph.group("vision", threads=1)'
+        )
+    return _shared_node_options(**given)
+
+
+@functools.lru_cache(maxsize=1024)
+def _shared_node_options(**given: Any) -> NodeOptions:
+    return NodeOptions(**given)
+
+
+@functools.lru_cache(maxsize=1024)
+def in_group(options: NodeOptions, group: str) -> NodeOptions:
+    """The same options with the group that was inherited."""
+    return msgspec.structs.replace(options, group=group)
+
+
+def edge_options(
+    where: Callable[[], str],
+    active: bool,
+    capacity: int,
+    overflow: str,
+    capacity_limit: int | None,
+    through: Iterable[Any],
+    initial: Iterable[Any],
+) -> EdgeOptions:
+    """Check the options of an edge; plain edges share one object, plain active ones another.
+
+    Raises:
+      ConnectionError: a value is out of its range, or the options contradict each other.
+    """
+    through, initial = tuple(through), tuple(initial)
+    if (
+        not through
+        and not initial
+        and capacity_limit is None
+        and overflow == "wait"
+        and capacity == DEFAULT_CAPACITY
+        and type(active) is bool
+    ):
+        return ACTIVE if active else PLAIN
+    at = where()
+    if type(active) is not bool:
+        raise errors.ConnectionError(f"{at}: active must be True or False, got {active!r}")
+    _need_choice(at, "overflow", overflow, OVERFLOW, errors.ConnectionError)
+    _need_whole(at, "capacity", capacity, 1, errors.ConnectionError)
+    if overflow == "latest":
+        if capacity not in (1, DEFAULT_CAPACITY):
+            raise errors.ConnectionError(
+                f'{at}: overflow="latest" keeps one signal, got capacity={capacity}; '
+                'leave capacity out, or use overflow="drop_oldest"'
+            )
+        capacity = 1
+    if capacity_limit is not None:
+        _need_whole(at, "capacity_limit", capacity_limit, capacity, errors.ConnectionError)
+        if overflow != "wait":
+            raise errors.ConnectionError(
+                f'{at}: capacity_limit bounds how far overflow="wait" may grow, '
+                f'got overflow="{overflow}", which never grows; leave one of them out'
+            )
+    broken = next((operator for operator in through if not callable(operator)), None)
+    if broken is not None:
+        raise errors.ConnectionError(
+            f"{at}: through takes reactivex operators such as ops.debounce(0.2), got {broken!r}"
+        )
+    return EdgeOptions(
+        active=active,
+        capacity=capacity,
+        overflow=overflow,  # type: ignore[arg-type]  # checked above
+        capacity_limit=capacity_limit,
+        through=through,
+        initial=initial,
+    )
+
+
+def group_spec(name: str, threads: int, policy: str, seed: int | None) -> GroupSpec:
+    """Check a group.
+
+    Raises:
+      GraphError: a value is out of its range.
+    """
+    if type(name) is not str or not name:
+        raise GraphError(f"a group needs a name, got {name!r}")
+    at = f'group "{name}"'
+    if type(threads) is not int or threads not in (0, 1):
+        raise GraphError(
+            f"{at}: threads must be 0 (on the loop) or 1 (a thread of its own), got {threads!r}; "
+            "nodes of one group never run at the same time, declare several groups to use several threads"
+        )
+    if name == "loop" and threads:
+        raise GraphError(
+            f'{at}: it is the event loop itself and takes no thread; declare another, graph.group("work", threads=1)'
+        )
+    _need_choice(at, "policy", policy, POLICY, GraphError)
+    if seed is not None:
+        _need_whole(at, "seed", seed, None, GraphError)
+    return GroupSpec(name, threads, policy, seed)  # type: ignore[arg-type]  # checked above
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and type(value) is not bool and value == value  # NaN is none
+
+
+def _need_choice(where: str, name: str, value: Any, choices: tuple[str, ...], error: type[HfgError]) -> None:
+    if value not in choices:
+        words = ", ".join(f'"{choice}"' for choice in choices)
+        raise error(f"{where}: {name} must be one of {words}, got {value!r}")
+
+
+def _need_whole(where: str, name: str, value: Any, least: int | None, error: type[HfgError]) -> None:
+    if type(value) is not int or (least is not None and value < least):
+        raise error(
+            f"{where}: {name} must be a whole number{'' if least is None else f' from {least} on'}, got {value!r}"
+        )
+
+
+def _need_positive(where: str, name: str, value: Any) -> None:
+    if value is not None and (not _is_number(value) or value <= 0):
+        raise GraphError(f"{where}: {name} must be a number above 0, or None for no limit, got {value!r}")
