@@ -1,8 +1,8 @@
-"""How an async node starts at once and waits as a task only if it really suspends.
+"""How an async node starts at once, and waits like a task if it suspends, for less.
 
 A coroutine stepped outside a task breaks `asyncio.timeout`, `anyio` and everything else that asks for the current task. So each async node has one dormant
-task. Its identity and context are entered around the coroutine's first step; if the coroutine suspends, the task wakes up and carries it on, beginning with
-the very future that the first step yielded. Works on Python 3.11 to 3.14.
+task, whose identity and context are entered around every step of its coroutines. The task itself sleeps on a future that hands cancellation on to the
+coroutine; what a coroutine waits for wakes the coroutine directly, as a task would, without a pass of the loop more.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextvars
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from typing import Any
 
 from hfg.engine.core import PENDING
@@ -33,23 +33,48 @@ else:
         return previous
 
 
+class _Bed(asyncio.Future[None]):
+    """What a dormant task sleeps on; cancelling the task cancels what it lends its identity to."""
+
+    carrier: Carrier | None = None
+
+    def cancel(self, msg: Any = None) -> bool:
+        """Hand the cancellation on; without a coroutine under way the task itself ends."""
+        carrier = self.carrier
+        if carrier is not None and carrier.waiting:
+            carrier._cancelled(msg)
+            return True
+        return super().cancel(msg)
+
+
 class Carrier:
     """The dormant task of one async node.
 
     Attributes:
       task: what `asyncio.current_task()` gives inside the node's code.
+      waiting: whether a coroutine is under way.
     """
 
-    __slots__ = ("_context", "_coroutine", "_done", "_loop", "_park", "_yielded", "task")
+    __slots__ = ("_context", "_coroutine", "_done", "_loop", "_must_cancel", "_outside", "_waits_for", "task")
 
     def __init__(self, loop: asyncio.AbstractEventLoop, name: str, context: contextvars.Context) -> None:
         self._loop = loop
+        self._outside = context  # in which the engine's own code goes on
         self._context = context.copy()
         self._coroutine: Any = None
-        self._yielded: Any = None
         self._done: Done | None = None
-        self._park: asyncio.Future[None] | None = None
-        self.task: asyncio.Task[None] = loop.create_task(self._live(), name=name, context=self._context)
+        self._waits_for: Any = None
+        self._must_cancel: asyncio.CancelledError | None = None
+        self.task: asyncio.Task[None] = loop.create_task(self._sleep(), name=name, context=self._context)
+
+    async def _sleep(self) -> None:
+        bed = _Bed(loop=self._loop)
+        bed.carrier = self
+        await bed
+
+    @property
+    def waiting(self) -> bool:
+        return self._coroutine is not None
 
     def start(self, coroutine: Any, done: Done) -> Any:
         """Run the first step now.
@@ -63,81 +88,77 @@ class Carrier:
         loop = self._loop
         previous = _swap(loop, self.task)
         try:
-            yielded = self._context.run(coroutine.send, None)
+            waits_for = self._context.run(coroutine.send, None)
         except StopIteration as stop:
             return stop.value
         finally:
             _swap(loop, previous)
         self._coroutine = coroutine
-        self._yielded = yielded
         self._done = done
-        park = self._park
-        if park is not None and not park.done():
-            park.set_result(None)
+        self._wait(waits_for)
         return PENDING
-
-    @property
-    def waiting(self) -> bool:
-        """Whether a coroutine is under way."""
-        return self._coroutine is not None
 
     def cancel(self) -> None:
         """Cancel the coroutine under way; without one, let the task end."""
-        self.task.cancel()
+        if self.waiting:
+            self._cancelled(None)
+        else:
+            self.task.cancel()
 
-    async def _live(self) -> None:
-        await _Awaitable(self._carry())
+    def _cancelled(self, message: Any) -> None:
+        """As `asyncio.Task.cancel`: cancel what it waits for, else throw at the next step."""
+        future = self._waits_for
+        if future is None or not future.cancel(msg=message):
+            self._must_cancel = asyncio.CancelledError() if message is None else asyncio.CancelledError(message)
 
-    def _carry(self) -> Generator[Any, Any, None]:
-        while True:
-            thrown: BaseException | None = None
-            while self._coroutine is None:
-                self._park = self._loop.create_future()
-                try:
-                    yield from self._park
-                except asyncio.CancelledError as cancelled:
-                    if self._coroutine is None:
-                        return
-                    thrown = cancelled  # it was meant for the coroutine that has just begun to wait
-                finally:
-                    self._park = None
-            coroutine, yielded, done = self._coroutine, self._yielded, self._done
-            assert done is not None
-            result: Any = None
-            error: BaseException | None = None
-            try:
-                while True:
-                    if thrown is not None:
-                        exception, thrown = thrown, None
-                        yielded = coroutine.throw(exception)
-                    try:
-                        received = yield yielded
-                    except GeneratorExit:
-                        coroutine.close()
-                        raise
-                    except BaseException as problem:  # noqa: BLE001 - it belongs to the coroutine
-                        thrown = problem
-                    else:
-                        yielded = coroutine.send(received)
-            except StopIteration as stop:
-                result = stop.value
-            except GeneratorExit:
-                raise
-            except BaseException as problem:  # noqa: BLE001
-                error = problem
-            self._coroutine = self._yielded = self._done = None
-            while self.task.cancelling():
-                self.task.uncancel()  # the cancellation ends with the firing it was meant for
-            done(result, error)
+    def _wait(self, waits_for: Any) -> None:
+        """Go on when what the coroutine yielded is done; the protocol between coroutines, futures and tasks."""
+        if waits_for is None:
+            self._loop.call_soon(self._step, context=self._outside)
+            return
+        if getattr(waits_for, "_asyncio_future_blocking", None):
+            waits_for._asyncio_future_blocking = False
+            self._waits_for = waits_for
+            waits_for.add_done_callback(self._wake, context=self._outside)
+            if self._must_cancel is not None and waits_for.cancel():
+                self._must_cancel = None
+            return
+        problem = RuntimeError(f"async code awaited something that asyncio does not know: {waits_for!r}")
+        self._loop.call_soon(self._step, problem, context=self._outside)
 
+    def _wake(self, future: asyncio.Future[Any]) -> None:
+        try:
+            future.result()
+        except BaseException as error:  # noqa: BLE001 - it belongs to the coroutine
+            self._step(error)
+        else:
+            self._step()
 
-class _Awaitable:
-    """Lets a coroutine drive a generator's bare yields."""
-
-    __slots__ = ("_generator",)
-
-    def __init__(self, generator: Generator[Any, Any, None]) -> None:
-        self._generator = generator
-
-    def __await__(self) -> Generator[Any, Any, None]:
-        return self._generator
+    def _step(self, error: BaseException | None = None) -> None:
+        coroutine = self._coroutine
+        self._waits_for = None
+        if self._must_cancel is not None:
+            error, self._must_cancel = self._must_cancel, None
+        result: Any = None
+        over: BaseException | None = None
+        loop = self._loop
+        previous = _swap(loop, self.task)
+        try:
+            waits_for = self._context.run(coroutine.send, None) if error is None else self._context.run(coroutine.throw, error)
+        except StopIteration as stop:
+            result = stop.value
+        except BaseException as problem:  # noqa: BLE001 - it goes to whoever started the coroutine
+            over = problem
+        else:
+            self._wait(waits_for)
+            return
+        finally:
+            _swap(loop, previous)
+        done = self._done
+        assert done is not None
+        self._coroutine = self._done = self._must_cancel = None
+        while self.task.cancelling():
+            self.task.uncancel()  # the cancellation ends with the firing it was meant for
+        done(result, over)
+        if isinstance(over, KeyboardInterrupt | SystemExit):
+            raise over

@@ -12,7 +12,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from types import CoroutineType
 from typing import Any
@@ -20,6 +20,7 @@ from typing import Any
 from hfg.clock import current_clock
 from hfg.engine import errors, lifecycle, plan, quiet, rx, steps, wiring
 from hfg.engine import ports as engine_ports
+from hfg.engine.activity import gate_changed
 from hfg.engine.carrier import Carrier
 from hfg.engine.core import PENDING, Core
 from hfg.engine.groups import Fifo, Group, Job, LoopGroup, ThreadGroup, make_policy
@@ -86,7 +87,7 @@ class _Timer:
         engine.core.timers -= 1
         if not engine.core.over:
             engine._guard(self._callback)
-            engine.kick()
+            engine.go_on()
 
     def cancel(self) -> None:
         if self._handle is not None:
@@ -154,6 +155,15 @@ class Engine:
 
     # --- groups ---------------------------------------------------------------------------------------------------------------------
 
+    def all_workers(self) -> Iterator[Worker]:
+        """Those inside iterations too."""
+        stack = [self.core]
+        while stack:
+            for worker in stack.pop().workers:
+                yield worker
+                if worker.iteration is not None:
+                    stack.append(worker.iteration.core)
+
     def _make_groups(self) -> dict[str, Group]:
         groups: dict[str, Group] = {}
         settings = self.settings
@@ -181,7 +191,7 @@ class Engine:
             if self.core.over and not isinstance(item, Job):
                 continue
             self._guard(partial(item.owner, item) if isinstance(item, Job) else item)
-        self.kick()
+        self.go_on()
 
     def on_loop(self) -> bool:
         """Whether the caller is on the run's own thread."""
@@ -201,6 +211,11 @@ class Engine:
         if not self._scheduled and not self.core.pumping:
             self._scheduled = True
             self.loop.call_soon(self._pump, context=self.context)
+
+    def go_on(self) -> None:
+        """At the end of a callback of the loop: pump at once, which saves a pass of the loop."""
+        if not self._scheduled and not self.core.pumping:
+            self._pump()
 
     def _pump(self) -> None:
         """Drain the loop group within a slice; a hop is a few function calls."""
@@ -356,7 +371,7 @@ class Engine:
     def begin(self, worker: Worker) -> None:
         """See `Host`."""
         worker.in_flight = True
-        self.core.in_flight += 1
+        worker.core.in_flight += 1
 
     def late(self, worker: Worker, done: Done) -> Done:
         """See `Host`."""
@@ -365,13 +380,15 @@ class Engine:
         def over(result: Any, error: BaseException | None) -> None:
             if worker.in_flight and (worker.carrier is carrier or carrier is None):
                 worker.in_flight = False
-                self.core.in_flight -= 1
+                worker.core.in_flight -= 1
             elif self._zombies:
                 self._zombies.discard(carrier)
             if self.core.over and not closing:
                 return
             self._guard(lambda: done(result, error))
-            self.kick()
+            if worker.core.inside is not None:
+                worker.core.inside.look_later()
+            self.go_on()
 
         carrier = worker.carrier
         return over
@@ -388,12 +405,14 @@ class Engine:
             group.returned()
             self.unhold_clock()
             worker.in_flight = False
-            self.core.in_flight -= 1
+            worker.core.in_flight -= 1
             if not self.core.over or closing:
                 done(job.result, job.error)
+            if worker.core.inside is not None:
+                worker.core.inside.look_later()
 
         worker_job = Job(back, call, arguments, done)
-        worker.late = worker_job
+        worker.job = worker_job
         group.submit(worker_job)
         self._limit(worker)
 
@@ -440,16 +459,15 @@ class Engine:
         if not worker.in_flight:
             return
         worker.in_flight = False
-        self.core.in_flight -= 1
+        worker.core.in_flight -= 1
         group: Any = worker.group
         if group.threaded:
-            job = worker.late
+            job = worker.job
             job.owner = lambda _job: None
             self.unhold_clock()
             group.abandon(f'"{worker.path}", firing {worker.firings}')
         else:
             carrier, worker.carrier = worker.carrier, None
-            worker.late = None
             self._zombies.add(carrier)
             carrier.cancel()
 
@@ -463,13 +481,13 @@ class Engine:
                 worker.room_waiters = []
             worker.room_waiters.append(lambda: waiter.done() or waiter.set_result(None))  # type: ignore[func-returns-value]
             worker.waiting_room += 1
-            self.core.in_flight -= worker.in_flight  # it waits for us, not we for it
+            worker.core.in_flight -= worker.in_flight  # it waits for us, not we for it
             self.kick()
             try:
                 await waiter
             finally:
                 worker.waiting_room -= 1
-                self.core.in_flight += worker.in_flight
+                worker.core.in_flight += worker.in_flight
 
     def adopt_event(self, port: Any) -> None:
         """Give an event the run's scheduler and thread (ARCHITECTURE §3)."""
@@ -484,24 +502,8 @@ class Engine:
         core = self.core
         self.started_at = self.now()
         self._watch = watchdog.watch(core, self.settings.block_warning_s)
-        for worker in core.workers:
-            if worker.is_async or any(spec.is_async for spec in worker.type.slots.values()) if worker.type else False:
-                worker.carrier = Carrier(self.loop, f"hfg {worker.path}", self.context)
-        for edge in core.edges:
-            initial = getattr(edge, "initial", ())
-            if initial:
-                edge.queue.extend(Token(value, 0, self.now(), 0) for value in initial)
-        for worker in core.workers:
-            if worker.scope is None:
-                await self._set_up_one(worker)
-            if self._outcome is not None:
-                return
-        for worker in core.workers:
-            engine_ports.bind_automatic(worker)
-            plan.watch(worker)
-            wiring.rewire(worker)
-        for edge, operators in core.piped:
-            self._disposables.append(rx.pipe_edge(edge, operators, self.scheduler))
+        if not await self._set_up_all(core):
+            return
         if self.settings.until_s is not None:
             self.loop.call_at(self.loop.time() + self.settings.until_s, self._until)
         if core.trace is not None:
@@ -511,19 +513,46 @@ class Engine:
         start = core.boundary.events.get("start")
         if start is not None:
             trigger(start, explicit=1)
-        for worker in core.workers:
-            self._close_gate(worker)
-            worker.blocked &= ~STARTING
-            consider(worker)
+        self._open_sources(core)
         for source, edge, operators in core.observables:
             self._feed(source, edge, operators)
         self.kick()
 
-    def _close_gate(self, worker: Worker) -> None:
-        if worker.gate is not None and worker.is_source:
-            from hfg.engine.activity import gate_changed
+    async def _set_up_all(self, core: Core) -> bool:
+        """Set up every node in order of adding, those inside an iteration right behind it; whether all went well."""
+        for worker in core.workers:
+            if worker.type is not None and (worker.is_async or any(spec.is_async for spec in worker.type.slots.values())):
+                worker.carrier = Carrier(self.loop, f"hfg {worker.path}", self.context)
+        for edge in core.edges:
+            initial = getattr(edge, "initial", ())
+            if initial:
+                edge.queue.extend(Token(value, 0, self.now(), 0) for value in initial)
+        for worker in core.workers:
+            if worker.scope is None:
+                await self._set_up_one(worker)
+            if self._outcome is not None:
+                return False
+            if worker.iteration is not None:
+                if not await self._set_up_all(worker.iteration.core):
+                    return False
+                worker.iteration.core.started = True
+        for worker in core.workers:
+            engine_ports.bind_automatic(worker)
+            plan.watch(worker)
+            wiring.rewire(worker)
+        for edge, operators in core.piped:
+            self._disposables.append(rx.pipe_edge(edge, operators, self.scheduler))
+        return True
 
-            gate_changed([worker.gate])
+    def _open_sources(self, core: Core) -> None:
+        """Sources may fire from now on, as far as their gates allow."""
+        for worker in core.workers:
+            if worker.gate is not None and worker.is_source:
+                gate_changed([worker.gate])
+            worker.blocked &= ~STARTING
+            consider(worker)
+            if worker.iteration is not None:
+                self._open_sources(worker.iteration.core)
 
     async def _set_up_one(self, worker: Worker) -> None:
         waiter: asyncio.Future[HfgError | None] = self.loop.create_future()
@@ -567,7 +596,8 @@ class Engine:
         self._outcome = (outcome, error)
         self.core.over = True
         self.ended_at = self.now()
-        for worker in self.core.workers:
+        for worker in self.all_workers():
+            worker.core.over = True
             worker.blocked |= TORN_DOWN
         for waiter in self._quiet_waiters:
             if not waiter.done():
@@ -592,7 +622,7 @@ class Engine:
             problem = await self._tear_down_one(worker)
             if problem is not None:
                 problems.append(problem)
-        for worker in core.workers:
+        for worker in self.all_workers():
             engine_ports.release_ports(worker)
             for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
                 if timer is not None:
@@ -601,7 +631,7 @@ class Engine:
             if edge.untaken and error is None and outcome in ("stopped", "until", "cancelled"):
                 discard(edge, "stopped")
         await self._end_threads()
-        carriers = [worker.carrier for worker in core.workers if worker.carrier is not None] + list(self._zombies)
+        carriers = [worker.carrier for worker in self.all_workers() if worker.carrier is not None] + list(self._zombies)
         for carrier in carriers:
             carrier.cancel()
         if carriers:
@@ -619,7 +649,7 @@ class Engine:
     async def _cancel_code(self) -> None:
         """Cancel what still waits; threads get their time to come back."""
         carriers = []
-        for worker in self.core.workers:
+        for worker in self.all_workers():
             if worker.in_flight and worker.carrier is not None:
                 worker.ticket += 1
                 worker.carrier.cancel()

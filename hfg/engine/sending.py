@@ -147,7 +147,7 @@ def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float |
 def _activity_left(worker: Worker) -> None:
     """A5: the first sending that carried +1 took the activity; the right of A3 stays until the firing or call is over."""
     if worker.active:
-        worker.right = bool(worker.busy)
+        worker.right = worker.stamp is not None  # in a firing or call
         set_active(worker, False, "sent")
     derive_scopes(worker.core)
 

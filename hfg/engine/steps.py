@@ -32,7 +32,7 @@ def choose(worker: Worker) -> None:
     worker.step = firing.step
     if worker.iteration is None and core.inside is not None:
         worker.step = core.inside.step
-    if not core.fast or core.trace is not None or core.debug or worker.node is None or worker.group.threaded:
+    if not core.fast or core.trace is not None or core.debug or worker.options is None or worker.group.threaded:
         return
     if worker.gate is not None or worker.iteration is not None or worker.ready_hook is not None or worker.observed:
         return
@@ -56,9 +56,8 @@ def choose(worker: Worker) -> None:
     if len(worker.in_edges) == 1 and len(worker.live_inputs) == 1 and len(worker.unset) == 1 and not worker.wants_token[0]:
         edge = worker.live_inputs[0]
         if type(edge) is SyncEdge and edge.target_kind == "input" and edge.mandatory and worker.type.process_kind in ("function", "async"):
-            if outs and worker.type.result != "single" and worker.silent_code:
-                return
-            worker.step = _through_step(worker, edge, outs[0] if outs else None)
+            make = _async_step if worker.is_async else _through_step
+            worker.step = make(worker, edge, outs[0] if outs else None)
 
 
 def _leave_lying(worker: Worker) -> None:
@@ -71,7 +70,7 @@ def _parameters_wired(worker: Worker) -> bool:
 
 
 def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step:
-    """One input, at most one output edge: the shape of a pipeline."""
+    """A plain function with one input and at most one output edge: the shape of a pipeline."""
     core = worker.core
     node = worker.node
     process: Any = worker.process
@@ -81,77 +80,43 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
     producer_outputs = producer.outputs
     sequential = taken.sequential
     silent_code = worker.silent_code  # it cannot send by itself, so nobody needs to know that it runs
-    is_async = worker.type.process_kind == "async"
-    start = worker.carrier.start if is_async else None
     general = firing.step
-    target: Worker | None = given.target if given is not None else None
-    target_inputs = target.inputs if target is not None else None
-    target_outputs = target.outputs if target is not None else None
+    target: Any = given.target if given is not None else None
+    target_inputs = target.inputs if given is not None else None
+    target_outputs = target.outputs if given is not None else None
     carries = given is not None and given.active
     only = (taken,)
-
-    def later(result: Any, error: BaseException | None) -> None:
-        if error is None:
-            firing.complete_firing(worker, result)
-        else:
-            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
 
     def step(worker: Worker) -> None:
         if worker.special or not worker.placed or inputs.missing or worker.busy:
             general(worker)
             return
         worker.queued = worker.placed = False
-        token = taken.token
+        token: Any = taken.token
         taken.token = None
         inputs.missing = 1
-        if token.activity:  # type: ignore[union-attr]
-            active = token.activity > 0  # type: ignore[union-attr]
-            worker.active = active
-            node._active = active
+        if token.activity:
+            worker.active = node._active = token.activity > 0
         worker.firings += 1
         core.current = worker
-        if silent_code:
-            try:
-                result = process(token.value)  # type: ignore[union-attr]
-            except Exception as error:
-                worker.busy = "firing"
-                worker.stamp = token.stamp  # type: ignore[union-attr]
-                worker.taken = only
-                errors.fail(worker, f"firing {worker.firings}", error, answer=True)
-                return
-        else:
+        if not silent_code:
             worker.busy = "firing"
-            worker.stamp = token.stamp  # type: ignore[union-attr]
+            worker.stamp = token.stamp
             worker.taken = only
-            try:
-                result = process(token.value)  # type: ignore[union-attr]
-            except Exception as error:
-                errors.fail(worker, f"firing {worker.firings}", error, answer=True)
-                return
-            if worker.written is not None or worker.right:
-                if not is_async:
-                    firing.complete_firing(worker, result)
-                    return
-        if is_async:
-            worker.busy = "firing"
-            worker.taken = only
-            worker.stamp = token.stamp  # type: ignore[union-attr]
-            if type(result) is CoroutineType:
-                try:
-                    result = start(result, worker.late or _late(worker, later))  # type: ignore[misc]
-                except Exception as error:
-                    errors.fail(worker, f"firing {worker.firings}", error, answer=True)
-                    return
-                if result is PENDING:
-                    core.host.begin(worker)
-                    return
+        try:
+            result = process(token.value)
+        except Exception as error:
+            _failed(worker, token.stamp, only, error)
+            return
+        if not silent_code:
             if worker.written is not None or worker.right:
                 firing.complete_firing(worker, result)
                 return
-        if given is None:
             worker.busy = ""
             worker.stamp = None
+        if given is None:
             if worker.calls or worker.events_due:
+                worker.busy = "firing"
                 worker.taken = only
                 firing.finish_firing(worker, "done")
                 return
@@ -163,29 +128,27 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
             return
         if result is None or type(result) is Token:
             worker.busy = "firing"
-            worker.stamp = token.stamp  # type: ignore[union-attr]
+            worker.stamp = token.stamp
             worker.taken = only
             firing.complete_firing(worker, result)
             return
-        worker.busy = ""
         given.sent = number = given.sent + 1
         if carries and worker.active:
             worker.active = node._active = False
-            given.token = Token(result, 1, token.stamp, number)  # type: ignore[union-attr]
+            given.token = Token(result, 1, token.stamp, number)
         else:
-            given.token = Token(result, 0, token.stamp, number)  # type: ignore[union-attr]
+            given.token = Token(result, 0, token.stamp, number)
         given.held = True
         outputs.missing = 1
-        worker.stamp = None
-        target_inputs.missing = missing = target_inputs.missing - 1  # type: ignore[union-attr]
+        target_inputs.missing = missing = target_inputs.missing - 1
         if not missing:
-            if target.blocked or target_outputs.missing or target.placed or target.calls is not None or target.paced:  # type: ignore[union-attr]
-                consider(target)  # type: ignore[arg-type]
+            if target.blocked or target_outputs.missing or target.placed or target.calls is not None or target.paced:
+                consider(target)
             else:
-                target.placed = True  # type: ignore[union-attr]
-                if not target.queued and not target.busy:  # type: ignore[union-attr]
-                    target.queued = True  # type: ignore[union-attr]
-                    target.push(target)  # type: ignore[union-attr]
+                target.placed = True
+                if not target.queued and not target.busy:
+                    target.queued = True
+                    target.push(target)
         if sequential:
             worker.held = True
             worker.taken = only
@@ -195,9 +158,90 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
     return step
 
 
-def _late(worker: Worker, later: Callable[[Any, BaseException | None], None]) -> Any:
-    worker.late = worker.core.host.late(worker, later)
-    return worker.late
+def _failed(worker: Worker, stamp: float, taken: tuple[SyncEdge, ...], error: BaseException) -> None:
+    """The function of a short step raised: the firing is one like any other from here (X1)."""
+    worker.busy = "firing"
+    worker.stamp = stamp
+    worker.taken = taken
+    errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+
+
+def _async_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step:
+    """The same for an async function: it starts at once, and what it gives back leaves by the same short way, now or later."""
+    core = worker.core
+    host = core.host
+    node = worker.node
+    process: Any = worker.process
+    inputs = worker.inputs
+    outputs = worker.outputs
+    start = worker.carrier.start
+    general = firing.step
+    target: Any = given.target if given is not None else None
+    carries = given is not None and given.active
+    only = (taken,)
+
+    def leave(result: Any, error: BaseException | None) -> None:
+        if error is not None:
+            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+            return
+        if (
+            given is None
+            or result is None
+            or worker.step is not step  # somebody has begun to watch, or the wiring has changed
+            or type(result) is Token
+            or worker.written is not None
+            or worker.right
+            or worker.calls
+            or worker.events_due
+            or (carries and worker.active)
+        ):
+            firing.complete_firing(worker, result)
+            return
+        stamp: Any = worker.stamp
+        worker.busy = ""
+        worker.stamp = None
+        given.sent = number = given.sent + 1
+        given.token = Token(result, 0, stamp, number)
+        given.held = True
+        outputs.missing = 1
+        worker.placed = False
+        barrier = target.inputs
+        barrier.missing -= 1
+        if not barrier.missing:
+            consider(target)
+        if taken.sequential:
+            worker.held = True
+        else:
+            release(only)
+
+    late = host.late(worker, leave)
+
+    def step(worker: Worker) -> None:
+        if worker.special or not worker.placed or inputs.missing or worker.busy:
+            general(worker)
+            return
+        worker.queued = worker.placed = False
+        token: Any = taken.token
+        taken.token = None
+        inputs.missing = 1
+        if token.activity:
+            worker.active = node._active = token.activity > 0
+        worker.firings += 1
+        core.current = worker
+        worker.busy = "firing"
+        worker.stamp = token.stamp
+        worker.taken = only
+        try:
+            result = start(process(token.value), late)
+        except Exception as error:
+            leave(None, error)
+            return
+        if result is PENDING:
+            host.begin(worker)
+        else:
+            leave(result, None)
+
+    return step
 
 
 def _outputs_done(worker: Worker) -> None:
@@ -290,8 +334,7 @@ def _call_step(worker: Worker) -> Step:
         if handler is None or type(edge) is not EventEdge:
             general(worker)
             return
-        worker.queued = False
-        calls.popleft()
+        calls.popleft()  # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
         queue = edge.queue
         token = queue.popleft()
         worker.call_number += 1
@@ -302,27 +345,30 @@ def _call_step(worker: Worker) -> Step:
             worker.active = active
             node._active = active
         core.current = worker
-        worker.busy = "call"
         worker.stamp = token.stamp
         try:
             result = handler(token.value)
         except Exception as error:
+            worker.queued = False
+            worker.busy = "call"
             worker.call_edge = edge
             worker.ticket += 1
             errors.fail_call(worker, edge.port_name, error)
             return
         if type(result) is CoroutineType:
+            worker.queued = False
+            worker.busy = "call"
             worker.call_edge = edge
             firing.await_call(worker, edge.port_name, result)
             return
-        worker.busy = ""
         worker.stamp = None
         worker.right = False
         if worker.events_due:
             flush_automatic(worker)
-        if calls and not worker.queued and not worker.blocked & CALLS_BLOCKED:
-            worker.queued = True
+        if calls and not worker.blocked & CALLS_BLOCKED:
             worker.push(worker)
+        else:
+            worker.queued = False
 
     return step
 
@@ -337,30 +383,40 @@ def emitter(event: RunningEvent) -> Callable[[Any, int | None, float | None], No
         return lambda value, activity, stamp: general(event, value, activity, stamp)
     edge = edges[0]
     target: Worker = edge.target
+    node = worker.node
     if edge.target_kind != "slot" or edge.overflow != "wait" or edge.pipeline is not None:
         return lambda value, activity, stamp: general(event, value, activity, stamp)
     port = event.port
+    port._observers = port._observers  # an attribute of its own is found faster than the class's
     queue = edge.queue
     carries = edge.active
 
     def emit(value: Any, activity: int | None, stamp: float | None) -> None:
+        if stamp is None:
+            stamp = worker.stamp
         if (
             activity is not None
-            or stamp is not None
+            or stamp is None
             or not core.pumping
-            or not edge.live
             or core.trace is not None
-            or port._observers
+            or port._observers is not None
+            or not edge.live
             or type(value) is Token
-            or (carries and (worker.active or worker.right))
         ):
             general(event, value, activity, stamp)
             return
-        stamp = worker.stamp
-        if stamp is None:
-            stamp = core.now()
         edge.sent = number = edge.sent + 1
-        queue.append(Token(value, 0, stamp, number))
+        if carries and (worker.active or worker.right) and not worker.watched:
+            queue.append(Token(value, 1, stamp, number))
+            if worker.active:
+                worker.active = node._active = False
+                worker.right = True
+        elif carries and (worker.active or worker.right):
+            edge.sent = number - 1
+            general(event, value, activity, stamp)
+            return
+        else:
+            queue.append(Token(value, 0, stamp, number))
         if len(queue) >= edge.capacity and not edge.full:
             edge.full = True
             worker.full_edges += 1

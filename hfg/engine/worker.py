@@ -123,7 +123,7 @@ class Worker:
         "is_boundary_output",
         "is_source",
         "iteration",
-        "late",
+        "job",
         "limit_timer",
         "live_inputs",
         "mandatory_ports",
@@ -240,7 +240,7 @@ class Worker:
         self.carrier: Any = None
         self.call_edge: Any = None
         self.in_flight = False  # its code waits or runs in a thread
-        self.late: Any = None
+        self.job: Any = None  # what its thread is doing for it
         self.waiting_room = 0  # its code awaits trigger_wait
         self.room_waiters: list[Callable[[], None]] | None = None
         self.ticket = 0  # which firing or call a late result belongs to (X2)
