@@ -7,7 +7,7 @@ Which floor stands on which; imports go down only, and asyncio begins on floor 5
     5  engine                                      outside: hfg_transports (sees floors 0-1 only)
     4  activity
     3  graph
-    2  nodetype, functions  <-  declaration, signature, description         registry
+    2  nodetype, functions  <-  declaration  <-  signature  <-  hints, description     registry
     1  ports                                       transport
     0  errors   problem   token   types   clock   trace
 
@@ -26,11 +26,11 @@ from hfg.token import END, NO_MESSAGE, Token
 
 __all__ = [
     "END",
+    "NO_MESSAGE",
     "EndOfStream",
     "Event",
     "Graph",
     "Input",
-    "NO_MESSAGE",
     "Node",
     "Output",
     "Parameter",

@@ -13,6 +13,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 
 from hfg.description import EventSpec, InputSpec, NodeType, OutputSpec, Result, SlotSpec
 from hfg.errors import DeclarationError, UsageError
+from hfg.hints import MISSING, hints_of, kind_of, split_token
 from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS
 from hfg.ports.base import Relaying
 from hfg.ports.events import Event
@@ -21,9 +22,19 @@ from hfg.ports.outputs import Output
 from hfg.ports.parameters import REQUIRED, Parameter, ParameterSpec
 from hfg.ports.slots import UNSET, Slot
 from hfg.ports.states import State
-from hfg.signature import MISSING, Signature, hints_of, kind_of, read_signature, split_token
+from hfg.signature import Signature, read_signature
 
-__all__ = ["HOOKS", "RESERVED", "Shared", "check_names", "declare", "snake_case"]
+__all__ = [
+    "HOOKS",
+    "RESERVED",
+    "Declaration",
+    "Shared",
+    "check_names",
+    "declare",
+    "install_ports",
+    "shared_names",
+    "snake_case",
+]
 
 HOOKS: Final = ("setup", "ready", "end", "teardown", "on_activated", "on_deactivated")
 """Methods of a node that a runner calls besides `process`."""
@@ -49,10 +60,10 @@ class Shared:
     def __get__(self, node: Any, owner: Any) -> Any:
         if node is None:
             return self
-        raise shared_name(node, self.name)
+        raise _shared_name(node, self.name)
 
 
-def shared_name(node: Any, name: str) -> Exception:
+def _shared_name(node: Any, name: str) -> Exception:
     """Make the refusal that names both ports."""
     kinds = [kind for kind in ("inputs", "outputs", "events", "slots") if name in getattr(node._type, kind)]
     both = " or ".join(f'node.ports.{kind}["{name}"]' for kind in kinds)
@@ -258,14 +269,14 @@ def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED)
                 f"first{_rename(kind, name)}"
             )
     for spec in kind.parameters.values():
-        check_default(spec, where)
+        _check_default(spec, where)
 
 
 def _rename(kind: NodeType, name: str) -> str:
     return f', as in inputs={{"{name}": "{name}_in"}}' if kind.is_function and name in kind.inputs else ""
 
 
-def check_default(spec: ParameterSpec, where: str) -> None:
+def _check_default(spec: ParameterSpec, where: str) -> None:
     """Refuse a default that breaks its own limits."""
     wrong = None if spec.trigger or spec.default is REQUIRED else spec.check(spec.default)
     if wrong is not None:

@@ -6,17 +6,29 @@ the class. Stands on ports; knows neither `Node` nor graphs.
 
 from __future__ import annotations
 
+import copy
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import msgspec
 
-from hfg.ports.parameters import ParameterSpec
+from hfg.ports.parameters import REQUIRED, ParameterSpec
 from hfg.ports.states import State
 
-__all__ = ["EventSpec", "InputSpec", "NodeType", "OutputSpec", "ProcessKind", "Result", "SlotSpec", "look_up"]
+__all__ = [
+    "EventSpec",
+    "InputSpec",
+    "NodeType",
+    "OutputSpec",
+    "ProcessKind",
+    "Result",
+    "SlotSpec",
+    "look_up",
+    "parameter_values",
+    "unknown_parameter",
+]
 
 ProcessKind = Literal["none", "function", "async", "generator", "async generator"]
 Result = Literal["none", "single", "fields"]
@@ -135,3 +147,40 @@ def look_up(module: str, qualname: str) -> Any:
     for part in qualname.split("."):
         found = getattr(found, part, None)
     return found
+
+
+def parameter_values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
+    """Give every parameter of a new node its value.
+
+    Raises:
+      TypeError: a name that the type does not have, or a parameter without default is missing.
+      ValueError: a value breaks its limits.
+    """
+    values: dict[str, Any] = {}
+    for name, spec in type_.parameters.items():
+        if spec.trigger:
+            continue
+        if name in given:
+            value = given[name]
+            wrong = spec.check(value)
+            if wrong is not None:
+                raise ValueError(f'parameter "{type_.name}.{name}" {wrong}')
+        elif spec.default is REQUIRED:
+            raise TypeError(
+                f'{type_.name} needs a value for its parameter "{name}": write {type_.qualname}({name}=...)'
+            )
+        else:
+            # A list as default must not be shared by all nodes.
+            value = copy.copy(spec.default) if isinstance(spec.default, MutableMapping | list | set) else spec.default
+        values[name] = value
+    unknown = [name for name in given if name not in values]
+    if unknown:
+        raise TypeError(unknown_parameter(type_, unknown[0]))
+    return values
+
+
+def unknown_parameter(type_: NodeType, name: str) -> str:
+    """Say that a type has no such parameter, and which it has."""
+    known = ", ".join(f'"{known}"' for known, spec in type_.parameters.items() if not spec.trigger) or "none"
+    hint = "; inputs are connected, not given here" if name in type_.inputs else ""
+    return f'{type_.name} has no parameter "{name}"; its parameters are {known}{hint}'

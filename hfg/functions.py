@@ -21,10 +21,11 @@ from typing_extensions import TypeForm
 from hfg.declaration import RESERVED, check_names, install_ports, shared_names, snake_case
 from hfg.description import InputSpec, NodeType, OutputSpec, Result
 from hfg.errors import DeclarationError
+from hfg.hints import MISSING, function_name, hints_of_class, output_type
 from hfg.nodetype import Node
 from hfg.ports.outputs import OutputPort
 from hfg.ports.parameters import Parameter, ParameterSpec
-from hfg.signature import MISSING, CallPlan, Signature, function_name, hints_of_class, output_type, read_signature
+from hfg.signature import CallPlan, Signature, read_signature
 
 __all__ = ["FunctionNode", "NodeFunction", "node"]
 

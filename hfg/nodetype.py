@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Final, TypeVar
 import msgspec
 
 from hfg.declaration import declare
-from hfg.description import NodeType
+from hfg.description import NodeType, parameter_values, unknown_parameter
 from hfg.errors import DeclarationError, EngineInternalError, NodeError, UsageError
 from hfg.ports.automatic import (
     AUTOMATIC_EVENTS,
@@ -30,7 +30,7 @@ from hfg.ports.base import Kind, Port, Source, Target
 from hfg.ports.events import Event, EventPort
 from hfg.ports.inputs import InputPort
 from hfg.ports.outputs import OutputPort
-from hfg.ports.parameters import REQUIRED, ParameterPort
+from hfg.ports.parameters import ParameterPort
 from hfg.ports.slots import SlotPort
 from hfg.ports.views import Ports
 from hfg.token import Token
@@ -117,7 +117,9 @@ class Node:
         self._place = None
         if positional:
             raise TypeError(_positional(self._type))
-        self._parameters = _values(self._type, parameters) if parameters or self._type.parameters else _NO_PARAMETERS
+        self._parameters = (
+            parameter_values(self._type, parameters) if parameters or self._type.parameters else _NO_PARAMETERS
+        )
 
     def __init_subclass__(cls, *, _made: Callable[[type[Node]], NodeType] | None = None, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)
@@ -307,7 +309,7 @@ class Node:
         """
         spec = self._type.parameters.get(name)
         if spec is None or spec.trigger:
-            raise ValueError(_unknown(self._type, name))
+            raise ValueError(unknown_parameter(self._type, name))
         wrong = spec.check(value)
         if wrong is not None:
             raise ValueError(f'parameter "{_name(self)}.{name}" {wrong}')
@@ -373,37 +375,6 @@ def _only(node: Node, candidates: list[Any], what: str) -> Any:
 
 def _name(node: Node) -> str:
     return node._type.name if node._place is None else node._place.path
-
-
-def _values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
-    """Give every parameter its value, checked."""
-    values: dict[str, Any] = {}
-    for name, spec in type_.parameters.items():
-        if spec.trigger:
-            continue
-        if name in given:
-            value = given[name]
-            wrong = spec.check(value)
-            if wrong is not None:
-                raise ValueError(f'parameter "{type_.name}.{name}" {wrong}')
-        elif spec.default is REQUIRED:
-            raise TypeError(
-                f'{type_.name} needs a value for its parameter "{name}": write {type_.qualname}({name}=...)'
-            )
-        else:
-            # A list as default must not be shared by all nodes.
-            value = copy.copy(spec.default) if isinstance(spec.default, MutableMapping | list | set) else spec.default
-        values[name] = value
-    unknown = [name for name in given if name not in values]
-    if unknown:
-        raise TypeError(_unknown(type_, unknown[0]))
-    return values
-
-
-def _unknown(type_: NodeType, name: str) -> str:
-    known = ", ".join(f'"{known}"' for known, spec in type_.parameters.items() if not spec.trigger) or "none"
-    hint = "; inputs are connected, not given here" if name in type_.inputs else ""
-    return f'{type_.name} has no parameter "{name}"; its parameters are {known}{hint}'
 
 
 def _positional(type_: NodeType) -> str:

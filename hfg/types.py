@@ -9,9 +9,11 @@ nodes.
 from __future__ import annotations
 
 import functools
+import operator
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
+from itertools import islice
 from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
@@ -121,6 +123,12 @@ _OPEN_DTYPES: Final = frozenset(
 _TOWER: Final[dict[type, tuple[type, ...]]] = {float: (int, bool), complex: (int, bool, float)}
 """What a number type takes besides itself (PEP 484)."""
 
+_ITEMS: Final[dict[type, type]] = {str: str, bytes: int, bytearray: int, range: int}
+"""What is in a plain sequence; beartype knows it of generic ones only."""
+
+_LOOKED_AT: Final = 1000
+"""How many items of a container are checked; the first ones, for the same value must always get the same answer."""
+
 
 def compatible(source: Any, target: Any) -> bool:
     """Say whether every value a port of type `source` sends fits a port of type `target`."""
@@ -165,6 +173,9 @@ def _judge(source: Any, target: Any) -> str | None:
 
 
 def _judge_plain(source: Any, target: Any) -> str | None:
+    origin, arguments = typing.get_origin(target), typing.get_args(target)
+    if source in _ITEMS and len(arguments) == 1 and isinstance(origin, type) and issubclass(source, origin):
+        return _judge(_ITEMS[source], arguments[0])
     if (isinstance(target, type) and source in _TOWER.get(target, ())) or source == target:
         return None
     try:
@@ -245,8 +256,16 @@ def _dtype_of(hint: Any) -> Any:
     arguments = typing.get_args(hint)
     dtype = arguments[1] if len(arguments) > 1 else Any
     scalars = typing.get_args(dtype)
-    scalar = _open(scalars[0])[0] if scalars else Any
-    return scalar if isinstance(scalar, type) or _is_union(scalar) else Any
+    return _scalar(scalars[0]) if scalars else Any
+
+
+def _scalar(hint: Any) -> Any:
+    """Give the scalar class, or a union of them; `np.floating[Any]` is `np.floating`."""
+    hint, _ = _open(hint)
+    if _is_union(hint):
+        return functools.reduce(operator.or_, map(_scalar, typing.get_args(hint)))
+    hint = typing.get_origin(hint) or hint
+    return hint if isinstance(hint, type) else Any
 
 
 def _open(hint: Any) -> tuple[Any, tuple[Shape, ...]]:
@@ -308,7 +327,30 @@ def _make_checker(hint: Any) -> Callable[[Any], bool]:
     if hint in _TOWER:
         allowed = (hint, *_TOWER[hint])
         return lambda value: isinstance(value, allowed)
-    return lambda value: _bearable(value, hint)
+    items = _items_checker(typing.get_origin(hint), typing.get_args(hint))
+    return items or (lambda value: _bearable(value, hint))
+
+
+def _items_checker(origin: Any, arguments: tuple[Any, ...]) -> Callable[[Any], bool] | None:
+    """Make the check of a container, which beartype does on one item chosen at random: no two runs would agree."""
+    if not (isinstance(origin, type) and issubclass(origin, Collection)) or not arguments:
+        return None
+    if issubclass(origin, Mapping) and len(arguments) == 2:
+        key, item = map(_checker, arguments)
+        return lambda value: (
+            isinstance(value, origin) and all(key(k) and item(v) for k, v in islice(value.items(), _LOOKED_AT))
+        )
+    if origin is tuple and not (len(arguments) == 2 and arguments[1] is Ellipsis):
+        checkers = [_checker(argument) for argument in arguments if argument != ()]
+        return lambda value: (
+            isinstance(value, tuple)
+            and len(value) == len(checkers)
+            and all(check(item) for check, item in zip(checkers, value, strict=True))
+        )
+    if origin is tuple or len(arguments) == 1:
+        item = _checker(arguments[0])
+        return lambda value: isinstance(value, origin) and all(map(item, islice(value, _LOOKED_AT)))
+    return None
 
 
 def _bearable(value: Any, hint: Any) -> bool:
@@ -339,7 +381,7 @@ def _words(hint: Any) -> str:
         return "None"
     if _is_union(hint):
         return " | ".join(describe(member) for member in typing.get_args(hint))
-    dtype = _dtype_of(hint)
+    dtype = _dtype_of(_open(hint)[0])  # NDArray is an alias from Python 3.12 on
     if dtype is not None:
         return "Array" if dtype is Any else f"Array[{describe(dtype)}]"
     if typing.get_origin(hint) is Annotated:

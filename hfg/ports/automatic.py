@@ -11,7 +11,14 @@ from hfg.errors import NodeError
 from hfg.ports.events import Event
 from hfg.ports.slots import Slot
 
-__all__ = ["AUTOMATIC_EVENTS", "AUTOMATIC_SLOTS", "SUBGRAPH_EVENTS", "SUBGRAPH_SLOTS"]
+__all__ = [
+    "AUTOMATIC_EVENTS",
+    "AUTOMATIC_SLOTS",
+    "SUBGRAPH_EVENTS",
+    "SUBGRAPH_SLOTS",
+    "automatic_event",
+    "automatic_slot",
+]
 
 AUTOMATIC_EVENTS: Final[dict[str, Any]] = {
     "activated": None,

@@ -45,7 +45,7 @@ class Source(Generic[T_co]):
 
         The same as `graph.connect(self, target, active=True)`.
         """
-        return graph_of(self, target).connect(self, target, active=True)
+        return _graph_of(self, target).connect(self, target, active=True)
 
     def __rshift__(self, other: Other) -> Other:
         """Connect to a target, or to the only free one of a node.
@@ -56,7 +56,7 @@ class Source(Generic[T_co]):
         target = other if finder is None else finder()
         if not isinstance(target, Target):
             return NotImplemented
-        graph_of(self, target).connect(self, target)
+        _graph_of(self, target).connect(self, target)
         return other
 
 
@@ -108,7 +108,7 @@ def path_of(node: Any, name: str) -> str:
     return f"{kind.name}.{name}" if kind is not None else name
 
 
-def graph_of(source: object, target: object) -> Any:
+def _graph_of(source: object, target: object) -> Any:
     """Find the graph in which two ends are to be connected.
 
     Raises:

@@ -58,7 +58,7 @@ class ParameterSpec(msgspec.Struct, frozen=True):
         for limit in self.limits:
             try:
                 wrong = _breaks(limit, value)
-            except Exception as error:  # noqa: BLE001 - a comparison that the value does not know, or the user's own predicate
+            except Exception as error:
                 return f"cannot be compared with {limit!r} ({type(error).__name__}: {error}), got {value!r}"
             if wrong:
                 return f"{wrong}, got {value!r}"

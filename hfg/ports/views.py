@@ -17,7 +17,11 @@ from hfg.ports.outputs import OutputPort
 from hfg.ports.parameters import ParameterPort
 from hfg.ports.slots import SlotPort
 
-__all__ = ["PortView", "Ports"]
+__all__ = [
+    "NoSuchPort",
+    "PortView",
+    "Ports",
+]
 
 P_co = TypeVar("P_co", covariant=True)
 

@@ -1,0 +1,59 @@
+"""Node types are found by reference."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import hfg
+from hfg import registry
+from hfg.errors import TargetError
+
+
+class Outer:
+    class Inner(hfg.Node):
+        def process(self, value: int) -> int:
+            return value
+
+
+@hfg.node
+def double(value: int) -> int:
+    return 2 * value
+
+
+@pytest.mark.parametrize("kind", [Outer.Inner, double])
+def test_a_type_is_found_by_its_reference(kind: type[hfg.Node]) -> None:
+    reference = registry.reference_of(kind)
+    assert reference is not None
+    assert registry.find(reference) is kind
+    assert registry.reference_of(kind()) == reference
+
+
+def test_a_module_is_imported_when_a_type_of_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "robot_parts.py").write_text("import hfg\nclass Arm(hfg.Node):\n    moved = hfg.Event()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert registry.find("robot_parts:Arm").__name__ == "Arm"
+    del sys.modules["robot_parts"]
+
+
+@pytest.mark.parametrize(
+    ("reference", "message"),
+    [
+        ("Arm", 'write "module:name"'),
+        ("no_such_module:Arm", 'module "no_such_module" cannot be found'),
+        ("hfg.errors:Arm", 'module "hfg.errors" has no "Arm"'),
+        ("hfg.errors:HfgError", "no node type; derive it from hfg.Node"),
+    ],
+)
+def test_what_is_no_node_type_is_refused(reference: str, message: str) -> None:
+    with pytest.raises(TargetError, match=message):
+        registry.find(reference)
+
+
+def test_a_module_that_fails_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "broken_parts.py").write_text("1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(TargetError, match=r'importing "broken_parts" failed \(ZeroDivisionError'):
+        registry.find("broken_parts:Arm")
