@@ -1,0 +1,237 @@
+"""Slot calls, and what the automatic slots do (rules F6, F9, F10, A7, A9, A10, G2, X1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from hfg.errors import Aborted, NodeError
+from hfg.testing.reference.firing import Firing
+from hfg.testing.reference.state import Flight, Line, Station
+from hfg.testing.reference.structure import ROOT
+from hfg.trace import CallEnded, CallStarted, ErrorRaised, NodeEnabled, TokenProcessed, TokenTaken
+
+__all__ = ["Calling"]
+
+_AUTOMATIC = ("enable", "disable", "activate", "deactivate", "reset")
+
+
+class Calling(Firing):
+    """A machine whose slots can be called."""
+
+    def start_call(self, owner: int, line: Line) -> None:
+        """Take the oldest token and work on it: activity first, then the handler (A6, A7)."""
+        lying = line.queue.pop(0)
+        name = line.edge.target.name
+        if line.edge.target.kind == "parameter":
+            self.set_between_firings(self.stations[owner], line, lying.token)
+            return
+        number = self.count_call(owner)
+        self.observe(CallStarted(self.now, self.path_of(owner), number, name, line.edge.label))
+        self.observe(TokenTaken(self.now, line.edge.label, lying.token))
+        if not line.edge.is_event:
+            line.unprocessed += 1
+        if owner < 0:
+            self.call_of_whole(owner, name)
+            self.observe(CallEnded(self.now, self.path_of(owner), number, "done"))
+            if not line.edge.is_event and line.unprocessed:
+                self.process(line)
+            self.settle()
+            return
+        station = self.stations[owner]
+        flight = Flight(station, "call", number, "call", lying.token.stamp, slot=name, line=line)
+        station.flight = flight
+        self.receive_activity(owner, [lying.token.activity])
+        self.launch_call(flight, self.handler_of(station, name, lying.token))
+        self.settle()
+
+    def count_call(self, owner: int) -> int:
+        """Number the calls of a node."""
+        if owner >= 0:
+            self.stations[owner].calls += 1
+            return self.stations[owner].calls
+        self.box_calls[owner] = self.box_calls.get(owner, 0) + 1
+        return self.box_calls[owner]
+
+    def path_of(self, owner: int) -> str:
+        """The path of a node, of a subgraph, or "" for the graph."""
+        if owner >= 0:
+            return self.stations[owner].path
+        return "" if owner == ROOT else self.structure.boxes[-2 - owner].path
+
+    def set_between_firings(self, station: Station, line: Line, token: Any) -> None:
+        """P8: a signal into a parameter."""
+        self.observe(TokenTaken(self.now, line.edge.label, token))
+        self.receive_activity(station.leaf.index, [token.activity])
+        try:
+            self.set_parameter(station, line.edge.target.name, token.value)
+        except ValueError as error:
+            self.fail_call_of(station, f'parameter "{line.edge.target.name}"', error)
+        self.settle()
+
+    def handler_of(self, station: Station, name: str, token: Any) -> Callable[[], Any]:
+        """What runs: an automatic slot of A9, or the node's own handler."""
+        index = station.leaf.index
+        if name in station.type.slots:
+            call = station.node._slot_call(name)
+            return lambda: call(token)
+        actions: dict[str, Callable[[], None]] = {
+            "enable": lambda: self.enable(index),
+            "disable": lambda: self.disable(index),
+            "reset": lambda: self.restart(station),
+            "activate": lambda: self.set_active(index, True, "slot"),
+            "deactivate": lambda: self.deactivate(index),
+        }
+        return actions[name]
+
+    def launch_call(self, flight: Flight, handler: Callable[[], Any]) -> None:
+        """Run the handler where its group runs."""
+        automatic = flight.slot not in flight.station.type.slots
+        self.begin_in_group(flight, automatic or self.is_async_slot(flight))
+        self.launch(flight, handler, lambda _, error: self.end_call(flight, error))
+
+    def is_async_slot(self, flight: Flight) -> bool:
+        """Whether the handler may wait."""
+        return bool(flight.station.type.slots[flight.slot].is_async)
+
+    def end_call(self, flight: Flight, error: BaseException | None) -> None:
+        """Automatic events follow, then the call is over and its token processed (F6)."""
+        station = flight.station
+        if error is not None and not self.fail_call_of(station, f"slot {flight.slot}, call {flight.number}", error):
+            return
+        self.flush_changes(station)
+        self.observe(CallEnded(self.now, station.path, flight.number, "done" if error is None else "failed"))
+        station.flight = None
+        line = flight.line
+        if line is not None and not line.edge.is_event and line.unprocessed:
+            self.process(line)
+        self.settle()
+
+    def fail_call_of(self, station: Station, what: str, error: BaseException) -> bool:
+        """A failed slot call is only counted, unless the policy is to stop; False if the run is over."""
+        policy = station.leaf.options.on_error
+        failure = NodeError(station.path, what, error)
+        self.observe(ErrorRaised(self.now, station.path, what, str(failure), policy))
+        if policy == "stop":
+            station.flight = None
+            self.fail_run(failure)
+            return False
+        return True
+
+    # --- A9's slots
+
+    def deactivate(self, index: int) -> None:
+        """Take A(v), and the right of A3 with it."""
+        flight = self.stations[index].flight
+        if flight is not None:
+            flight.right = False
+        self.set_active(index, False, "slot")
+
+    def call_of_whole(self, owner: int, name: str) -> None:
+        """Slots of the graph (A10) and of subgraphs (G2)."""
+        if owner == ROOT:
+            if name == "stop":
+                self.finish("stopped")
+            else:
+                self.fail_run(Aborted("the slot abort was called"), "aborted")
+        elif name == "enable":
+            self.enable(owner)
+        elif name == "disable":
+            self.disable(owner)
+        elif name == "deactivate":
+            self.quench(-2 - owner, "slot")
+        else:
+            for member in self.structure.boxes[-2 - owner].members:
+                self.restart(self.stations[member])
+
+    def restart(self, station: Station) -> None:
+        """Teardown, setup, not ended; tokens and A(v) stay."""
+        if station.leaf.inside is None:
+            self.tear_down(station)
+            self.set_up(station)
+
+    def set_up(self, station: Station) -> None:
+        """Make the node as new: state, generator, not ended."""
+        station.iterator = None
+        station.ending = station.ended = station.stops_itself = False
+        station.resting_until = None
+        station.set_up = True
+        if station.leaf.inside is None:
+            station.node._reset_states()
+            hook = station.node._hook("setup")
+            if hook is not None:
+                self.run_hook(station, hook)
+
+    def tear_down(self, station: Station) -> None:
+        """Close what `setup` opened."""
+        if station.set_up and station.leaf.inside is None:
+            hook = station.node._hook("teardown")
+            if hook is not None:
+                self.run_hook(station, hook)
+        station.set_up = False
+
+    # --- F10
+
+    def members_of(self, owner: int) -> list[Station]:
+        """The node itself, or all inside a subgraph."""
+        if owner >= 0:
+            return [self.stations[owner]]
+        return [self.stations[member] for member in self.structure.boxes[-2 - owner].members]
+
+    def enable(self, owner: int) -> None:
+        """Rule F10: starts afresh; A(v) is kept."""
+        members = self.members_of(owner)
+        before = [self.is_enabled(station.leaf.index) for station in members]
+        if self._set_enabled(owner, True):
+            for station, was in zip(members, before, strict=True):
+                if not was and self.is_enabled(station.leaf.index):
+                    self.tear_down(station)
+                    self.set_up(station)
+            self.settle()
+
+    def disable(self, owner: int) -> None:
+        """Rule F10: what lies on the inputs and in the queues is discarded, and what nobody took from the outputs."""
+        members = self.members_of(owner)
+        before = [self.is_enabled(station.leaf.index) for station in members]
+        if self._set_enabled(owner, False):
+            for station, was in zip(members, before, strict=True):
+                if was and not self.is_enabled(station.leaf.index):
+                    self._silence(station)
+            if owner < ROOT:
+                self._empty(lambda line: line.edge.target.owner == owner and line.edge.target.name != "enable")
+            self.settle()
+
+    def _set_enabled(self, owner: int, enabled: bool) -> bool:
+        if owner >= 0:
+            changed = self.stations[owner].enabled != enabled
+            self.stations[owner].enabled = enabled
+        else:
+            changed = self.box_enabled[-2 - owner] != enabled
+            self.box_enabled[-2 - owner] = enabled
+        if changed:
+            self.observe(NodeEnabled(self.now, self.path_of(owner), enabled))
+        return changed
+
+    def _silence(self, station: Station) -> None:
+        index = station.leaf.index
+        if station.flight is not None and station.flight.what == "firing":
+            station.flight.void = True
+        self._empty(lambda line: line.edge.target.owner == index and line.edge.target.name != "enable")
+        self._empty(lambda line: line.edge.source.owner == index and not line.edge.is_event)
+
+    def _empty(self, which: Callable[[Line], bool]) -> None:
+        for line in self.lines:
+            if which(line):
+                occupied = not line.edge.is_event and not line.delay and bool(line.queue)
+                for lying in list(line.queue):
+                    self.discard(line, lying, "disabled")
+                if occupied:
+                    self.observe(TokenProcessed(self.now, line.edge.label))
+
+    def finish(self, outcome: str) -> None:
+        """End the run."""
+        raise NotImplementedError
+
+    def fail_run(self, error: BaseException, outcome: str = "failed") -> None:
+        """End the run in failure."""
+        raise NotImplementedError

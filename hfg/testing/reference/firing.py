@@ -1,0 +1,303 @@
+"""One firing from beginning to end (rules F3-F5, F11, A6, A11, X1, P6, P8)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+from hfg.errors import EndOfStream, FiringTimeout, NodeError, UsageError
+from hfg.testing.reference.running_code import RunningCode
+from hfg.testing.reference.state import Flight, Line, Lying, Station, newest
+from hfg.testing.reference.structure import ROOT
+from hfg.token import END, NO_MESSAGE, Token
+from hfg.trace import (
+    ErrorRaised,
+    FiringEnded,
+    FiringStarted,
+    ParameterSet,
+    TokenDropped,
+    TokenTaken,
+)
+
+__all__ = ["Firing"]
+
+_OVER = object()
+"""What an iterator gives when nothing more comes."""
+
+Taken = list[tuple[Line, Lying]]
+
+
+class Firing(RunningCode):
+    """A machine whose nodes can fire."""
+
+    def start_firing(self, index: int) -> None:
+        """Take a token from every edge, let activity and parameters act, decide what kind of firing it is, and begin (D3)."""
+        station = self.stations[index]
+        station.place = None
+        station.firings += 1
+        joined = [line for line in self.lines_joined(index) if self.is_live(line) or self.takes_part(line)]
+        taken = self.take_all([line for line in joined if self.takes_part(line)])
+        tokens = [lying.token for _, lying in taken]
+        kind = self.kind_of(station, joined, taken)
+        stamp = self.now if station.type.is_source else newest(tokens, self.now)
+        flight = Flight(station, "firing", station.firings, kind, stamp, [line for line, _ in taken])
+        station.flight = flight
+        self.observe(FiringStarted(self.now, station.path, flight.number, kind))
+        self.receive_activity(index, [token.activity for token in tokens])
+        if kind != "silent":
+            rate = station.leaf.options.max_rate_hz
+            station.hold_until = self.now + 1 / rate if rate else station.hold_until
+        failure = self.set_parameters(station, taken)
+        if kind == "end":
+            for line, lying in taken:
+                if not lying.token.is_marker and line.edge.target.kind == "input":
+                    self.observe(TokenDropped(self.now, line.edge.label, lying.token, "ended"))
+            self.run_end(flight)
+        elif failure is not None:
+            self.fail_firing(flight, failure)
+        elif kind == "silent":
+            self.end_firing(flight, "silent")
+        else:
+            station.last_function = self.now
+            self.run_process(flight, taken)
+        self.settle()
+
+    def take_all(self, lines: list[Line]) -> Taken:
+        """Take one token from each edge."""
+        taken = []
+        for line in lines:
+            lying = line.queue.pop(0)
+            line.ended = lying.token.value is END
+            self.observe(TokenTaken(self.now, line.edge.label, lying.token))
+            if line.edge.is_event:
+                pass
+            elif line.delay:
+                self.note_processed(line)
+            else:
+                line.unprocessed += 1
+            taken.append((line, lying))
+        return taken
+
+    def kind_of(self, station: Station, joined: list[Line], taken: Taken) -> Literal["process", "silent", "end"]:
+        """F4, and A11's silence."""
+        index = station.leaf.index
+        if station.stops_itself:
+            return "end"
+        values = {line.edge.label: lying.token.value for line, lying in taken}
+        mandatory = [values[line.edge.label] for line, _ in taken if not self.is_optional(line)]
+        if END in mandatory:
+            return "end"
+        real = [line for line in joined if not line.delay]
+        if real and all(line.ended for line in real):
+            return "end"
+        if NO_MESSAGE in mandatory:
+            return "silent"
+        if joined and not mandatory and all(value is NO_MESSAGE or value is END for value in values.values()):
+            return "silent"
+        if not self.within_idle_rate(index):
+            return "silent"
+        return "process"
+
+    def set_parameters(self, station: Station, taken: Taken) -> Exception | None:
+        """P8: a value that is taken sets the parameter, also in a silent firing."""
+        for line, lying in taken:
+            if line.edge.target.kind == "parameter" and not lying.token.is_marker:
+                try:
+                    self.set_parameter(station, line.edge.target.name, lying.token.value)
+                except ValueError as error:
+                    return error
+        return None
+
+    def set_parameter(self, station: Station, name: str, value: Any) -> None:
+        """Set a parameter and say so.
+
+        Raises:
+          ValueError: it is out of its limits.
+        """
+        station.node._set_parameter(name, value)
+        self.observe(ParameterSet(self.now, station.path, name, value))
+
+    # --- the function
+
+    def run_process(self, flight: Flight, taken: Taken) -> None:
+        """Run the process function with the values that were taken; what is absent has its default (P6)."""
+        station = flight.station
+        held = {line.edge.target.name: lying.token for line, lying in taken if line.edge.target.kind == "input"}
+        arguments = []
+        for name, spec in station.type.inputs.items():
+            token = held.get(name)
+            if token is None or token.is_marker:
+                arguments.append(spec.default)
+            else:
+                arguments.append(token if spec.token else token.value)
+        self.begin_in_group(flight, station.type.process_kind in ("async", "async generator"))
+        self.launch(flight, self.what_to_run(station, arguments), lambda result, error: self.end_process(flight, result, error))
+
+    def begin_in_group(self, flight: Flight, is_async: bool) -> None:
+        """Code that does not wait runs in the thread of its group, if that has one (R1)."""
+        group = flight.station.leaf.options.group
+        flight.in_thread = not is_async and self.structure.threads.get(group, 0) > 0
+
+    def what_to_run(self, station: Station, arguments: list[Any]) -> Callable[[], Any]:
+        """One firing of each kind of process function; a generator begins at its first firing."""
+        kind = station.type.process_kind
+        if kind in ("function", "async"):
+            call = station.node._process_call()
+            return lambda: call(*arguments)
+        if kind == "generator":
+            return lambda: next(self.iterator_of(station), _OVER)
+
+        async def step() -> Any:
+            return await anext(self.iterator_of(station), _OVER)
+
+        return step
+
+    def iterator_of(self, station: Station) -> Any:
+        """The running generator of a source."""
+        if station.iterator is None:
+            station.iterator = station.node._process_call()()
+            if hasattr(station.iterator, "__iter__"):
+                station.iterator = iter(station.iterator)
+        return station.iterator
+
+    def end_process(self, flight: Flight, result: Any, error: BaseException | None) -> None:
+        """Say what the end of the function means: the end of a source, a failure, or outputs."""
+        station = flight.station
+        if result is _OVER or (isinstance(error, EndOfStream) and station.type.is_source):
+            self.run_end(flight)
+            return
+        if error is None:
+            try:
+                self.write_result(flight, result)
+            except (TypeError, UsageError) as wrong:
+                error = wrong
+        if error is not None:
+            self.fail_firing(flight, error)
+        else:
+            self.end_firing(flight, "done")
+
+    def write_result(self, flight: Flight, result: Any) -> None:
+        """Returned values are written to the outputs; None is silence (T2)."""
+        station = flight.station
+        for name, value in zip(station.type.outputs, station.node._split(result), strict=False):
+            if value is None:
+                continue
+            if name in flight.writes:
+                raise UsageError(f'"{station.path}.{name}" is written twice in one firing')
+            flight.writes[name] = (value, None, None)
+
+    # --- the end of a node
+
+    def run_end(self, flight: Flight) -> None:
+        """F4(1): call `end()`; from now on what arrives is drained (F12)."""
+        station = flight.station
+        station.ending = True
+        station.stamp = flight.stamp
+        flight.writes.clear()
+        hook = station.node._hook("end") if station.leaf.inside is None else None
+        if hook is None:
+            self.end_firing(flight, "ended")
+            return
+        self.begin_in_group(flight, False)
+
+        def after(result: Any, error: BaseException | None) -> None:
+            if error is not None:
+                self.fail_firing(flight, error)
+            else:
+                self.end_firing(flight, "ended")
+
+        self.launch(flight, hook, after)
+
+    # --- the end of a firing
+
+    def end_firing(self, flight: Flight, outcome: Literal["done", "silent", "ended", "failed", "abandoned"], failure: NodeError | None = None) -> None:
+        """Outputs leave together, then automatic events in the order they arose (D3); then the firing is over."""
+        station = flight.station
+        index = station.leaf.index
+        if not flight.void and (outcome != "ended" or flight.writes):
+            self.send(index, self.shipments(flight, silent=outcome not in ("done", "ended")), flight)
+        self.flush_changes(station)
+        if outcome == "done":
+            self.trigger(index, "processed")
+            self.flush_changes(station)
+        if failure is not None:
+            self.trigger(index, "failed", failure)
+            self.flush_changes(station)
+        if flight.void and outcome == "done":
+            outcome = "abandoned"
+        self.observe(FiringEnded(self.now, station.path, flight.number, outcome))
+        station.flight = None
+        for line in flight.taken:
+            if line.edge.is_event or line.delay:
+                continue
+            if self.is_pipelined(line):
+                self.process(line)
+            else:
+                station.owed.append(line)
+        self.settle()
+
+    def shipments(self, flight: Flight, *, silent: bool) -> list[tuple[Line, Any, int | None, float]]:
+        """Exactly one token for every edge of every output (F3); parameters send their values unless the firing is silent (P8)."""
+        station = flight.station
+        shipments: list[tuple[Line, Any, int | None, float]] = []
+        for line in self.in_order_of_outputs(station):
+            source = line.edge.source
+            value: Any = NO_MESSAGE
+            activity: int | None = None
+            stamp: float | None = None
+            if source.kind == "parameter" and not silent:
+                value = station.node._parameters[source.name]
+            elif source.kind == "output" and not silent and source.name in flight.writes:
+                value, activity, stamp = flight.writes[source.name]
+            if isinstance(value, Token):  # A4
+                activity = value.activity if activity is None else activity
+                stamp = value.stamp if stamp is None else stamp
+                value = value.value
+            shipments.append((line, NO_MESSAGE if value is None else value, activity, flight.stamp if stamp is None else stamp))
+        return shipments
+
+    def is_pipelined(self, line: Line) -> bool:
+        """F5: the consumer's mode, `auto` by whether the edge crosses groups."""
+        options = self.stations[line.edge.target.owner].leaf.options
+        if options.release != "auto":
+            return bool(options.release == "pipelined")
+        source = line.edge.source.owner
+        return source != ROOT and self.stations[source].leaf.options.group != options.group
+
+    # --- X1
+
+    def fail_firing(self, flight: Flight, error: BaseException, outcome: Literal["failed", "abandoned"] = "failed") -> None:
+        """An exception in a node's code: its policy decides."""
+        station = flight.station
+        options = station.leaf.options
+        what = f"firing {flight.number}"
+        failure = error if isinstance(error, NodeError) else NodeError(station.path, what, error)
+        self.observe(ErrorRaised(self.now, station.path, what, str(failure), options.on_error))
+        if options.on_error == "stop" or (options.on_error == "restart" and station.restarts >= options.restart_limit):
+            station.flight = None
+            self.fail_run(failure)
+            return
+        if options.on_error == "disable":
+            flight.void = True
+            self.end_firing(flight, outcome, failure)
+            self.disable(station.leaf.index)
+            return
+        if options.on_error == "restart":
+            station.restarts += 1
+            station.resting_until = self.now + options.restart_backoff_s * 2 ** (station.restarts - 1)
+        self.end_firing(flight, outcome, failure)
+
+    def time_out(self, flight: Flight) -> None:
+        """X2: the firing took too long."""
+        self.abandon(flight)
+        limit = flight.station.leaf.options.max_duration_s
+        error = FiringTimeout(flight.station.path, f"firing {flight.number}", f"took longer than {limit} s")
+        self.fail_firing(flight, error, "abandoned")
+
+    def fail_run(self, error: BaseException) -> None:
+        """End the run in failure."""
+        raise NotImplementedError
+
+    def disable(self, owner: int) -> None:
+        """Rule F10."""
+        raise NotImplementedError

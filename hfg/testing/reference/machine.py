@@ -1,0 +1,360 @@
+"""The reference machine: which moves the rules permit, and what each of them does.
+
+`moves()` lists every decision that a scheduler may take now; `apply(move)` takes one and gives what an observer sees of it. Where it is quiet, the steps that
+follow from quiet alone are the moves: time goes on (R6), a queue grows (F8), operators complete (P9), events end (F13), the run ends (R5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from hfg.errors import QueueLimit, Stalled
+from hfg.testing.reference.calls import Calling
+from hfg.testing.reference.state import Line, Station
+from hfg.testing.reference.structure import ROOT
+from hfg.token import END, Token
+from hfg.trace import ActivityChanged, QueueGrown, RunEnded, RunStarted, TokenDropped, TraceEvent
+
+__all__ = ["Move", "ReferenceMachine"]
+
+
+@dataclass(frozen=True)
+class Move:
+    """One permitted step.
+
+    Attributes:
+      kind: "fire" node; "call" a slot of node with the token of `edge`; "go on" with the firing or call of node; "time out" the firing of node (X2);
+        "wait" until `time`; "grow" the queue of `edge`; "complete" operators; "end events"; "finish" the run.
+      outcome: of "finish".
+    """
+
+    kind: Literal["fire", "call", "go on", "time out", "wait", "grow", "complete", "end events", "finish"]
+    node: str = ""
+    edge: str = ""
+    time: float = 0.0
+    outcome: str = ""
+
+    def __str__(self) -> str:
+        match self.kind:
+            case "wait":
+                return f"wait until {self.time:g} s"
+            case "finish":
+                return f"finish: {self.outcome}"
+            case "grow":
+                return f"grow {self.edge}"
+            case "call":
+                return f'call a slot of "{self.node}" over {self.edge}'
+            case "complete" | "end events":
+                return self.kind
+        return f'{self.kind} "{self.node}"'
+
+
+class ReferenceMachine(Calling):
+    """A run of a graph whose every decision is taken from outside.
+
+    Args:
+      graph: as built; its nodes are copied, so it can be run elsewhere too.
+      until_s: the run ends when time would go beyond it.
+      held_open: somebody outside may still send something, so quiet does not end the run.
+    """
+
+    def __init__(self, graph: Any, *, until_s: float | None = None, held_open: bool = False) -> None:
+        super().__init__(graph)
+        self.until_s = until_s
+        self.held_open = held_open
+        self.paths = {station.path: station.leaf.index for station in self.stations}
+        self.paths |= {box.path: -2 - box.index for box in self.structure.boxes}
+        self.paths[""] = ROOT
+        self.labels = {line.edge.label: line for line in self.lines}
+
+    def start(self) -> list[TraceEvent]:
+        """Set up all nodes, lay the initial tokens, trigger `start` (A10, D6)."""
+        self.connect_ports()
+        self.make_operators()
+        for station in self.stations:
+            self.set_up(station)
+        for line in self.lines:
+            for value in line.edge.initial:
+                self.lay(line, value)
+        self.observe(RunStarted(self.now))
+        self.trigger(ROOT, "start", activity=1)
+        self.settle()
+        return self.observed_since(0)
+
+    def lay(self, line: Line, value: Any) -> None:
+        """Lay an initial token (P7, D8)."""
+        from hfg.testing.reference.state import Lying
+
+        line.queue.append(Lying(Token(value, 0, self.now, 0), self.next_tick(), line.edge.source.owner))
+
+    def observed_since(self, mark: int) -> list[TraceEvent]:
+        """What was seen after the first `mark` events."""
+        return self.observed[mark:]
+
+    # --- what may happen
+
+    def moves(self) -> list[Move]:
+        """Give every permitted next move; none after the end, or if only the world outside can go on."""
+        if self.outcome is not None:
+            return []
+        found = self.working_moves()
+        if found:
+            if self.ends_beside_sources(found):
+                found = [*found, Move("finish", outcome="done")]
+            return found
+        return self.quiet_moves()
+
+    def working_moves(self) -> list[Move]:
+        """Firings, calls, and what goes on in those under way."""
+        found = []
+        for owner in [ROOT, *(-2 - box.index for box in self.structure.boxes)]:
+            line = self.next_call(owner)
+            if line is not None and not self.full_lines(owner):
+                found.append(Move("call", self.path_of(owner), line.edge.label))
+        for index, station in enumerate(self.stations):
+            flight = station.flight
+            if flight is not None:
+                if self.can_go_on(flight):
+                    found.append(Move("go on", station.path))
+                limit = station.leaf.options.max_duration_s
+                if limit is not None and flight.what == "firing" and flight.task is not None and self.now >= flight.began + limit:
+                    found.append(Move("time out", station.path))
+                continue
+            move = self.next_of(index)
+            if move is not None:
+                found.append(move)
+        return found
+
+    def next_of(self, index: int) -> Move | None:
+        """F9: of a node's calls and its firing, the one with the oldest place."""
+        station = self.stations[index]
+        line = self.next_call(index)
+        held = bool(self.full_lines(index)) or station.resting_until is not None
+        if line is not None and (station.place is None or line.queue[0].place < station.place):
+            return None if held else Move("call", station.path, line.edge.label)
+        if station.place is not None and self.may_fire(index):
+            return Move("fire", station.path)
+        return None
+
+    def quiet_moves(self) -> list[Move]:
+        """What follows when nothing runs and nothing can start."""
+        due = self.next_timer()
+        if due is not None:
+            if self.until_s is not None and due > self.until_s:
+                return [Move("finish", outcome="until", time=self.until_s)]
+            return [Move("wait", time=due)]
+        line = self.queue_to_grow()
+        if line is not None:
+            return [Move("grow", edge=line.edge.label)]
+        if any(station.flight is not None for station in self.stations) or self.held_open:
+            return []
+        if any(line.operators is not None and not line.completed for line in self.lines):
+            return [Move("complete")]
+        if self.events_to_end():
+            return [Move("end events")]
+        return [Move("finish", outcome="stalled" if self.stalled() else "done")]
+
+    def next_timer(self) -> float | None:
+        """The next moment at which something could start: rate, gate, back-off, time-out with a connected event, operators, waiting code."""
+        times = [] if (due := self.loop.next_time()) is None else [due]
+        for index, station in enumerate(self.stations):
+            flight, options = station.flight, station.leaf.options
+            if flight is not None and flight.what == "firing" and options.max_duration_s is not None and flight.task is not None:
+                times.append(flight.began + options.max_duration_s)
+            if station.resting_until is not None:
+                times.append(station.resting_until)
+            if flight is None and station.place is None and self.may_fire(index, ignore="timers"):
+                times += [station.hold_until] if station.hold_until > self.now else []
+                times += [station.last_function + 1 / rate for rate in self.gates_of(index) if rate and self.is_resting(index)]
+            if options.active_for_s is not None and station.active_since is not None and self.lines_from(index, "event", "timeout"):
+                times.append(station.active_since + options.active_for_s)
+        for box in self.structure.boxes:
+            since, limit = self.box_since[box.index], box.options.active_for_s
+            if since is not None and limit is not None and self.lines_from(-2 - box.index, "event", "timeout"):
+                times.append(since + limit)
+        for line in self.lines:
+            if line.operators is not None and (due := line.operators.due()) is not None:
+                times.append(max(due, self.now))
+        return min(times, default=None)
+
+    def queue_to_grow(self) -> Line | None:
+        """F8: if only full queues hold nodes back, the smallest of those queues."""
+        full: list[Line] = []
+        for index, station in enumerate(self.stations):
+            waits = station.flight is not None and station.flight.waiting_for
+            held = station.flight is None and (self.may_fire(index, ignore="queues") or self.next_call(index) is not None)
+            if waits or (held and station.resting_until is None):
+                full += self.full_lines(index)
+        for box in self.structure.boxes:
+            if self.next_call(-2 - box.index) is not None:
+                full += self.full_lines(-2 - box.index)
+        return min(full, key=lambda line: (line.capacity, line.edge.index), default=None)
+
+    def events_to_end(self) -> list[Line]:
+        """F13: live event edges into inputs whose queues are empty, once an edge."""
+        return [
+            line
+            for line in self.lines
+            if line.edge.is_event and line.edge.target.kind == "input" and self.is_live(line) and not line.queue and not line.given_end
+        ]
+
+    def stalled(self) -> list[str]:
+        """R5: sources that have not ended and are blocked, and edges with tokens that can never be taken."""
+        found = []
+        for index, station in enumerate(self.stations):
+            resting = self.is_suspended_source(index) or self.is_resting(index)
+            if station.type.is_source and self.is_enabled(index) and not station.ended and not resting and not self.is_moot(index):
+                found.append(station.path)
+        return found + [line.edge.label for line in self.lines if line.queue]
+
+    def is_moot(self, index: int) -> bool:
+        """R5: a source with edges only into ended nodes."""
+        lines = [line for line in self.lines if line.edge.source.owner == index]
+        targets = {line.edge.target.owner for line in lines}
+        return bool(lines) and all(target >= 0 and self.stations[target].ended for target in targets)
+
+    def ends_beside_sources(self, working: list[Move]) -> bool:
+        """R5: each source has ended, is disabled, or works for ended nodes only, and everything else is quiet."""
+        moot = {station.path for index, station in enumerate(self.stations) if station.type.is_source and self.is_moot(index)}
+        if not moot or any(move.node not in moot for move in working) or self.held_open:
+            return False
+        others = [s for i, s in enumerate(self.stations) if s.type.is_source and self.is_enabled(i) and not s.ended and s.path not in moot]
+        return not others
+
+    # --- what happens
+
+    def apply(self, move: Move) -> list[TraceEvent]:
+        """Take a permitted move and give what is seen of it."""
+        mark = len(self.observed)
+        index = self.paths.get(move.node, ROOT)
+        match move.kind:
+            case "fire":
+                self.start_firing(index)
+            case "call":
+                self.start_call(index, self.labels[move.edge])
+            case "go on":
+                flight = self.stations[index].flight
+                assert flight is not None
+                self.go_on(flight)
+                self.settle()
+            case "time out":
+                flight = self.stations[index].flight
+                assert flight is not None
+                self.time_out(flight)
+                self.settle()
+            case "wait":
+                self.wait_until(move.time)
+            case "grow":
+                self.grow(self.labels[move.edge])
+            case "complete":
+                self.complete_all()
+            case "end events":
+                self.end_events()
+            case "finish":
+                self.now = move.time or self.now
+                self.finish(move.outcome)
+        return self.observed_since(mark)
+
+    def wait_until(self, time: float) -> None:
+        """Let time go on; what is due then becomes possible or happens."""
+        self.now = max(self.now, time)
+        self.loop.ring()
+        for line in self.lines:
+            if line.operators is not None:
+                line.operators.advance(self.now)
+        for station in self.stations:
+            if station.resting_until is not None and self.now >= station.resting_until:
+                self.restart(station)
+            limit = station.leaf.options.active_for_s
+            if limit is not None and station.active_since is not None and self.now >= station.active_since + limit:
+                self.time_activity_out(station)
+        for box in self.structure.boxes:
+            since, limit = self.box_since[box.index], box.options.active_for_s
+            if since is not None and limit is not None and self.now >= since + limit:
+                self.box_since[box.index] = None
+                self.trigger(-2 - box.index, "timeout")
+        self.settle()
+
+    def time_activity_out(self, station: Station) -> None:
+        """A12: once for each unbroken activity; it takes the right of A3 away."""
+        station.active_since = None
+        if station.flight is not None:
+            station.flight.right = False
+        self.trigger(station.leaf.index, "timeout")
+
+    def grow(self, line: Line) -> None:
+        """F8: one more place, unless the limit forbids it."""
+        limit = line.edge.capacity_limit
+        if limit is not None and line.capacity >= limit:
+            self.fail_run(QueueLimit(f'the queue of "{line.edge.label}" would grow over its limit of {limit}'))
+            return
+        line.capacity += 1
+        self.observe(QueueGrown(self.now, line.edge.label, line.capacity))
+        self.settle()
+
+    def complete_all(self) -> None:
+        """P9: all events complete before the run ends."""
+        for line in self.lines:
+            if line.operators is not None and not line.completed:
+                line.completed = True
+                line.operators.complete()
+        self.settle()
+
+    def end_events(self) -> None:
+        """F13: END on all of them at the same moment."""
+        for line in self.events_to_end():
+            line.given_end = True
+            self.enqueue(line, Token(END, 0, self.now), line.edge.source.owner)
+        self.settle()
+
+    def finish(self, outcome: str) -> None:
+        """End the run; what is left is dropped."""
+        if self.outcome is not None:
+            return
+        self.outcome = outcome
+        if outcome == "stalled":
+            self.error = Stalled(f"nothing can move any more: {', '.join(self.stalled())}")
+        for line in self.lines:
+            for lying in line.queue:
+                self.observe(TokenDropped(self.now, line.edge.label, lying.token, "stopped"))
+        self.observe(RunEnded(self.now, outcome))
+        for station in self.stations:
+            if station.flight is not None:
+                self.abandon(station.flight)
+
+    def fail_run(self, error: BaseException, outcome: str = "failed") -> None:
+        """End the run in failure."""
+        if self.outcome is None:
+            self.error = error
+            self.finish(outcome)
+
+    # --- what the world outside may do
+
+    def set_from_outside(self, path: str, parameter: str, value: Any) -> None:
+        """Set a parameter between firings."""
+        self.set_parameter(self.stations[self.paths[path]], parameter, value)
+        self.settle()
+
+    def trigger_from_outside(self, path: str, event: str, value: Any = None, activity: int | None = None) -> None:
+        """Trigger an event as its node would, with the time as stamp."""
+        self.trigger(self.paths[path], event, value, activity)
+        self.settle()
+
+    def reset_activity(self) -> None:
+        """A14: all A(v) := 0, modifiers on edges := 0, the right of A3 ends, then `start` is triggered."""
+        for line in self.lines:
+            for lying in line.queue:
+                lying.token = Token(lying.token.value, 0, lying.token.stamp, lying.token.sequence)
+        for station in self.stations:
+            station.drained_modifiers = [0 for _ in station.drained_modifiers]
+            if station.flight is not None:
+                station.flight.right = False
+            if station.active:
+                station.active = station.node._active = False
+                station.active_since = None
+                station.changes.append("deactivated")
+                self.observe(ActivityChanged(self.now, station.path, False, "reset"))
+        self.settle()
+        self.trigger(ROOT, "start", activity=1)
+        self.settle()

@@ -1,0 +1,104 @@
+"""Reactivex operators on an edge (rule P9), in the time of whoever holds the machine.
+
+Tokens are pushed in, what comes out is given on as tokens; timers of operators wait until `advance`. Stands on reactivex and tokens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+from typing import Any
+
+from reactivex.disposable import Disposable, SingleAssignmentDisposable
+from reactivex.scheduler.scheduler import Scheduler
+from reactivex.subject import Subject
+
+from hfg.token import Token
+
+__all__ = ["Operators"]
+
+
+class _Clock(Scheduler):
+    """A scheduler whose time is told to it; what is scheduled waits in a list."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seconds = 0.0
+        self._waiting: list[tuple[float, int, Any, Any, SingleAssignmentDisposable]] = []
+        self._count = 0
+
+    @property
+    def now(self) -> datetime:
+        """The machine's time, as reactivex wants it."""
+        return self.to_datetime(self.seconds)
+
+    def schedule(self, action: Any, state: Any = None) -> Any:
+        """Do it at the next occasion."""
+        return self._at(self.seconds, action, state)
+
+    def schedule_relative(self, duetime: Any, action: Any, state: Any = None) -> Any:
+        """Do it later."""
+        return self._at(self.seconds + max(0.0, self.to_seconds(duetime)), action, state)
+
+    def schedule_absolute(self, duetime: Any, action: Any, state: Any = None) -> Any:
+        """Do it at a moment."""
+        return self._at(max(self.seconds, self.to_seconds(duetime)), action, state)
+
+    def _at(self, seconds: float, action: Any, state: Any) -> Any:
+        disposable = SingleAssignmentDisposable()
+        self._count += 1
+        self._waiting.append((seconds, self._count, action, state, disposable))
+        return disposable
+
+    def due(self) -> float | None:
+        """Seconds of the next action that was not disposed of."""
+        self._waiting = [entry for entry in self._waiting if not entry[4].is_disposed]
+        return min((entry[0] for entry in self._waiting), default=None)
+
+    def advance(self, seconds: float) -> None:
+        """Do everything that is due until then, in order of time."""
+        while (due := self.due()) is not None and due <= seconds:
+            entry = min(self._waiting, key=lambda one: one[:2])
+            self._waiting.remove(entry)
+            self.seconds = max(self.seconds, entry[0])
+            entry[4].disposable = entry[2](self, entry[3]) or Disposable()
+        self.seconds = max(self.seconds, seconds)
+
+
+class Operators:
+    """One edge's chain of operators; `give` gets every token that comes out."""
+
+    def __init__(self, operators: tuple[Any, ...], give: Callable[[Token[Any]], None]) -> None:
+        self._clock = _Clock()
+        self._subject: Subject[Token[Any]] = Subject()
+        self._give = give
+        self._newest: float | None = None
+        self.error: Exception | None = None
+        self._subject.pipe(*operators).subscribe(self._out, on_error=self._failed, scheduler=self._clock)
+
+    def push(self, token: Token[Any]) -> None:
+        """Put a signal in."""
+        self._newest = token.stamp if self._newest is None else max(self._newest, token.stamp)
+        self._subject.on_next(token)
+
+    def complete(self) -> None:
+        """Let them give out what they hold."""
+        self._subject.on_completed()
+
+    def due(self) -> float | None:
+        """When something will happen by itself."""
+        return self._clock.due()
+
+    def advance(self, now: float) -> None:
+        """Let the time be `now`."""
+        self._clock.advance(now)
+
+    def _out(self, value: Any) -> None:
+        if isinstance(value, Token):
+            self._give(Token(value.value, 0, value.stamp))
+        else:
+            self._give(Token(value, 0, self._clock.seconds if self._newest is None else self._newest))
+
+    def _failed(self, error: Exception) -> None:
+        self.error = error
+

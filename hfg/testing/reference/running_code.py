@@ -1,0 +1,160 @@
+"""How a machine runs the code of nodes: at once on the loop, in steps where it waits, out of sight in a thread (rules F3, R1, X2).
+
+A `Flight` is a firing or call under way. What its code writes is kept in it; what it triggers leaves at once, or from a thread when the machine delivers it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from hfg.clock import current_clock
+from hfg.errors import UsageError
+from hfg.testing.reference.sending import Sending
+from hfg.testing.reference.state import Flight, Station
+
+__all__ = ["RunningCode"]
+
+
+class RunningCode(Sending):
+    """A machine that can run functions, coroutines and iterators of nodes."""
+
+    def connect_ports(self) -> None:
+        """Let the ports of all nodes speak to this machine."""
+        for station in self.stations:
+            if station.leaf.inside is not None:
+                continue
+            for name in station.type.outputs:
+                station.node.ports.outputs[name]._emit = self._writer(station, name)
+            for name in station.type.events:
+                port = station.node.ports.events[name]
+                port._emit = self._trigger_of(station, name)
+                port._emit_wait = self._waiting_trigger_of(station, name)
+
+    def _writer(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], None]:
+        def write(value: Any, activity: int | None, stamp: float | None) -> None:
+            flight = station.flight
+            if flight is None or flight.what != "firing":
+                raise UsageError(f'"{station.path}.{name}" is written outside a firing')
+            if name in flight.writes:
+                raise UsageError(f'"{station.path}.{name}" is written twice in one firing')
+            flight.writes[name] = (value, activity, stamp)
+
+        return write
+
+    def _trigger_of(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], None]:
+        def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
+            flight = station.flight
+            if flight is not None and flight.in_thread:
+                flight.signals.append((name, value, activity, stamp))
+            else:
+                self.trigger(station.leaf.index, name, value, activity, stamp, flight)
+
+        return trigger
+
+    def _waiting_trigger_of(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], Any]:
+        async def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
+            self.trigger(station.leaf.index, name, value, activity, stamp, station.flight)
+            flight = station.flight
+            while flight is not None and self.has_no_room(station, name):
+                flight.waiting_for = name
+                await asyncio.sleep(0)
+            if flight is not None:
+                flight.waiting_for = ""
+
+        return trigger
+
+    def has_no_room(self, station: Station, name: str) -> bool:
+        """Whether a queue behind the event is full (F8)."""
+        return any(line.edge.source.name == name for line in self.full_lines(station.leaf.index))
+
+    @contextmanager
+    def amid_code(self) -> Iterator[None]:
+        """Run user code: in the machine's time and on its loop."""
+        reset = current_clock.set(lambda: self.now)
+        try:
+            with self.loop.entered():
+                yield
+        finally:
+            current_clock.reset(reset)
+
+    def launch(self, flight: Flight, function: Callable[[], Any], then: Callable[[Any, BaseException | None], None]) -> None:
+        """Run `function`; `then` gets its result or error, now or when the flight has been carried on to its end."""
+        flight.then = then
+        flight.began = self.now
+        try:
+            with self.amid_code():
+                result = function()
+        except Exception as error:  # noqa: BLE001 - whatever a node raises is judged by X1
+            result, failure = None, error
+        else:
+            failure = None
+        if inspect.iscoroutine(result):
+            with self.amid_code():
+                flight.task = self.loop.start(flight, result)
+        elif flight.in_thread:
+            flight.result, flight.error = result, failure
+        else:
+            self.land(flight, result, failure)
+
+    def land(self, flight: Flight, result: Any, error: BaseException | None) -> None:
+        """Hand over what came out."""
+        then, flight.then = flight.then, None
+        assert then is not None
+        then(result, error)
+
+    def can_go_on(self, flight: Flight) -> bool:
+        """Whether something of the flight can happen without time going by."""
+        if flight.task is None:
+            return flight.in_thread
+        if flight.waiting_for and self.has_no_room(flight.station, flight.waiting_for):
+            return False
+        return self.loop.can_step(flight)
+
+    def go_on(self, flight: Flight) -> None:
+        """Carry the flight on by one step: a signal from its thread, a step of its coroutine, or its end."""
+        if flight.task is None:
+            if flight.signals:
+                name, value, activity, stamp = flight.signals.pop(0)
+                self.trigger(flight.station.leaf.index, name, value, activity, stamp, flight)
+            else:
+                flight.in_thread = False
+                self.land(flight, flight.result, flight.error)
+            return
+        reset = current_clock.set(lambda: self.now)
+        try:
+            self.loop.step(flight)
+        finally:
+            current_clock.reset(reset)
+        if flight.task.done() and flight.then is not None:
+            task: asyncio.Task[Any] = flight.task
+            error = asyncio.CancelledError() if task.cancelled() else task.exception()
+            self.land(flight, None if error is not None else task.result(), error)
+
+    def abandon(self, flight: Flight) -> None:
+        """Stop caring for what it still does (X2)."""
+        flight.then = None
+        flight.in_thread = False
+        if flight.task is not None:
+            flight.task.cancel()
+            with self.loop.entered():
+                while self.loop.step(flight):
+                    pass
+        self.loop.forget(flight)
+
+    def run_hook(self, station: Station, hook: Any) -> None:
+        """Run a hook to its end; the reference cannot wait in one."""
+        owner = object()
+        with self.amid_code():
+            result = hook()
+            if not inspect.iscoroutine(result):
+                return
+            task = self.loop.start(owner, result)
+        while not task.done():
+            if not self.loop.step(owner):
+                self.loop.forget(owner)
+                raise NotImplementedError(f'a hook of "{station.path}" waits for time to go by, which the reference does not do')
+        task.result()

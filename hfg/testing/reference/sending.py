@@ -1,0 +1,323 @@
+"""What happens to tokens that leave, and to activity with them (rules T1-T5, P5, F3, F12, A3-A9).
+
+One sending is all edges of one output set, or of one trigger. It is put in full before anything follows from it; what follows (automatic events, tokens that
+are processed at once, outputs that become free) is done by `settle` until nothing changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Literal
+
+from hfg.errors import QueueOverflow
+from hfg.testing.reference.operators import Operators
+from hfg.testing.reference.state import Flight, Line, Lying, State, Station
+from hfg.testing.reference.structure import ROOT
+from hfg.token import END, NO_MESSAGE, Token
+from hfg.trace import (
+    ActivityChanged,
+    ActivityLost,
+    EventTriggered,
+    NodeEnded,
+    TokenDrained,
+    TokenDropped,
+    TokenProcessed,
+    TokenSent,
+    TraceEvent,
+)
+
+__all__ = ["Sending", "Shipment"]
+
+Shipment = tuple[Line, Any, int | None, float]
+"""One token to be put: where, its value or marker, its explicit modifier if any, its stamp."""
+
+Cause = Literal["token", "sent", "slot", "reset", "returned"]
+
+
+class Sending(State):
+    """A state whose tokens move."""
+
+    def observe(self, event: TraceEvent) -> None:
+        """Write down what an observer sees."""
+        self.observed.append(event)
+
+    def next_tick(self) -> int:
+        """Number the moments, for the order of F9."""
+        self.tick += 1
+        return self.tick
+
+    # --- one sending
+
+    def send(self, sender: int, shipments: Iterable[Shipment], flight: Flight | None = None) -> None:
+        """Put all tokens of one sending, slots first; then A(sender) follows (A3, A5)."""
+        ordered = sorted(shipments, key=lambda shipment: shipment[0].edge.target.kind != "slot")
+        gives = self.is_active(sender) or (flight is not None and flight.right)
+        gave = False
+        for line, value, explicit, stamp in ordered:
+            if not self.is_live(line):
+                continue
+            modifier = 0
+            if line.edge.active and value is not NO_MESSAGE:
+                if explicit is not None:
+                    modifier = explicit  # A4
+                elif gives:
+                    modifier, gave = 1, True  # A3
+            self.put(line, Token(value, modifier, stamp), sender)
+        if gave:
+            self.take_activity(sender, flight)
+        self.settle()
+
+    def take_activity(self, sender: int, flight: Flight | None) -> None:
+        """A5, and for a subgraph: activity that leaves by its events is taken from everything inside (G2)."""
+        if sender >= 0:
+            if self.stations[sender].active and flight is not None:
+                flight.right = True
+            self.set_active(sender, False, "sent")
+        elif sender < ROOT:
+            self.quench(-2 - sender, "sent")
+
+    def quench(self, box: int, cause: Cause) -> None:
+        """Take the activity from everything inside a subgraph, tokens on their way included."""
+        for line in self.lines_inside(box):
+            for lying in line.queue:
+                if lying.token.activity == 1:
+                    lying.token = _with(lying.token, activity=0)
+        for member in self.structure.boxes[box].members:
+            flight = self.stations[member].flight
+            if flight is not None:
+                flight.right = False
+            self.set_active(member, False, cause)
+
+    def put(self, line: Line, token: Token[Any], sender: int) -> None:
+        """Put one token on an edge, or hand it to the operators in front of its queue."""
+        if line.operators is not None:
+            if not line.completed:
+                line.operators.push(_with(token, activity=0))
+            return
+        self.enqueue(line, token, sender)
+
+    def enqueue(self, line: Line, token: Token[Any], sender: int) -> None:
+        """Give the token its number and its place in the queue; a full queue follows its policy (P5)."""
+        line.sequence += 1
+        token = _with(token, sequence=line.sequence)
+        policy = line.edge.overflow
+        full = line.edge.is_event and len(line.queue) >= line.capacity
+        if full and policy in ("drop_oldest", "latest"):
+            self.observe(TokenDropped(self.now, line.edge.label, line.queue.pop(0).token, "overflow"))
+        self.observe(TokenSent(self.now, line.edge.label, token))
+        if full and policy in ("drop_newest", "error"):  # "error": only what operators give out, for nobody triggers it
+            self.observe(TokenDropped(self.now, line.edge.label, token, "overflow"))
+            return
+        line.queue.append(Lying(token, self.next_tick(), sender))
+        if not line.edge.is_event and line.delay and len(line.queue) <= line.delay:
+            self.observe(TokenProcessed(self.now, line.edge.label))  # P7: a delay ends the wave
+
+    # --- events
+
+    def trigger(
+        self,
+        owner: int,
+        name: str,
+        value: Any = None,
+        activity: int | None = None,
+        stamp: float | None = None,
+        flight: Flight | None = None,
+    ) -> None:
+        """Trigger an event: one sending of its own.
+
+        Raises:
+          QueueOverflow: an edge with policy "error" is full; nothing was sent.
+        """
+        if isinstance(value, Token):  # A4: a token passed on keeps its modifier and stamp
+            activity = value.activity if activity is None else activity
+            stamp = value.stamp if stamp is None else stamp
+            value = value.value
+        if stamp is None:
+            stamp = self.now if flight is None else flight.stamp
+        lines = self.lines_from(owner, "event", name)
+        for line in lines:
+            if line.edge.overflow == "error" and self.is_live(line) and line.operators is None and len(line.queue) >= line.capacity:
+                raise QueueOverflow(f'"{line.edge.label}" holds {line.capacity} signals and takes no more')
+        if lines or not self.is_automatic(owner, name):
+            path = self.event_path(owner, name)
+            self.observe(EventTriggered(self.now, path, Token(value, activity or 0, stamp)))
+        self.send(owner, [(line, value, activity, stamp) for line in lines], flight)
+
+    def is_automatic(self, owner: int, name: str) -> bool:
+        """Whether nobody declared the event (A9)."""
+        return owner < ROOT or (owner >= 0 and name not in self.stations[owner].type.events)
+
+    def event_path(self, owner: int, name: str) -> str:
+        """The event's path."""
+        if owner == ROOT:
+            return name
+        return f"{self.stations[owner].path if owner >= 0 else self.structure.boxes[-2 - owner].path}.{name}"
+
+    # --- activity
+
+    def set_active(self, owner: int, active: bool, cause: Cause) -> None:
+        """Change A(v), which is seen, restarts its time-out (A12), is told to its code and raises an automatic event (A9)."""
+        station = self.stations[owner]
+        if station.active == active:
+            return
+        station.active = station.node._active = active
+        station.active_since = self.now if active else None
+        self.observe(ActivityChanged(self.now, station.path, active, cause))
+        station.changes.append("activated" if active else "deactivated")
+        hook = station.node._hook("on_activated" if active else "on_deactivated")
+        if hook is not None:
+            self.run_hook(station, hook)
+
+    def run_hook(self, station: Station, hook: Any) -> None:
+        """Run a hook to its end."""
+        raise NotImplementedError
+
+    def receive_activity(self, owner: int, modifiers: list[int]) -> None:
+        """A6: the tokens of one firing together; only the net change counts."""
+        if owner < 0:
+            return
+        active = self.stations[owner].active
+        if -1 in modifiers:
+            active = False
+        if 1 in modifiers:
+            active = True
+        self.set_active(owner, active, "token")
+
+    def flush_changes(self, station: Station) -> None:
+        """Send the automatic events that arose, each a sending of its own that carries +1 only if the node is active at that moment (D3)."""
+        while station.changes:
+            self.trigger(station.leaf.index, station.changes.pop(0))
+
+    # --- discarding
+
+    def discard(self, line: Line, lying: Lying, reason: Literal["overflow", "disabled", "ended", "removed", "stopped"]) -> None:
+        """Throw a token away; activity on it goes back to its sender (A8)."""
+        line.queue.remove(lying)
+        self.observe(TokenDropped(self.now, line.edge.label, lying.token, reason))
+        if lying.token.activity == 1 and reason == "disabled":
+            if lying.sender >= 0:
+                self.set_active(lying.sender, True, "returned")
+            else:
+                self.lost_activity += 1
+                self.observe(ActivityLost(self.now, line.edge.label))
+
+    # --- what follows by itself
+
+    def settle(self) -> None:
+        """Do what rules want "at once", until nothing changes; then see who is enabled now."""
+        while self.drain_once() or self.release_once() or self.end_once() or self.flush_once():
+            pass
+        self.note_places()
+
+    def drain_once(self) -> bool:
+        """Markers into slots, and tokens for nodes that are ending, are processed at once (T4, F12)."""
+        for line in self.lines:
+            target = line.edge.target
+            if not line.queue or target.owner == ROOT:
+                continue
+            marker = target.kind in ("slot", "parameter") and line in self.lines_called(target.owner) and line.queue[0].token.is_marker
+            ended = target.owner >= 0 and self.stations[target.owner].ending and line in self.lines_joined(target.owner)
+            if not marker and not ended:
+                continue
+            token = line.queue.pop(0).token
+            self.observe(TokenDrained(self.now, line.edge.label, token))
+            self.note_processed(line)
+            if ended and not self.stations[target.owner].ended:
+                self.stations[target.owner].drained_modifiers.append(token.activity)
+            else:
+                self.receive_activity(target.owner, [token.activity])
+            return True
+        return False
+
+    def note_processed(self, line: Line) -> None:
+        """Say that a synchronous edge is free again, once a token was taken from it."""
+        if line.edge.is_event:
+            return
+        if not line.delay or len(line.queue) == line.delay:
+            self.observe(TokenProcessed(self.now, line.edge.label))
+
+    def release_once(self) -> bool:
+        """What a sequential firing took is processed when what it put is (F5)."""
+        for station in self.stations:
+            if station.owed and self.outputs_are_free(station.leaf.index) and not (station.ending and not station.ended):
+                owed, station.owed = station.owed, []
+                for line in owed:
+                    self.process(line)
+                return True
+        return False
+
+    def process(self, line: Line) -> None:
+        """Count one taken token as processed."""
+        if not line.delay:
+            line.unprocessed -= 1
+            self.observe(TokenProcessed(self.now, line.edge.label))
+
+    def end_once(self) -> bool:
+        """END follows on all outputs as soon as they are free (F4, D5); then drained modifiers act (F12)."""
+        for station in self.stations:
+            index = station.leaf.index
+            if station.ending and not station.ended and station.flight is None and self.outputs_are_free(index):
+                station.ended = True
+                lines = [line for line in self.in_order_of_outputs(station)]
+                self.send(index, [(line, END, None, station.stamp) for line in lines])
+                self.observe(NodeEnded(self.now, station.path))
+                self.complete_operators(station)
+                waiting, station.drained_modifiers = station.drained_modifiers, []
+                for modifier in waiting:
+                    self.receive_activity(index, [modifier])
+                return True
+        return False
+
+    def complete_operators(self, station: Station) -> None:
+        """P9: when the event's node has ended, the event completes."""
+        for line in self.lines:
+            if line.edge.source.owner == station.leaf.index and line.operators is not None and not line.completed:
+                line.completed = True
+                line.operators.complete()
+
+    def in_order_of_outputs(self, station: Station) -> list[Line]:
+        """The synchronous edges of a node: outputs in order of declaration, then parameters, each in order of connecting."""
+        order = [("output", name) for name in station.type.outputs] + [("parameter", name) for name in station.type.parameters]
+        return [line for kind, name in order for line in self.lines_from(station.leaf.index, kind, name)]
+
+    def flush_once(self) -> bool:
+        """Automatic events of changes outside a firing or call; then those of subgraphs (G2)."""
+        for station in self.stations:
+            if station.changes and station.flight is None:
+                self.trigger(station.leaf.index, station.changes.pop(0))
+                return True
+        for box in self.structure.boxes:
+            active = self.is_active(-2 - box.index)
+            if active != self.box_active[box.index] and not self.is_amid(box.index):
+                self.box_active[box.index] = active
+                self.box_since[box.index] = self.now if active else None
+                self.trigger(-2 - box.index, "activated" if active else "deactivated")
+                return True
+        return False
+
+    def is_amid(self, box: int) -> bool:
+        """Whether a node inside is amid a step of its own, so that the subgraph's activity is not looked at yet."""
+        return False
+
+    def note_places(self) -> None:
+        """Give a place to each node that has become enabled for a firing, and take it from those that are not any more (F9, D1)."""
+        for station in self.stations:
+            if not self.may_fire(station.leaf.index):
+                station.place = None
+            elif station.place is None:
+                station.place = self.next_tick()
+
+    def make_operators(self) -> None:
+        """Put the operators of P9 in front of their queues."""
+        for line in self.lines:
+            if line.edge.through:
+                line.operators = Operators(line.edge.through, lambda token, line=line: self.enqueue(line, token, line.edge.source.owner))
+
+
+def _with(token: Token[Any], *, activity: int | None = None, sequence: int | None = None) -> Token[Any]:
+    return Token(
+        token.value,
+        token.activity if activity is None else activity,
+        token.stamp,
+        token.sequence if sequence is None else sequence,
+    )

@@ -1,0 +1,329 @@
+"""The state of a reference machine: what lies on each edge, what each node is doing, and what has been observed.
+
+Nothing is clever here: token lists are lists, flags are flags. `State` answers the questions that the rules ask about one moment (is the edge live, is the
+output free, may the node fire) and changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from hfg.errors import EndOfStream
+from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, dissolve
+from hfg.testing.reference.waiting import HandTurnedLoop
+from hfg.token import END, NO_MESSAGE, Token
+from hfg.trace import TraceEvent
+
+__all__ = ["Flight", "Line", "Lying", "State", "Station"]
+
+
+@dataclass
+class Lying:
+    """A token on its edge; `place` orders what a node has to do (F9), `sender` gets activity back (A8)."""
+
+    token: Token[Any]
+    place: int
+    sender: int
+
+
+@dataclass
+class Line:
+    """An edge and what lies on it."""
+
+    edge: Edge
+    capacity: int
+    queue: list[Lying] = field(default_factory=list)  # untaken
+    unprocessed: int = 0  # taken, but the producer still waits for it
+    sequence: int = 0
+    ended: bool = False  # END was taken: an optional input is absent from now on (F4)
+    given_end: bool = False  # by F13, once
+    operators: Any = None  # the run's end of what lies between event and queue (P9)
+    completed: bool = False
+
+    @property
+    def delay(self) -> int:
+        """How many initial tokens it began with; they make a delay of a synchronous edge (P7)."""
+        return len(self.edge.initial)
+
+
+@dataclass(eq=False)
+class Flight:
+    """A firing or slot call under way. `signals`: triggered in a thread, not at the loop yet."""
+
+    station: Station
+    what: Literal["firing", "call"]
+    number: int
+    kind: str
+    stamp: float
+    taken: list[Line] = field(default_factory=list)
+    began: float = 0.0
+    writes: dict[str, tuple[Any, int | None, float | None]] = field(default_factory=dict)
+    right: bool = False  # the right of A3: activity left earlier in this firing or call
+    in_thread: bool = False
+    signals: list[tuple[str, Any, int | None, float | None]] = field(default_factory=list)
+    task: Any = None
+    then: Callable[[Any, BaseException | None], None] | None = None  # what happens with the result
+    result: Any = None
+    error: BaseException | None = None
+    waiting_for: str = ""  # an event whose queues have no room (trigger_wait)
+    void: bool = False  # the node was disabled meanwhile: outputs go nowhere (F10)
+    slot: str = ""
+    line: Line | None = None  # the edge a slot call took its token from
+
+
+@dataclass(eq=False)
+class Station:
+    """A node in the machine: a fresh copy that does the work, and what the rules keep of it."""
+
+    leaf: Leaf
+    node: Any
+    active: bool = False
+    enabled: bool = True
+    ending: bool = False  # `end()` has been called; END is due
+    ended: bool = False
+    flight: Flight | None = None
+    place: int | None = None  # since when it is enabled for a firing (F9)
+    firings: int = 0
+    calls: int = 0
+    owed: list[Line] = field(default_factory=list)  # taken by the last firing, processed when the outputs are (F5)
+    hold_until: float = float("-inf")  # F11
+    last_function: float = float("-inf")  # for the idle rate of a gate
+    resting_until: float | None = None  # the back-off of a restart
+    restarts: int = 0
+    iterator: Any = None
+    changes: list[str] = field(default_factory=list)  # automatic events that arose and were not sent yet
+    active_since: float | None = None  # None: not active, or its time-out is over
+    drained_modifiers: list[int] = field(default_factory=list)  # wait until the own END is sent (F12)
+    stamp: float = 0.0  # of the firing in which it ended
+    set_up: bool = False
+    stops_itself: bool = False  # `ready` raised EndOfStream
+
+    @property
+    def path(self) -> str:
+        """The node's path."""
+        return self.leaf.path
+
+    @property
+    def type(self) -> Any:
+        """What is known of its type."""
+        return self.node._type
+
+
+class State:
+    """One moment of a run, and what can be asked about it."""
+
+    def __init__(self, graph: Any, *, structure: Structure | None = None) -> None:
+        self.structure = dissolve(graph) if structure is None else structure
+        self.graph = graph
+        self.now = 0.0
+        self.tick = 0
+        self.stations = [Station(leaf, _fresh(leaf)) for leaf in self.structure.leaves]
+        self.lines = [Line(edge, edge.capacity) for edge in self.structure.edges]
+        self.box_enabled = [bool(box.options.enabled) for box in self.structure.boxes]
+        self.box_active = [False] * len(self.structure.boxes)
+        self.box_since: list[float | None] = [None] * len(self.structure.boxes)
+        self.box_calls: dict[int, int] = {}
+        self.loop = HandTurnedLoop(lambda: self.now)
+        self.held_open = False
+        self.readers: set[str] = set()
+        self.outcome: str | None = None
+        self.error: BaseException | None = None
+        self.observed: list[TraceEvent] = []
+        self.lost_activity = 0
+        for station in self.stations:
+            station.enabled = bool(station.leaf.options.enabled)
+
+    # --- edges
+
+    def lines_from(self, owner: int, kind: str, name: str) -> list[Line]:
+        """Edges of one source, in order of connecting."""
+        return [line for line in self.lines if tuple(line.edge.source) == (owner, kind, name)]
+
+    def lines_out(self, owner: int) -> list[Line]:
+        """Synchronous edges out of a node: they belong to its outputs."""
+        return [line for line in self.lines if line.edge.source.owner == owner and not line.edge.is_event]
+
+    def lines_joined(self, owner: int) -> list[Line]:
+        """Edges that a firing of the node takes from; a signal into a parameter takes no part (P8)."""
+        return [
+            line
+            for line in self.lines
+            if line.edge.target.owner == owner
+            and (line.edge.target.kind == "input" or (line.edge.target.kind == "parameter" and not line.edge.is_event))
+        ]
+
+    def lines_called(self, owner: int) -> list[Line]:
+        """Edges whose tokens are worked on one by one: into slots, and signals into parameters."""
+        return [
+            line
+            for line in self.lines
+            if line.edge.target.owner == owner
+            and (line.edge.target.kind == "slot" or (line.edge.target.kind == "parameter" and line.edge.is_event))
+        ]
+
+    def is_live(self, line: Line) -> bool:
+        """A live edge: both ends are enabled, or the target port is an `enable` slot."""
+        source, target = line.edge.source, line.edge.target
+        if source.owner != ROOT and not self.is_enabled(source.owner):
+            return False
+        if any(not self._box_open(box) for box in line.edge.via):
+            return target.kind == "slot" and target.name == "enable"
+        if target.owner == ROOT or (target.kind == "slot" and target.name == "enable"):
+            return True
+        return self.is_enabled(target.owner)
+
+    def is_enabled(self, owner: int) -> bool:
+        """A node is enabled if it and all subgraphs around it are."""
+        if owner == ROOT:
+            return True
+        if owner < ROOT:
+            return self._box_open(-2 - owner)
+        station = self.stations[owner]
+        return station.enabled and all(self._box_open(box) for box in station.leaf.boxes)
+
+    def _box_open(self, box: int) -> bool:
+        around = (*self.structure.boxes[box].boxes, box)
+        return all(self.box_enabled[one] for one in around)
+
+    def takes_part(self, line: Line) -> bool:
+        """Whether a firing waits for the edge: a live one, or one with signals that a node sent before it was disabled (F10)."""
+        if self.is_live(line):
+            return not (line.ended and not line.queue and self.is_optional(line))
+        return line.edge.is_event and bool(line.queue) and self.is_enabled(line.edge.target.owner)
+
+    def is_optional(self, line: Line) -> bool:
+        """Parameters are optional inputs too (P8)."""
+        target = line.edge.target
+        return target.kind == "parameter" or bool(self.stations[target.owner].type.inputs[target.name].optional)
+
+    def is_occupied(self, line: Line) -> bool:
+        """Whether the producer's token is not processed yet (P4, P7)."""
+        if not self.is_live(line):
+            return False
+        if line.delay:
+            return len(line.queue) > line.delay
+        return bool(line.queue) or line.unprocessed > 0
+
+    def outputs_are_free(self, owner: int) -> bool:
+        """An output is free when all its live edges are (F5)."""
+        return not any(self.is_occupied(line) for line in self.lines_out(owner))
+
+    def full_lines(self, owner: int) -> list[Line]:
+        """Live `wait` edges of the node that hold capacity or more untaken tokens (F8)."""
+        return [
+            line
+            for line in self.lines
+            if line.edge.source.owner == owner
+            and line.edge.is_event
+            and line.edge.overflow == "wait"
+            and self.is_live(line)
+            and len(line.queue) >= line.capacity
+        ]
+
+    # --- activity
+
+    def is_active(self, owner: int) -> bool:
+        """A(v); of a subgraph by G2: a node inside is active, or +1 is under way between two of them."""
+        if owner == ROOT:
+            return False
+        if owner >= 0:
+            return self.stations[owner].active
+        members = self.structure.boxes[-2 - owner].members
+        return any(self.stations[member].active for member in members) or any(
+            lying.token.activity == 1 for line in self.lines_inside(-2 - owner) for lying in line.queue
+        )
+
+    def lines_inside(self, box: int) -> list[Line]:
+        """Edges with both ends inside a subgraph."""
+        members = self.structure.boxes[box].members
+        inner = [-2 - one.index for one in self.structure.boxes if box in one.boxes]
+        inside = [*members, *inner]
+        return [line for line in self.lines if line.edge.source.owner in inside and line.edge.target.owner in inside]
+
+    # --- F1
+
+    def may_fire(self, index: int, *, ignore: str = "") -> bool:
+        """F1, all but "not busy" (D1: this is what a place is for). `ignore`: "queues" leaves F8 out, "timers" F11, A11 and back-off."""
+        station = self.stations[index]
+        if not self.is_enabled(index) or station.ending or station.ended or station.type.process_kind == "none":
+            return False
+        if not self.has_all_inputs(index) or not self.outputs_are_free(index):
+            return False
+        if ignore != "queues" and self.full_lines(index):
+            return False
+        if ignore != "timers" and (self.is_held_by_time(index) or self.is_resting(index)):
+            return False
+        return not self.is_suspended_source(index) and self.says_ready(station)
+
+    def has_all_inputs(self, index: int) -> bool:
+        """A source or a live input edge; a live edge at every mandatory input; a token on every edge that takes part."""
+        station = self.stations[index]
+        joined = self.lines_joined(index)
+        waited = [line for line in joined if self.takes_part(line)]
+        if not station.type.is_source and not any(self.is_live(line) or line in waited for line in joined):
+            return False
+        connected = {line.edge.target.name for line in waited if line.edge.target.kind == "input"}
+        mandatory = {name for name, spec in station.type.inputs.items() if not spec.optional}
+        return mandatory <= connected and all(line.queue for line in waited)
+
+    def says_ready(self, station: Station) -> bool:
+        """Ask `ready()`, last of all."""
+        hook = station.node._hook("ready")
+        if hook is None or station.stops_itself:
+            return True
+        try:
+            return bool(hook())
+        except EndOfStream:
+            station.stops_itself = True
+            return True
+
+    def gates_of(self, index: int) -> Iterator[float | None]:
+        """The idle rates of gates whose state node is inactive now; None suspends (A11)."""
+        for gate in self.structure.gates:
+            if index in gate.targets and not self.is_active(gate.by):
+                yield gate.idle_rate_hz
+
+    def is_suspended_source(self, index: int) -> bool:
+        """Sources rest under a gate without an idle rate."""
+        return self.stations[index].type.is_source and any(rate is None for rate in self.gates_of(index))
+
+    def is_resting(self, index: int) -> bool:
+        """A throttled source that has had its firing for now (D7)."""
+        return self.stations[index].type.is_source and not self.within_idle_rate(index)
+
+    def within_idle_rate(self, index: int) -> bool:
+        """Whether every gate allows a firing that runs the function now."""
+        station = self.stations[index]
+        return all(rate is not None and self.now >= station.last_function + 1 / rate for rate in self.gates_of(index))
+
+    def is_held_by_time(self, index: int) -> bool:
+        """F11's hold (D2: no firing at all within it), or the back-off of a restart."""
+        station = self.stations[index]
+        return self.now < station.hold_until or station.resting_until is not None
+
+    # --- what is next for one node (F9)
+
+    def next_call(self, owner: int) -> Line | None:
+        """The edge with the oldest token that waits for a slot call of the node; of a disabled one only `enable` answers."""
+        candidates = [
+            line
+            for line in self.lines_called(owner)
+            if line.queue and (self.is_enabled(owner) or line.edge.target.name == "enable")
+        ]
+        return min(candidates, key=lambda line: line.queue[0].place, default=None)
+
+
+def _fresh(leaf: Leaf) -> Any:
+    if leaf.inside is not None:
+        return leaf.node
+    node = leaf.node._copy()
+    node._place = leaf.node._place  # code may ask where it is
+    return node
+
+
+def newest(tokens: list[Token[Any]], otherwise: float) -> float:
+    """T5: the newest stamp of the values that were taken, else of all that was taken."""
+    values = [token.stamp for token in tokens if token.value is not NO_MESSAGE and token.value is not END]
+    return max(values or [token.stamp for token in tokens] or [otherwise])

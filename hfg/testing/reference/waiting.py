@@ -1,0 +1,126 @@
+"""A tiny event loop that a machine can turn by hand: async node code runs in it one step at a time, in the machine's own time.
+
+Each firing or call that waits has an owner; its steps and timers are kept apart, so that whoever holds the machine decides which coroutine goes on next.
+Only what `asyncio.sleep`, futures, tasks and `asyncio.timeout` need is there: no sockets, no threads, no signals.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from contextvars import Context, ContextVar, copy_context
+from typing import Any, Final
+
+__all__ = ["HandTurnedLoop"]
+
+_OWNER: Final[ContextVar[object]] = ContextVar("hfg.testing.owner", default=None)
+
+
+class HandTurnedLoop(asyncio.AbstractEventLoop):
+    """Runs callbacks when told to, never by itself; `now` is asked for the time."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._ready: list[tuple[object, asyncio.Handle]] = []
+        self._timers: list[tuple[object, asyncio.TimerHandle]] = []
+
+    # --- what asyncio asks of a loop
+
+    def time(self) -> float:
+        """Give the machine's time."""
+        return self._now()
+
+    def get_debug(self) -> bool:
+        """Tell asyncio not to look closer."""
+        return False
+
+    def is_running(self) -> bool:
+        """Say yes: code that asks is being run."""
+        return True
+
+    def is_closed(self) -> bool:
+        """Say no: the loop lives as long as its machine."""
+        return False
+
+    def create_future(self) -> asyncio.Future[Any]:
+        """Make a future that wakes its waiter through this loop."""
+        return asyncio.Future(loop=self)
+
+    def create_task(self, coro: Any, *, name: Any = None, context: Context | None = None, **_: Any) -> asyncio.Task[Any]:
+        """Make a task; its first step is one of the owner's next steps."""
+        return asyncio.Task(coro, loop=self, name=name, context=context)
+
+    def call_soon(self, callback: Any, *args: Any, context: Context | None = None) -> asyncio.Handle:
+        """Add a step to those that the owner may do next."""
+        handle = asyncio.Handle(callback, args, self, context)
+        self._ready.append((_owner_of(context), handle))
+        return handle
+
+    def call_later(self, delay: float, callback: Any, *args: Any, context: Context | None = None) -> asyncio.TimerHandle:
+        """Add a step for later."""
+        return self.call_at(self._now() + delay, callback, *args, context=context)
+
+    def call_at(self, when: float, callback: Any, *args: Any, context: Context | None = None) -> asyncio.TimerHandle:
+        """Add a step for a moment of the machine's time."""
+        timer = asyncio.TimerHandle(when, callback, args, self, context)
+        self._timers.append((_owner_of(context), timer))
+        return timer
+
+    def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
+        """Nothing is counted: cancelled timers are skipped."""
+
+    def call_exception_handler(self, context: dict[str, Any]) -> None:
+        """Say nothing: a coroutine that is thrown away at the end of a run is no fault."""
+
+    # --- what the machine does with it
+
+    def start(self, owner: object, coroutine: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
+        """Make a task for `owner`; nothing of it runs yet."""
+        context = copy_context()
+        context.run(_OWNER.set, owner)
+        return self.create_task(coroutine, context=context)
+
+    def can_step(self, owner: object) -> bool:
+        """Whether something of `owner` can go on now."""
+        return any(one is owner and not handle.cancelled() for one, handle in self._ready)
+
+    def step(self, owner: object) -> bool:
+        """Run the first waiting step of `owner`; False if there was none."""
+        for index, (one, handle) in enumerate(self._ready):
+            if one is owner and not handle.cancelled():
+                del self._ready[index]
+                with self.entered():
+                    handle._run()
+                return True
+        return False
+
+    def next_time(self) -> float | None:
+        """The moment of the next timer, or None."""
+        return min((timer.when() for _, timer in self._timers if not timer.cancelled()), default=None)
+
+    def ring(self) -> None:
+        """Make the timers whose moment has come into steps of their owners, in order of time."""
+        due = [entry for entry in self._timers if entry[1].when() <= self._now()]
+        self._timers = [entry for entry in self._timers if entry not in due]
+        self._ready.extend((owner, timer) for owner, timer in sorted(due, key=lambda entry: entry[1].when()))
+
+    def forget(self, owner: object) -> None:
+        """Throw away what `owner` still has to do."""
+        self._ready = [entry for entry in self._ready if entry[0] is not owner]
+        self._timers = [entry for entry in self._timers if entry[0] is not owner]
+
+    @contextmanager
+    def entered(self) -> Iterator[None]:
+        """Be the running loop for a moment, also inside another one."""
+        outside = asyncio._get_running_loop()
+        asyncio._set_running_loop(None)
+        asyncio._set_running_loop(self)
+        try:
+            yield
+        finally:
+            asyncio._set_running_loop(outside)
+
+
+def _owner_of(context: Context | None) -> object:
+    return _OWNER.get() if context is None else context.get(_OWNER)
