@@ -139,8 +139,8 @@ class _Reader:
             self._match_known()
         kind = kind_of(self.function)
         output = MISSING
-        if "return" in self.hints or (kind in ("generator", "async generator") and self.known is not None):
-            output, kind = result_of(self.hints.get("return"), kind, bool(self.inputs))
+        if "return" in self.hints:
+            output, kind = result_of(self.hints["return"], kind, bool(self.inputs))
         return self._signature(output, kind)
 
     def _signature(self, output: Any, kind: ProcessKind) -> Signature:

@@ -157,6 +157,23 @@ def test_a_source_is_told_by_its_type() -> None:
     assert [kind.outputs["out"].type for kind in kinds[:5]] == [int] * 5
 
 
+def test_a_generator_may_write_its_outputs_itself() -> None:
+    class Ticker(hfg.Node):
+        tick = hfg.Output(int)
+
+        def process(self):  # type: ignore[no-untyped-def]
+            yield
+
+    class Pacer(hfg.Node):
+        beat = hfg.Event()
+
+        def process(self) -> Iterator[None]:
+            yield
+
+    assert (Ticker._type.process_kind, list(Ticker._type.outputs)) == ("generator", ["tick"])
+    assert (Pacer._type.process_kind, Pacer._type.result) == ("generator", "none")
+
+
 def test_a_type_without_process_has_nothing_to_call() -> None:
     class Quiet(hfg.Node):
         done = hfg.Event()
@@ -269,6 +286,12 @@ def test_a_result_that_nothing_is_said_of_is_refused() -> None:
 
         class Broken(hfg.Node):
             def process(self, value: int): ...  # type: ignore[no-untyped-def]
+
+    with pytest.raises(DeclarationError, match="process says nothing about its result"):
+
+        class Silent(hfg.Node):
+            def process(self):  # type: ignore[no-untyped-def]
+                yield 1
 
 
 def test_beside_declared_inputs_silence_about_the_result_means_none() -> None:
