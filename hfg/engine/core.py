@@ -104,6 +104,8 @@ class Core:
         self.in_flight = 0
         self.timers = 0
         self.pumping = False
+        self.plain = False  # pumping, and nobody listens: what is triggered may take the short way
+        self.futile = False  # the sources left feed only ended nodes (R5)
         self.current: Worker | None = None
         self.started = False
         self.over = False

@@ -223,22 +223,19 @@ class Engine:
         core = self.core
         if core.over or not core.started:
             return
-        policy = self._loop_group.policy
-        ready_groups = self._ready_groups
+        policy: Any = self._loop_group.policy
         core.pumping = True
+        core.plain = core.trace is None
         try:
-            if isinstance(policy, Fifo):
-                self._drain(policy, policy.popleft, ready_groups)
-            else:
-                self._drain(policy, policy.pop, ready_groups)
+            self._drain(policy, policy.popleft if isinstance(policy, Fifo) else policy.pop, self._ready_groups)
         except Exception as error:
             self._internal(error)
         finally:
-            core.pumping = False
+            core.pumping = core.plain = False
             core.current = None
         if core.over:
             return
-        if len(policy) or ready_groups:
+        if policy or self._ready_groups:
             self.kick()
         else:
             self._settle()
@@ -257,28 +254,36 @@ class Engine:
             self._internal(error)
 
     def _drain(self, policy: Any, pop: Callable[[], Worker], ready_groups: deque[ThreadGroup]) -> None:
+        """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock."""
         core = self.core
-        steps = _VIRTUAL_SLICE_STEPS if self.virtual else _SLICE_STEPS
-        until = 0.0 if self.virtual else time.monotonic() + _SLICE_S
+        left = _VIRTUAL_SLICE_STEPS if self.virtual else _SLICE_STEPS
+        until = 0.0
         while True:
-            for _ in range(steps):
+            if ready_groups:
+                ready_groups.popleft().dispatch()
+            if not policy:
                 if ready_groups:
-                    ready_groups.popleft().dispatch()
-                if not policy:
-                    if ready_groups:
-                        continue
-                    return
-                worker = pop()
-                worker.step(worker)
-            if core.over or self.virtual or time.monotonic() >= until:
+                    continue
                 return
+            worker = pop()
+            worker.step(worker)
+            left -= 1
+            if not left:
+                if core.over or self.virtual:
+                    return
+                now = time.monotonic()
+                if not until:
+                    until = now + _SLICE_S
+                elif now >= until:
+                    return
+                left = _SLICE_STEPS
 
     def _settle(self) -> None:
         """The run queues are empty: is the graph quiet, and if so, what follows?"""
         core = self.core
-        if core.in_flight and not quiet.only_futile_in_flight(core):
-            return
         if core.timers:
+            return
+        if core.in_flight and not (core.futile and quiet.only_futile_in_flight(core)):
             return
         self.quiet()
 
@@ -385,11 +390,17 @@ class Engine:
                 self._zombies.discard(carrier)
             if self.core.over and not closing:
                 return
-            self._guard(lambda: done(result, error))
-            if worker.core.inside is not None:
-                worker.core.inside.look_later()
-            self.go_on()
+            try:
+                done(result, error)
+            except Exception as fault:
+                self._internal(fault)
+            if inside is not None:
+                inside.look_later()
+            if not self._scheduled and not outer.pumping:
+                self._pump()
 
+        inside = worker.core.inside
+        outer = self.core
         carrier = worker.carrier
         return over
 
@@ -539,6 +550,8 @@ class Engine:
         for worker in core.workers:
             engine_ports.bind_automatic(worker)
             plan.watch(worker)
+            if worker.watched:
+                engine_ports.bind(worker)
             wiring.rewire(worker)
         for edge, operators in core.piped:
             self._disposables.append(rx.pipe_edge(edge, operators, self.scheduler))
@@ -745,6 +758,7 @@ class Engine:
                     consumer(event)
 
             core.trace = tell
+        core.plain = core.pumping and core.trace is None
         if core.started and (before is None) != (core.trace is None):
             for worker in core.workers:
                 steps.choose(worker)

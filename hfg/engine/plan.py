@@ -6,6 +6,7 @@ Stands on `graph.flat`, `worker` and `wiring`.
 from __future__ import annotations
 
 import inspect
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,7 +15,7 @@ from hfg.engine.groups import Group
 from hfg.engine.scopes import Gate, Scope
 from hfg.engine.wiring import is_live, rewire
 from hfg.engine.worker import DISABLED, STARTING, RunningEvent, Worker
-from hfg.errors import GraphError
+from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import FlatEdge, FlatGraph, FlatNode
 from hfg.ports.edges import DelayEdge, Edge, EventEdge, SyncEdge
 
@@ -191,8 +192,14 @@ def _edge(core: Core, flat: FlatEdge, ends: _Ends) -> None:
         event.edges = tuple(sorted((*event.edges, edge), key=lambda one: (one.target_kind == "input", one.index)))
         if flat.through:
             core.piped.append((edge, flat.through))
+            edge.pipeline = _not_piped_yet
     else:
         _out_of(edge, source, flat)
+
+
+def _not_piped_yet(token: Any) -> None:
+    """Stands for the operators of an edge until all nodes are set up."""
+    raise UsageError("an event with operators on its edge was triggered in setup(): trigger it in a firing or a slot")
 
 
 def _sequential(source: Worker, target: Worker) -> bool:
@@ -212,6 +219,10 @@ def _into(edge: Edge, target: Worker, flat: FlatEdge) -> None:
         edge.target_kind = "parameter"
     if kind == "slot":
         target.slot_edges += (edge,)
+        if target.calls is None:
+            target.calls = deque()
+        if type(edge) is EventEdge:
+            edge.handler = target.plain_handlers.get(flat.target.name)
         return
     if kind == "input" and target.type is not None:
         edge.position = list(target.type.inputs).index(flat.target.name)
@@ -244,7 +255,10 @@ def prepare_slot(worker: Worker, name: str) -> EventEdge:
     edge.target_kind = "slot"
     edge.port_name = name
     worker.slot_edges += (edge,)
+    if worker.calls is None:
+        worker.calls = deque()
     _handler(worker, name)
+    edge.handler = worker.plain_handlers.get(name)
     core.edges.append(edge)
     core.outside[worker.index, name] = edge
     if core.started:

@@ -5,7 +5,6 @@ Bound at each setup. Stands on `sending` and `firing`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -38,15 +37,18 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         event = worker.events[name] = RunningEvent(worker, name, None)
     port = event.port = worker.node.ports.events[name]
     host: Any = worker.core.host
-    emit: Callable[[Any, int | None, float | None], None] = steps.emitter(event)
     if worker.group.threaded:
-        emit = partial(_from_thread, worker, event)
-    port._emit = emit
+        port._emit = partial(_from_thread, worker, event)
+    else:
+        emit = steps.emitter(event)
+        port.trigger = emit  # in place of the method, which would only call it
+        port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     port._emit_wait = partial(host.trigger_wait, event)
     host.adopt_event(port)
     if name in AUTOMATIC_EVENTS and worker.core.started:
         plan.watch(worker)
         steps.choose(worker)
+        bind(worker)  # what it triggers may have consequences now
     return event
 
 
@@ -78,6 +80,7 @@ def release_ports(worker: Worker) -> None:
     for event in worker.events.values():
         port = event.port
         if port is not None:
+            port.__dict__.pop("trigger", None)
             port._emit = port._refuse
             port._emit_wait = port._refuse_wait
             port._complete()

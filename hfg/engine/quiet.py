@@ -102,6 +102,7 @@ def node_ended(worker: Worker) -> None:
             complete_edge(edge)
     sources = [one for one in core.sources if not one.blocked & (ENDED | DISABLED)]
     if sources and all(_feeds_only_ended(source) for source in sources):
+        core.futile = True
         for source in sources:
             block(source, FUTILE)
             if source.rate_timer is not None:

@@ -12,7 +12,17 @@ from typing import Any
 
 from hfg.engine import errors, firing
 from hfg.engine.core import PENDING
-from hfg.engine.sending import add_call, block, consider, flush_automatic, freed, outputs_free, release, trigger
+from hfg.engine.sending import (
+    block,
+    consider,
+    derive_scopes,
+    flush_automatic,
+    freed,
+    outputs_free,
+    release,
+    touch,
+    trigger,
+)
 from hfg.engine.worker import CALLS_BLOCKED, FULL, RunningEvent, Worker
 from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge, SyncEdge
@@ -322,16 +332,15 @@ def _call_step(worker: Worker) -> Step:
     core = worker.core
     node = worker.node
     general = firing.step
-    handlers = worker.plain_handlers
+    calls: Any = worker.calls
 
     def step(worker: Worker) -> None:
-        calls = worker.calls
         if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
             general(worker)
             return
         edge = calls[0]
-        handler = handlers.get(edge.port_name)
-        if handler is None or type(edge) is not EventEdge:
+        handler = edge.handler
+        if handler is None:
             general(worker)
             return
         calls.popleft()  # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
@@ -341,24 +350,17 @@ def _call_step(worker: Worker) -> Step:
         if edge.full and len(queue) < edge.capacity:
             freed(edge)
         if token.activity:
-            active = token.activity > 0
-            worker.active = active
-            node._active = active
+            worker.active = node._active = token.activity > 0
         core.current = worker
         worker.stamp = token.stamp
         try:
             result = handler(token.value)
         except Exception as error:
-            worker.queued = False
-            worker.busy = "call"
-            worker.call_edge = edge
-            worker.ticket += 1
+            _call_taken(worker, edge)
             errors.fail_call(worker, edge.port_name, error)
             return
-        if type(result) is CoroutineType:
-            worker.queued = False
-            worker.busy = "call"
-            worker.call_edge = edge
+        if result is not None and type(result) is CoroutineType:
+            _call_taken(worker, edge)
             firing.await_call(worker, edge.port_name, result)
             return
         worker.stamp = None
@@ -373,58 +375,61 @@ def _call_step(worker: Worker) -> Step:
     return step
 
 
-def emitter(event: RunningEvent) -> Callable[[Any, int | None, float | None], None]:
+def _call_taken(worker: Worker, edge: EventEdge) -> None:
+    """A short call goes on as one like any other."""
+    worker.queued = False
+    worker.busy = "call"
+    worker.call_edge = edge
+    worker.ticket += 1
+
+
+def emitter(event: RunningEvent) -> Callable[..., None]:
     """What a port's `trigger` does: the short way for one plain edge into a slot that nobody watches, else `sending.trigger`."""
     worker = event.worker
     core = worker.core
     general = trigger
     edges = event.edges
+
+    def emit_general(value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+        general(event, value, activity, stamp)
+
     if not core.fast or len(edges) != 1:
-        return lambda value, activity, stamp: general(event, value, activity, stamp)
+        return emit_general
     edge = edges[0]
     target: Worker = edge.target
     node = worker.node
-    if edge.target_kind != "slot" or edge.overflow != "wait" or edge.pipeline is not None:
-        return lambda value, activity, stamp: general(event, value, activity, stamp)
+    if edge.target_kind != "slot" or edge.overflow != "wait" or edge.pipeline is not None or worker.watched:
+        return emit_general
     port = event.port
     port._observers = port._observers  # an attribute of its own is found faster than the class's
     queue = edge.queue
+    calls: Any = target.calls
     carries = edge.active
+    scopes = target.scopes
 
-    def emit(value: Any, activity: int | None, stamp: float | None) -> None:
-        if stamp is None:
-            stamp = worker.stamp
-        if (
-            activity is not None
-            or stamp is None
-            or not core.pumping
-            or core.trace is not None
-            or port._observers is not None
-            or not edge.live
-            or type(value) is Token
-        ):
+    def emit(value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+        if activity is not None or not core.plain or port._observers is not None or not edge.live or type(value) is Token:
             general(event, value, activity, stamp)
             return
+        if stamp is None:
+            stamp = worker.stamp
+            if stamp is None:
+                stamp = core.now()
         edge.sent = number = edge.sent + 1
-        if carries and (worker.active or worker.right) and not worker.watched:
+        if carries and (worker.active or worker.right):
             queue.append(Token(value, 1, stamp, number))
             if worker.active:
                 worker.active = node._active = False
-                worker.right = True
-        elif carries and (worker.active or worker.right):
-            edge.sent = number - 1
-            general(event, value, activity, stamp)
-            return
+                worker.right = worker.stamp is not None
+            if scopes:
+                touch(core, scopes)
+                derive_scopes(core)
         else:
             queue.append(Token(value, 0, stamp, number))
         if len(queue) >= edge.capacity and not edge.full:
             edge.full = True
             worker.full_edges += 1
             block(worker, FULL)
-        calls = target.calls
-        if calls is None:
-            add_call(target, edge)
-            return
         calls.append(edge)
         if not target.queued and not target.busy and not target.blocked & CALLS_BLOCKED:
             target.queued = True

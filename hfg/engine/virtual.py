@@ -82,6 +82,14 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         future.add_done_callback(lambda _: self.unhold())
         return future
 
+    async def shutdown_default_executor(self, timeout: float | None = None) -> None:  # type: ignore[override]
+        """As asyncio's, but the clock waits for the executor's threads."""
+        self.hold()
+        try:
+            await super().shutdown_default_executor()
+        finally:
+            self.unhold()
+
     def _jump(self, timeout: float) -> None:
         scheduled = self._scheduled  # type: ignore[attr-defined]
         if scheduled:

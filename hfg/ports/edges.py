@@ -153,6 +153,7 @@ class EventEdge(Edge):
       full: a `wait` edge that holds `capacity` or more: its source starts nothing new (F8).
       grown: how often F8 made it longer.
       pipeline: feeds a token to the operators on the edge (P9), or None.
+      handler: of the slot it leads into, taking the value, where that is all there is to a call; None: the general way.
       complete: tells the operators that no more comes, or None.
       end_sent: END has been put on it (F13, once an edge).
     """
@@ -164,6 +165,7 @@ class EventEdge(Edge):
         "end_sent",
         "full",
         "grown",
+        "handler",
         "initial",
         "overflow",
         "pipeline",
@@ -189,6 +191,7 @@ class EventEdge(Edge):
         self.grown = 0
         self.initial = initial
         self.end_sent = False
+        self.handler: Callable[[Any], Any] | None = None
         self.pipeline: Callable[[Token[Any]], None] | None = None
         self.complete: Callable[[], None] | None = None
 
