@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol, TypeGuard
 
-from hfg.description import NodeType
+from hfg.nodetype import NodeType
 from hfg.graph.options import NodeOptions
 from hfg.ports import Relaying
 

@@ -23,7 +23,18 @@ from hfg.nodetype import Node
 from hfg.ports import ParameterPort
 from hfg.problem import Problem
 
-__all__ = ["check", "check_flat", "runs_for_ever"]
+__all__ = [
+    "borders",
+    "check",
+    "check_flat",
+    "endless_sources",
+    "joined_edges",
+    "runs_for_ever",
+    "signal_rings",
+    "synchronous_rings",
+    "unconnected_inputs",
+    "unknown_groups",
+]
 
 
 def check(graph: Graph) -> list[Problem]:

@@ -248,7 +248,7 @@ def _need_initial(source: Any, target: Any, initial: tuple[Any, ...]) -> None:
     if target.kind == "parameter" and getattr(source, "kind", None) not in _SYNCHRONOUS:
         raise errors.ConnectionError(
             f"{between}: an event edge into a parameter holds no initial tokens; "
-            f"give the node the value, as in {target.node._type.name}({target.name}=...)"
+            f"give the node the value, as in {type(target.node).__name__}({target.name}=...)"
         )
     expected = type_of(target)
     for value in initial:
@@ -286,9 +286,11 @@ def _need_passable(source: Any, target: Any, options: EdgeOptions) -> None:
     between = f'"{end_path(source)}" -> "{target.path}"'
     for end in (source, target):
         owner = getattr(end, "node", None)
-        if not is_box(owner) or not iterated(owner) or end.kind not in ("slot", "event"):
+        # Inside nothing is refused: a relay without an edge on the other side is no edge at all (rule G1).
+        if not is_box(owner) or not iterated(owner) or isinstance(end, InnerSource | InnerTarget):
             continue
-        if end.name in (owner._type.slots if end.kind == "slot" else owner._type.events):
+        names = {"slot": owner._type.slots, "event": owner._type.events}.get(end.kind, ())
+        if end.name in names:
             raise errors.ConnectionError(
                 f'{between}: "{owner._place.path}" iterates, so signals cannot cross its border; '
                 "use inputs and outputs, or take iterate_over out (rule G4)"

@@ -221,10 +221,10 @@ class _Edges:
     def _make_end(self, port: Any) -> End | None:
         if is_feed(port):
             return End(ROOT, "observable", "observable", port)
-        if isinstance(port, InnerSource):  # only those of what iterates come here: its boundary
-            return End(ROOT, "output", port.name, port)
-        if isinstance(port, InnerTarget):
-            return End(ROOT, "input", port.name, port)
+        if isinstance(port, InnerSource | InnerTarget):  # only those of what iterates come here: its boundary
+            if port.kind in ("slot", "event"):
+                return None  # no edge leads there from outside (rule G4)
+            return End(ROOT, "output" if isinstance(port, InnerSource) else "input", port.name, port)
         node = port.node
         index = self.index_of.get(node)
         if index is None:

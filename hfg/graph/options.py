@@ -25,6 +25,7 @@ __all__ = [
     "Release",
     "edge_options",
     "group_spec",
+    "in_group",
     "node_options",
 ]
 

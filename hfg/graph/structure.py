@@ -233,6 +233,19 @@ class Graph:
         Raises:
           ConnectionError: the edge cannot be; nothing was changed.
         """
+        if source is self.start and isinstance(target, Target) and self._is_around(target):
+            # `graph.start.activates(...)` inside a subgraph: the edge belongs where its node is (rule A10).
+            inside: Graph = target.graph
+            return inside.connect(
+                source,
+                target,
+                active=active,
+                capacity=capacity,
+                overflow=overflow,
+                capacity_limit=capacity_limit,
+                through=through,
+                initial=initial,
+            )
         options = edge_options(
             lambda: f'"{end_path(source)}" -> "{end_path(target)}"',
             active,
@@ -426,6 +439,11 @@ class Graph:
             one._place = one._options = None
             if hasattr(one, "_graph"):
                 del one._graph
+
+    def _is_around(self, target: Any) -> bool:
+        """Whether a port lies in a graph inside this one."""
+        home = target.graph
+        return isinstance(home, Graph) and home is not self and home._root is self
 
     def _new_port(self, kind: str, name: str) -> str:
         if self._owner is not None:
