@@ -23,9 +23,13 @@ FLOORS = {
     "hfg.trace": 0,
     "hfg.ports": 1,
     "hfg.transport": 1,
+    "hfg.declaration": 2,
+    "hfg.description": 2,
+    "hfg.functions": 2,
+    "hfg.hints": 2,
     "hfg.nodetype": 2,
-    "hfg.signature": 2,
     "hfg.registry": 2,
+    "hfg.signature": 2,
     "hfg.graph": 3,
     "hfg.activity": 4,
     "hfg.engine": 5,
@@ -80,9 +84,10 @@ def imported(module: str, file: Path) -> Iterator[tuple[str, int]]:
             if statement.level:
                 anchor = package.split(".")[: len(package.split(".")) - statement.level + 1]
                 base = ".".join([*anchor, base] if base else anchor)
-            for alias in statement.names:  # `from hfg import graph` imports hfg.graph, `from hfg import Graph` the door
-                full = f"{base}.{alias.name}"
-                yield (full if full in ALL else base), statement.lineno
+            # `from hfg import graph` imports hfg.graph, `from hfg import Graph` the door
+            names = [f"{base}.{alias.name}" for alias in statement.names]
+            for name in {name if name in ALL else base for name in names}:
+                yield name, statement.lineno
 
 
 def violations(module: str, file: Path) -> list[str]:
@@ -132,7 +137,7 @@ def test_the_oracle_shares_no_code_with_the_accused(module: str) -> None:
 
 
 def test_the_table_names_only_what_exists_or_is_planned() -> None:
-    planned = {"hfg.transport", "hfg.registry", "hfg.signature", "hfg.activity", "hfg.nodes", "hfg.files", "hfg.studio"}
+    planned = {"hfg.transport", "hfg.nodes", "hfg.files", "hfg.studio"}
     missing = {name for name in FLOORS if name not in HFG} - planned
     assert not missing, f"FLOORS names modules that are gone: {sorted(missing)}"
 

@@ -66,6 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             show.failure(error)
             return 1
         except (KeyboardInterrupt, typer.Abort):
+            code = Interrupt.TYPERS_CODE
+        if code == Interrupt.TYPERS_CODE:
             show.sentence("interrupted")
             return 1
-        return 1 if code == Interrupt.TYPERS_CODE else int(code or 0)
+        return int(code or 0)

@@ -19,7 +19,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, ClassVar, Final
 
@@ -48,6 +48,7 @@ class Interrupt:
         self._run: tuple[asyncio.AbstractEventLoop, asyncio.Task[Any]] | None = None
         self._noticed = threading.Event()
         self._breaking_in = False
+        self._is_installed = False
 
     @classmethod
     @contextmanager
@@ -59,20 +60,40 @@ class Interrupt:
             return
         previous = signal.signal(signal.SIGINT, interrupt._pressed)
         outer, cls.current = cls.current, interrupt
+        interrupt._is_installed = True
         try:
             yield interrupt
         finally:
             cls.current = outer
+            interrupt._is_installed = False
             signal.signal(signal.SIGINT, previous)
 
     @contextmanager
     def cancels(self, task: asyncio.Task[Any]) -> Iterator[None]:
         """Inside the block Ctrl-C cancels the task, which may then clean up."""
-        self._run = (task.get_loop(), task)
+        loop = task.get_loop()
+        self._run = (loop, task)
+        self._wake(loop, True)
         try:
             yield
         finally:
+            self._wake(loop, False)
             self._run = None
+
+    def _wake(self, loop: asyncio.AbstractEventLoop, on: bool) -> None:
+        """Let a signal wake the loop also if it arrives just before the loop begins to wait.
+
+        Python runs a handler between two of its own instructions only. asyncio's handlers come with a wake-up file for
+        that case, so one that does nothing is registered, and ours is put back in its place.
+        """
+        if not self._is_installed:
+            return
+        with suppress(NotImplementedError):  # Windows wakes up by other means
+            if on:
+                loop.add_signal_handler(signal.SIGINT, lambda: None)
+            else:
+                loop.remove_signal_handler(signal.SIGINT)
+        signal.signal(signal.SIGINT, self._pressed)
 
     def _pressed(self, _number: int, _frame: FrameType | None) -> None:
         if self._breaking_in:  # our own signal, from `_insist`
@@ -104,7 +125,8 @@ class Interrupt:
 
     def _leave(self, sentence: str) -> None:
         for call in self.before_leaving:
-            call()
+            with suppress(ValueError, OSError):  # closed already, or the disk is full: nothing keeps us here
+                call()
         sys.stderr.write(f"hfg: {sentence}\n")
         sys.stderr.flush()
         os._exit(1)

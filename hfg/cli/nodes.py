@@ -29,9 +29,7 @@ _LIBRARY = "hfg.nodes"
 
 
 def nodes(
-    module: Annotated[
-        str | None, typer.Argument(help="module or file.py; without it, all that is installed")
-    ] = None,
+    module: Annotated[str | None, typer.Argument(help="module or file.py; without it, all that is installed")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the node types as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:

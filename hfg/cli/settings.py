@@ -9,7 +9,7 @@ import ast
 from collections.abc import Iterable
 from typing import Any
 
-from hfg.errors import TargetError
+from hfg.errors import GraphError, TargetError
 from hfg.graph import Graph
 
 __all__ = ["set_parameters"]
@@ -41,7 +41,7 @@ def set_parameters(graph: Graph, settings: Iterable[str]) -> None:
 def _node(graph: Graph, path: str) -> Any:
     try:
         found = graph[path]
-    except (KeyError, ValueError, LookupError):
+    except (GraphError, LookupError):
         found = None
     if found is None or not hasattr(found, "ports"):
         raise TargetError(f'graph "{graph.name}" has no node "{path}"; it has {", ".join(graph.nodes) or "none"}')

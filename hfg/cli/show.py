@@ -16,13 +16,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-import hfg
 from hfg.engine.report import Report
-from hfg.errors import EngineInternalError, NodeError, TeardownError
+from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
 
 __all__ = ["encode", "failure", "json", "plain", "report", "sentence", "set_debug", "table", "user_traceback"]
 
-_OURS = (str(Path(hfg.__file__).parent),)
+_OURS = str(Path(__file__).resolve().parent.parent)
 _MACHINERY = (
     "asyncio",
     "importlib",
@@ -61,7 +60,7 @@ def failure(error: BaseException) -> None:
 
 def user_traceback(error: BaseException | None) -> None:
     """Write a traceback without the frames of hfg and of what lies between it and the user's code."""
-    if error is None or (isinstance(error, hfg.errors.HfgError) and not _debug):
+    if error is None or (isinstance(error, HfgError) and not _debug):
         return
     shown = traceback.TracebackException.from_exception(error)
     if not _debug:
@@ -107,12 +106,12 @@ _ENCODER = msgspec.json.Encoder(enc_hook=plain)
 
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]], *, to_stderr: bool = False) -> None:
     """Write a table; numbers stand to the right."""
-    rows = [[str(cell) for cell in row] for row in rows]
+    cells = [[str(cell) for cell in row] for row in rows]
     drawn = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
     for index, column in enumerate(columns):
-        numbers = bool(rows) and all(row[index].replace(".", "").isdigit() for row in rows)
+        numbers = bool(cells) and all(row[index].replace(".", "").isdigit() for row in cells)
         drawn.add_column(column, justify="right" if numbers else "left", overflow="fold")
-    for row in rows:
+    for row in cells:
         drawn.add_row(*(cell.replace("[", "\\[") for cell in row))
     stream = sys.stderr if to_stderr else sys.stdout
     Console(file=stream, width=None if stream.isatty() else _WIDTH_OF_A_FILE).print(drawn)

@@ -176,7 +176,7 @@ def _builders(module: ModuleType) -> dict[str, Callable[[], Any]]:
 def _promises_graph(function: Callable[..., Any]) -> bool:
     try:
         return typing.get_type_hints(function).get("return") is Graph
-    except Exception:  # noqa: BLE001 - hints of the user's that cannot be resolved promise nothing
+    except Exception:  # hints of the user's that cannot be resolved promise nothing
         return False
 
 

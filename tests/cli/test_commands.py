@@ -28,7 +28,7 @@ def numbers(*, count: int = 3) -> Iterator[int]:
 
 
 @hfg.node
-def half(number: int, *, divisor: Annotated[int, Interval(ge=0, le=9)] = 2, label: str = "half") -> float:
+def half(number: float, *, divisor: Annotated[int, Interval(ge=0, le=9)] = 2, label: str = "half") -> float:
     print(label, number)
     return number / divisor
 
@@ -183,7 +183,7 @@ def test_a_run_refuses_an_unsound_graph(hfg: Command) -> None:
         (("run", TARGET, "--clock", "slow"), "slow"),
         (("run", TARGET, "--until", "-1"), "not negative"),
         (("run", TARGET, "--policy", "whim"), "whim"),
-        (("run",), "TARGET"),
+        (("run",), "target"),
         (("walk",), "walk"),
         (("check", "nowhere.py"), "nowhere.py: does not exist"),
         (("nodes", "nowhere.py"), "nowhere.py: does not exist"),
