@@ -76,7 +76,7 @@ def run(
     if json and report is not None:
         show.json(report)
     if interrupt.count:
-        show.sentence(f'graph "{graph.name}": interrupted, everything is torn down')
+        show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
         return 1
     if error is not None:
         show.failure(error)
