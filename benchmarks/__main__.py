@@ -1,7 +1,8 @@
 """Run the benchmarks: `python -m benchmarks [bench_hop ...] [--runs 5] [--json FILE]`.
 
-Every case runs in a fresh process, `--runs` times, the cases in turn (A B C A B C ...) so that a drift of the machine meets all of them. The table shows the
-median and the spread, (max - min) / median; `--json` writes one line per case with every single figure, the machine and the versions.
+Every case runs in a fresh process, `--runs` times, the cases in turn (A B C A B C ...) so that a drift of the
+machine meets all of them. The table shows the median and the spread, (max - min) / median; `--json` writes one line
+per case with every single figure, the machine and the versions.
 """
 
 from __future__ import annotations
@@ -43,12 +44,20 @@ def main() -> int:
         unit = getattr(module, "UNIT", "us")
         for case, values in figures.items():
             print(row(case, values, unit))
-        for line in getattr(module, "ratios", lambda _: [])({case: statistics.median(values) for case, values in figures.items()}):
+        for line in getattr(module, "ratios", lambda _: [])(
+            {case: statistics.median(values) for case, values in figures.items()}
+        ):
             print("  " + line)
         if arguments.json:
             with arguments.json.open("a") as lines:
                 for case, values in figures.items():
-                    record: dict[str, Any] = {"bench": name, "case": case, "unit": unit, "values": values, "machine": machine()}
+                    record: dict[str, Any] = {
+                        "bench": name,
+                        "case": case,
+                        "unit": unit,
+                        "values": values,
+                        "machine": machine(),
+                    }
                     lines.write(json.dumps(record) + "\n")
     return 0
 

@@ -1,8 +1,9 @@
 """What one hop costs: the wall and CPU time of a token per edge, in chains of several kinds.
 
-Measured: a run of N tokens through a source, K nodes and a sink (K + 1 edges), from the first firing to the end of the run, divided by N and by K + 1;
-values are small integers, nobody observes, all rules are in force. `queue` is the same work with asyncio.Queue(1) and a task per node. Not measured: building
-the graph (see bench_shape) and user code (each node adds 0 or passes on).
+Measured: a run of N tokens through a source, K nodes and a sink (K + 1 edges), from the first firing to the end of
+  the run, divided by N and by K + 1;
+values are small integers, nobody observes, all rules are in force. `queue` is the same work with asyncio.Queue(1)
+and a task per node. Not measured: building the graph (see bench_shape) and user code (each node adds 0 or passes on).
 
 Each case runs in a fresh process; the table shows the median of the processes and their spread, (max - min) / median.
 """
@@ -12,6 +13,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import hfg
@@ -152,7 +154,7 @@ def queue_chain(length: int, tokens: int) -> float:
         began = time.perf_counter()
         async with asyncio.TaskGroup() as group:
             group.create_task(source())
-            for before, after in zip(queues, queues[1:], strict=False):
+            for before, after in pairwise(queues):
                 group.create_task(node(before, after))
             group.create_task(last())
         return time.perf_counter() - began

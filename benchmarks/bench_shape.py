@@ -1,7 +1,9 @@
 """From 1 to 10,000 nodes: building and checking, the cost of a hop, memory per node.
 
-Measured: `build` is the wall time to make, add, connect and check a chain of 10,000 functions; `hop` the time per edge of a run of few tokens through it
-(beside a chain of 10 in the same process kind); `memory` what the process grows by per node with one edge, built and running. Values are small integers.
+Measured: `build` is the wall time to make, add, connect and check a chain of 10,000 functions; `hop` the time per
+  edge of a run of few tokens through it
+(beside a chain of 10 in the same process kind); `memory` what the process grows by per node with one edge, built and
+running. Values are small integers.
 """
 
 from __future__ import annotations
@@ -64,4 +66,7 @@ CASES: dict[str, Callable[[], float]] = {
 
 def ratios(medians: dict[str, float]) -> list[str]:
     """The ratio that holds on any machine."""
-    return [f"hop at 10,000 nodes / at 10: {medians['hop in a chain of 10,000, us'] / medians['hop in a chain of 10, us']:.2f}"]
+    return [
+        f"hop at 10,000 nodes / at 10: "
+        f"{medians['hop in a chain of 10,000, us'] / medians['hop in a chain of 10, us']:.2f}"
+    ]

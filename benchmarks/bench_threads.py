@@ -1,6 +1,7 @@
 """Two thread groups with OpenCV work against one.
 
-Measured: wall seconds for 60 pictures of 1280 x 960 through a fork into two branches of blurs, once with both branches in one thread group and once in two;
+Measured: wall seconds for 60 pictures of 1280 x 960 through a fork into two branches of blurs, once with both
+  branches in one thread group and once in two;
 `cv2.setNumThreads(1)` in both, so that the groups alone give the parallelism.
 """
 
@@ -59,7 +60,10 @@ def seconds(groups: int) -> float:
     return time.perf_counter() - began
 
 
-CASES: dict[str, Callable[[], float]] = {"one thread group": lambda: seconds(1), "two thread groups": lambda: seconds(2)}
+CASES: dict[str, Callable[[], float]] = {
+    "one thread group": lambda: seconds(1),
+    "two thread groups": lambda: seconds(2),
+}
 
 
 def ratios(medians: dict[str, float]) -> list[str]:

@@ -1,6 +1,7 @@
 """A day of virtual time: one 10 Hz source through a chain of three.
 
-Measured: wall seconds for 864,000 tokens through a source with `max_rate_hz=10`, three functions and a sink under the virtual clock.
+Measured: wall seconds for 864,000 tokens through a source with `max_rate_hz=10`, three functions and a sink under
+  the virtual clock.
 """
 
 from __future__ import annotations

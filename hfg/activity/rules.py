@@ -1,4 +1,6 @@
-"""The rules of activity as functions over values (rules A3-A6): what a node becomes by what it takes, and what leaves it.
+"""The rules of activity as functions over values (rules A3-A6): what a node becomes by what it takes.
+
+And what leaves it.
 
 Nothing here knows nodes, edges or time. Stands on `token`.
 """

@@ -1,4 +1,6 @@
-"""What follows when A(v) changes: hooks, automatic events, time-outs, gates, subgraphs (rules A9, A11, A12, G2), and reset (A14).
+"""What follows when A(v) changes: hooks, automatic events, time-outs, gates, subgraphs (rules A9, A11, A12, G2).
+
+And reset (A14).
 
 Only workers marked `watched` come here. Stands on `sending`.
 """
@@ -84,7 +86,7 @@ def _rest(worker: Worker, gate: Any) -> None:
         consider(worker)  # throttled: it may have to wait now (D7)
 
 
-# --- subgraphs --------------------------------------------------------------------------------------------------------------------------
+# --- subgraphs ------------------------------------------------------------------------------------------------------
 
 
 def scopes_changed(core: Core) -> None:

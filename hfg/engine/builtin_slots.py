@@ -1,4 +1,6 @@
-"""What the automatic slots of every node do: enable, disable, activate, deactivate, reset (rules A7, A9); and the graph's own: stop, abort (A10).
+"""What the automatic slots of every node do: enable, disable, activate, deactivate, reset (rules A7, A9).
+
+And the graph's own: stop, abort (A10).
 
 Stands on `lifecycle` and `sending`.
 """

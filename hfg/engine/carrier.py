@@ -1,8 +1,9 @@
 """How an async node starts at once, and waits like a task if it suspends, for less.
 
-A coroutine stepped outside a task breaks `asyncio.timeout`, `anyio` and everything else that asks for the current task. So each async node has one dormant
-task, whose identity and context are entered around every step of its coroutines. The task itself sleeps on a future that hands cancellation on to the
-coroutine; what a coroutine waits for wakes the coroutine directly, as a task would, without a pass of the loop more.
+A coroutine stepped outside a task breaks `asyncio.timeout`, `anyio` and everything else that asks for the current
+task. So each async node has one dormant task, whose identity and context are entered around every step of its
+coroutines. The task itself sleeps on a future that hands cancellation on to the coroutine; what a coroutine waits
+for wakes the coroutine directly, as a task would, without a pass of the loop more.
 """
 
 from __future__ import annotations
@@ -74,6 +75,7 @@ class Carrier:
 
     @property
     def waiting(self) -> bool:
+        """Whether a coroutine is under way."""
         return self._coroutine is not None
 
     def start(self, coroutine: Any, done: Done) -> Any:
@@ -129,7 +131,7 @@ class Carrier:
     def _wake(self, future: asyncio.Future[Any]) -> None:
         try:
             future.result()
-        except BaseException as error:  # noqa: BLE001 - it belongs to the coroutine
+        except BaseException as error:
             self._step(error)
         else:
             self._step()
@@ -144,10 +146,12 @@ class Carrier:
         loop = self._loop
         previous = _swap(loop, self.task)
         try:
-            waits_for = self._context.run(coroutine.send, None) if error is None else self._context.run(coroutine.throw, error)
+            waits_for = (
+                self._context.run(coroutine.send, None) if error is None else self._context.run(coroutine.throw, error)
+            )
         except StopIteration as stop:
             result = stop.value
-        except BaseException as problem:  # noqa: BLE001 - it goes to whoever started the coroutine
+        except BaseException as problem:
             over = problem
         else:
             self._wait(waits_for)

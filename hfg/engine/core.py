@@ -1,7 +1,8 @@
 """The state of one run, shared by the modules that decide over it.
 
-`sending` says what leaves a node, `firing` what a node does next, `wiring` which edges are live, `quiet` what happens when nothing moves, `steps` how the
-common shapes go fast. None of them waits: time, threads and coroutines are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asyncio.
+`sending` says what leaves a node, `firing` what a node does next, `wiring` which edges are live, `quiet` what
+happens when nothing moves, `steps` how the common shapes go fast. None of them waits: time, threads and coroutines
+are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asyncio.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any, Protocol
 from hfg.engine.scopes import Scope
 from hfg.engine.worker import Worker
 from hfg.errors import HfgError
-from hfg.ports.edges import Edge
+from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
 from hfg.trace import TraceEvent
 
 __all__ = ["PENDING", "Core", "Host", "Timer"]
@@ -41,7 +42,10 @@ class Host(Protocol):
         """Seconds on the run's clock."""
 
     def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
-        """Call back at `when` on the run's clock; the timer counts as one that could start something (quiet waits for it)."""
+        """Call back at `when` on the run's clock.
+
+        The timer counts as one that could start something (quiet waits for it).
+        """
 
     def kick(self) -> None:
         """Something was queued from outside the pump: see to it that it goes on."""
@@ -55,7 +59,9 @@ class Host(Protocol):
     ) -> None:
         """Run a node's code where it belongs; `done(result, error)` follows, at once or later on the loop."""
 
-    def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]) -> None:
+    def execute_aside(
+        self, worker: Worker, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]
+    ) -> None:
         """Run a hook of activity beside whatever the worker is doing."""
 
     def drive(self, worker: Worker, coroutine: Any, done: Callable[[Any, BaseException | None], None]) -> None:
@@ -94,7 +100,7 @@ class Core:
         self.host = host
         self.now = host.now
         self.workers: list[Worker] = []
-        self.edges: list[Edge] = []
+        self.edges: list[SyncEdge | DelayEdge | EventEdge] = []
         self.scopes: list[Scope] = []
         self.by_path: dict[str, Worker] = {}
         self.boundary: Worker | None = None

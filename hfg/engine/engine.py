@@ -1,11 +1,13 @@
 """The part of a run that waits: the pump, timers, coroutines and threads (rules R1, R5, R6, X2, X3).
 
-What is to happen is decided in `firing`, `sending` and `quiet`; here it is made to happen on one event loop, without a task per hop. Stands on all of them.
+What is to happen is decided in `firing`, `sending` and `quiet`; here it is made to happen on one event loop, without
+a task per hop. Stands on all of them.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import contextvars
 import inspect
 import logging
@@ -30,6 +32,7 @@ from hfg.engine.watchdog import Watch, watchdog
 from hfg.engine.worker import STARTING, TORN_DOWN, RunningEvent, Worker
 from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
 from hfg.graph.flat import FlatGraph
+from hfg.ports.edges import DelayEdge, EventEdge
 from hfg.token import Token
 from hfg.trace import RunEnded, RunStarted, TraceEvent
 
@@ -68,6 +71,12 @@ class Settings:
         self.allow_idle = allow_idle
         self.block_warning_s = block_warning_s
         self.teardown_limit_s = teardown_limit_s
+
+
+def answer(waiter: asyncio.Future[Any], value: Any) -> None:
+    """Give a waiting future its result, unless whoever waited has gone."""
+    if not waiter.done():
+        waiter.set_result(value)
 
 
 class _Timer:
@@ -123,6 +132,7 @@ class Engine:
         self._quiet_waiters: list[asyncio.Future[None]] = []
         self._outcome: tuple[str, HfgError | None] | None = None
         self.ending: asyncio.Event = asyncio.Event()
+        self._came_back = asyncio.Event()  # code that was cancelled at the end is over
         self._scheduled = False
         self._set_up: list[Worker] = []
         self._aside: set[asyncio.Task[None]] = set()
@@ -143,7 +153,7 @@ class Engine:
         if settings.trace is not None:
             self.add_consumer(settings.trace)
 
-    # --- time -----------------------------------------------------------------------------------------------------------------------
+    # --- time -------------------------------------------------------------------------------------------------------
 
     def now(self) -> float:
         """Seconds on the run's clock."""
@@ -153,7 +163,7 @@ class Engine:
         """See `Host`."""
         return _Timer(self, when - self._epoch, callback)
 
-    # --- groups ---------------------------------------------------------------------------------------------------------------------
+    # --- groups -----------------------------------------------------------------------------------------------------
 
     def all_workers(self) -> Iterator[Worker]:
         """Those inside iterations too."""
@@ -180,10 +190,8 @@ class Engine:
 
     def _deliver(self, box: deque[Any]) -> None:
         """From a thread: one wake-up for all that it has put into its box by then."""
-        try:
+        with contextlib.suppress(RuntimeError):  # the loop is closed: the run is over, nobody waits for this
             self.loop.call_soon_threadsafe(self._collect, box, context=self.context)
-        except RuntimeError:
-            pass  # the loop is closed: the run is over, nobody waits for this
 
     def _collect(self, box: deque[Any]) -> None:
         while box:
@@ -204,7 +212,7 @@ class Engine:
         else:
             self.loop.call_soon_threadsafe(call, context=self.context)
 
-    # --- the pump -------------------------------------------------------------------------------------------------------------------
+    # --- the pump ---------------------------------------------------------------------------------------------------
 
     def kick(self) -> None:
         """Something may be queued: see to it that the pump runs."""
@@ -233,7 +241,7 @@ class Engine:
         finally:
             core.pumping = core.plain = False
             core.current = None
-        if core.over:
+        if self._outcome is not None:
             return
         if policy or self._ready_groups:
             self.kick()
@@ -242,7 +250,11 @@ class Engine:
 
     def _internal(self, error: BaseException) -> None:
         """A fault of ours must end the run, not hang it."""
-        problem = error if isinstance(error, HfgError) else EngineInternalError(f"{type(error).__name__}: {error}; please report this")
+        problem = (
+            error
+            if isinstance(error, HfgError)
+            else EngineInternalError(f"{type(error).__name__}: {error}; please report this")
+        )
         if problem is not error:
             problem.__cause__ = error
         self.finish("failed", problem)
@@ -327,7 +339,7 @@ class Engine:
         self.holds -= 1
         self.kick()
 
-    # --- a node's code --------------------------------------------------------------------------------------------------------------
+    # --- a node's code ----------------------------------------------------------------------------------------------
 
     def execute(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
         """See `Host`."""
@@ -388,8 +400,10 @@ class Engine:
                 worker.core.in_flight -= 1
             elif self._zombies:
                 self._zombies.discard(carrier)
-            if self.core.over and not closing:
-                return
+            if outer.over:
+                self._came_back.set()
+                if not closing:
+                    return
             try:
                 done(result, error)
             except Exception as fault:
@@ -490,7 +504,7 @@ class Engine:
             waiter: asyncio.Future[None] = self.loop.create_future()
             if worker.room_waiters is None:
                 worker.room_waiters = []
-            worker.room_waiters.append(lambda: waiter.done() or waiter.set_result(None))  # type: ignore[func-returns-value]
+            worker.room_waiters.append(partial(answer, waiter, None))
             worker.waiting_room += 1
             worker.core.in_flight -= worker.in_flight  # it waits for us, not we for it
             self.kick()
@@ -506,7 +520,7 @@ class Engine:
         port._thread = self._thread
         self.seen_ports.append(port)
 
-    # --- beginning and ending -------------------------------------------------------------------------------------------------------
+    # --- beginning and ending ---------------------------------------------------------------------------------------
 
     async def start(self) -> None:
         """Set up all nodes, trigger `start`, then let the sources go (A10)."""
@@ -532,12 +546,13 @@ class Engine:
     async def _set_up_all(self, core: Core) -> bool:
         """Set up every node in order of adding, those inside an iteration right behind it; whether all went well."""
         for worker in core.workers:
-            if worker.type is not None and (worker.is_async or any(spec.is_async for spec in worker.type.slots.values())):
+            if worker.type is not None and (
+                worker.is_async or any(spec.is_async for spec in worker.type.slots.values())
+            ):
                 worker.carrier = Carrier(self.loop, f"hfg {worker.path}", self.context)
         for edge in core.edges:
-            initial = getattr(edge, "initial", ())
-            if initial:
-                edge.queue.extend(Token(value, 0, self.now(), 0) for value in initial)
+            if isinstance(edge, DelayEdge | EventEdge):
+                edge.queue.extend(Token(value, 0, self.now(), 0) for value in edge.initial)
         for worker in core.workers:
             if worker.scope is None:
                 await self._set_up_one(worker)
@@ -570,7 +585,7 @@ class Engine:
     async def _set_up_one(self, worker: Worker) -> None:
         waiter: asyncio.Future[HfgError | None] = self.loop.create_future()
         self._set_up.append(worker)
-        lifecycle.set_up(worker, lambda error: waiter.done() or waiter.set_result(error))  # type: ignore[func-returns-value,arg-type]
+        lifecycle.set_up(worker, partial(answer, waiter))
         error = waiter.result() if waiter.done() else await waiter
         if error is not None:
             self.finish("failed", error)
@@ -618,10 +633,11 @@ class Engine:
         self._quiet_waiters.clear()
         self.ending.set()
 
-
-
     async def close(self) -> tuple[str, HfgError | None]:
-        """Tear everything down, in reverse order of setup, each within its time limit (X3); gives back how the run ended."""
+        """Tear everything down, in reverse order of setup, each within its time limit (X3).
+
+        Gives back how the run ended.
+        """
         if self._outcome is None:
             self.finish("cancelled", None)
         assert self._outcome is not None
@@ -670,12 +686,16 @@ class Engine:
         for task in self._aside:
             task.cancel()
         limit = self.teardown_limit_s
-        until = time.monotonic() + limit
-        while any(worker.in_flight for worker in carriers) and time.monotonic() < until:
-            await asyncio.sleep(0)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(limit):
+                while any(worker.in_flight for worker in carriers):
+                    self._came_back.clear()
+                    await self._came_back.wait()
         for worker in carriers:
             if worker.in_flight:
-                problem = NodeError(worker.path, f"firing {worker.firings}", f"it was cancelled and did not end within {limit:g} s")
+                problem = NodeError(
+                    worker.path, f"firing {worker.firings}", f"it was cancelled and did not end within {limit:g} s"
+                )
                 self.core.errors.append(problem)
                 worker.carrier = None
 
@@ -685,7 +705,7 @@ class Engine:
         if worker.generator is None and worker.node._hook("teardown") is None:
             return None
         waiter: asyncio.Future[NodeError | None] = self.loop.create_future()
-        lifecycle.tear_down(worker, lambda error: waiter.done() or waiter.set_result(error))  # type: ignore[func-returns-value,arg-type]
+        lifecycle.tear_down(worker, partial(answer, waiter))
         if waiter.done():
             return waiter.result()
         limit = self.teardown_limit_s
@@ -721,10 +741,13 @@ class Engine:
         """Whose cancellation means that somebody wants to leave, even while a node blocks the loop."""
         self._main_task = task
 
-    # --- the trace ------------------------------------------------------------------------------------------------------------------
+    # --- the trace --------------------------------------------------------------------------------------------------
 
     def add_consumer(self, consumer: Callable[[TraceEvent], None]) -> Callable[[], None]:
-        """Let a consumer see every event from now on; gives back what removes it. One that raises is logged and removed (R7)."""
+        """Let a consumer see every event from now on.
+
+        Gives back what removes it. One that raises is logged and removed (R7).
+        """
 
         def guarded(event: TraceEvent) -> None:
             try:
@@ -762,4 +785,3 @@ class Engine:
         if core.started and (before is None) != (core.trace is None):
             for worker in core.workers:
                 steps.choose(worker)
-

@@ -1,6 +1,7 @@
 """What a node does next: a firing, a slot call, its end (rules F1-F4, F9, F11, F12, P6, P8, A6, A11, T5).
 
-The general way; `steps` has shorter ones for the common shapes, which fall back to this one. Stands on `sending`; a node's code is run by the host.
+The general way; `steps` has shorter ones for the common shapes, which fall back to this one. Stands on `sending`; a
+node's code is run by the host.
 """
 
 from __future__ import annotations
@@ -38,7 +39,16 @@ from hfg.trace import (
 )
 from hfg.types import accepts, describe
 
-__all__ = ["await_call", "complete_firing", "finish_call", "finish_firing", "idle_again", "source_ended", "step", "write"]
+__all__ = [
+    "await_call",
+    "complete_firing",
+    "finish_call",
+    "finish_firing",
+    "idle_again",
+    "source_ended",
+    "step",
+    "write",
+]
 
 
 def step(worker: Worker) -> None:
@@ -92,7 +102,7 @@ def idle_again(worker: Worker, *, asked: bool = False) -> None:
         queue(worker)
 
 
-# --- firing -----------------------------------------------------------------------------------------------------------------------------
+# --- firing ---------------------------------------------------------------------------------------------------------
 
 
 def fire(worker: Worker) -> None:
@@ -152,7 +162,7 @@ def _take(edge: Any) -> Token[Any]:
     """Remove the oldest token (rule F3); its place is freed by the caller once the firing is on record."""
     barrier = edge.target.inputs
     if type(edge) is SyncEdge:
-        token = edge.token
+        token: Any = edge.token
         edge.token = None
         barrier.missing += 1
     else:
@@ -205,7 +215,11 @@ def _idle_turn(worker: Worker, idle_rate_hz: float | None) -> bool:
 
 def _all_ended(worker: Worker) -> bool:
     """F4(1): every live input has ended; edges with initial tokens do not count, and one other must have."""
-    live = [edge for edge in worker.in_edges if edge.live and not (type(edge) is EventEdge and edge.target_kind == "parameter")]
+    live = [
+        edge
+        for edge in worker.in_edges
+        if edge.live and not (type(edge) is EventEdge and edge.target_kind == "parameter")
+    ]
     counted = [edge for edge in live if not getattr(edge, "initial", ())]
     return bool(counted) and all(edge.ended for edge in counted)
 
@@ -284,7 +298,9 @@ def merge(worker: Worker, result: Any) -> list[Any] | None:
     if result is not None:
         if node_type.result == "none":
             if worker.out_names and len(worker.out_names) > len(node_type.parameters):
-                raise TypeError(f"process returned {describe(type(result))}, but it writes its outputs with send(): return None")
+                raise TypeError(
+                    f"process returned {describe(type(result))}, but it writes its outputs with send(): return None"
+                )
         else:
             values = worker.node._split(result)
             if written is None:
@@ -293,14 +309,20 @@ def merge(worker: Worker, result: Any) -> list[Any] | None:
                 if value is None:
                     continue
                 if written[position] is not None:
-                    raise UsageError(f'output "{worker.path}.{worker.out_names[position]}" was written twice in one firing: return or send, once')
+                    raise UsageError(
+                        f'output "{worker.path}.{worker.out_names[position]}" was written twice in one '
+                        f"firing: return or send, once"
+                    )
                 written[position] = _entry(value)
     if worker.core.debug and written is not None:
         for position, name in enumerate(node_type.outputs):
             entry = written[position]
             hint = node_type.outputs[name].type
             if entry is not None and not accepts(entry[0], hint):
-                raise TypeError(f'output "{worker.path}.{name}" is declared {describe(hint)}, got {describe(type(entry[0]))}: {entry[0]!r:.80}')
+                raise TypeError(
+                    f'output "{worker.path}.{name}" is declared {describe(hint)}, got '
+                    f"{describe(type(entry[0]))}: {entry[0]!r:.80}"
+                )
     if node_type is not None and node_type.parameters:
         written = _add_parameters(worker, written)
     return written
@@ -330,13 +352,17 @@ def write(worker: Worker, position: int, value: Any, activity: int | None, stamp
     path = f"{worker.path}.{worker.out_names[position]}"
     if worker.busy not in ("firing", "ending"):
         where = "in a slot handler" if worker.busy == "call" else "outside a firing"
-        raise UsageError(f'output "{path}" was written {where}: outputs belong to process() and end(); trigger an event instead')
+        raise UsageError(
+            f'output "{path}" was written {where}: outputs belong to process() and end(); trigger an event instead'
+        )
     if value is None:
         return
     if worker.written is None:
         worker.written = [None] * len(worker.out_edges)
     if worker.written[position] is not None:
-        raise UsageError(f'output "{path}" was written twice in one firing: it takes one token, merge the values or use an event')
+        raise UsageError(
+            f'output "{path}" was written twice in one firing: it takes one token, merge the values or use an event'
+        )
     if type(value) is Token:
         activity = value.activity if activity is None else activity
         stamp = value.stamp if stamp is None else stamp
@@ -371,7 +397,7 @@ def _cancel_limit(worker: Worker) -> None:
         worker.limit_timer = None
 
 
-# --- the end of a node ------------------------------------------------------------------------------------------------------------------
+# --- the end of a node ----------------------------------------------------------------------------------------------
 
 
 def source_ended(worker: Worker) -> None:
@@ -447,7 +473,7 @@ def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     idle_again(worker)
 
 
-# --- slot calls -------------------------------------------------------------------------------------------------------------------------
+# --- slot calls -----------------------------------------------------------------------------------------------------
 
 
 def call(worker: Worker) -> None:
@@ -526,4 +552,3 @@ def finish_call(worker: Worker, outcome: Any) -> None:
     worker.right = False
     worker.stamp = None
     idle_again(worker)
-

@@ -1,7 +1,7 @@
 """Where nodes run and in which order: run queues with a policy, the loop group and thread groups (rules R1, R2, X2).
 
-A policy is three methods over workers; the loop group's is drained by the pump in `run`. Threads are our own and daemons: an executor's stuck job would
-hold the interpreter's exit. Stands on `worker`.
+A policy is three methods over workers; the loop group's is drained by the pump in `run`. Threads are our own and
+daemons: an executor's stuck job would hold the interpreter's exit. Stands on `worker`.
 """
 
 from __future__ import annotations
@@ -19,14 +19,25 @@ from typing import Any, Protocol
 from hfg.engine.worker import Worker
 from hfg.errors import UsageError
 
-__all__ = ["POLICIES", "Fifo", "Group", "Job", "LoopGroup", "Policy", "Priority", "SeededRandom", "ThreadGroup", "make_policy"]
+__all__ = [
+    "POLICIES",
+    "Fifo",
+    "Group",
+    "Job",
+    "LoopGroup",
+    "Policy",
+    "Priority",
+    "SeededRandom",
+    "ThreadGroup",
+    "make_policy",
+]
 
 
 class Policy(Protocol):
     """Which of the workers that can move is next (R2).
 
-    A worker stands in it at most once. `push` is called when it can move, `pop` only while there are any; a policy may look at everything a worker and its
-    options say (priority, deadline, busy time), but must not change it.
+    A worker stands in it at most once. `push` is called when it can move, `pop` only while there are any; a policy
+    may look at everything a worker and its options say (priority, deadline, busy time), but must not change it.
     """
 
     def push(self, worker: Worker) -> None:
@@ -42,7 +53,7 @@ class Fifo(deque[Worker]):
     """First in, first out: the default."""
 
     push = deque.append
-    pop = deque.popleft  # type: ignore[assignment]
+    pop = deque.popleft
 
 
 class Priority:
@@ -53,9 +64,11 @@ class Priority:
         self._count = itertools.count()
 
     def push(self, worker: Worker) -> None:
+        """See `Policy`."""
         heapq.heappush(self._heap, (-worker.priority, next(self._count), worker))
 
     def pop(self) -> Worker:
+        """See `Policy`."""
         return heapq.heappop(self._heap)[2]
 
     def __len__(self) -> int:
@@ -70,9 +83,11 @@ class SeededRandom:
         self._workers: list[Worker] = []
 
     def push(self, worker: Worker) -> None:
+        """See `Policy`."""
         self._workers.append(worker)
 
     def pop(self) -> Worker:
+        """See `Policy`."""
         workers = self._workers
         position = self._random.randrange(len(workers))
         workers[position], workers[-1] = workers[-1], workers[position]
@@ -120,7 +135,13 @@ class Job:
 
     __slots__ = ("arguments", "call", "done", "error", "owner", "result")
 
-    def __init__(self, owner: Any, call: Callable[..., Any], arguments: tuple[Any, ...], done: Callable[[Any, BaseException | None], None]) -> None:
+    def __init__(
+        self,
+        owner: Any,
+        call: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        done: Callable[[Any, BaseException | None], None],
+    ) -> None:
         self.owner = owner
         self.call = call
         self.arguments = arguments
@@ -130,7 +151,9 @@ class Job:
 
 
 class ThreadGroup(Group):
-    """A thread of its own. The loop decides what it does next; results and signals come back in order, many with one wake-up.
+    """A thread of its own. The loop decides what it does next; results and signals come back in order.
+
+    Many with one wake-up.
 
     Attributes:
       running: jobs given to the thread and not yet back.
@@ -185,7 +208,9 @@ class ThreadGroup(Group):
         """From the group's own thread: do this on the loop, before the result of the job under way (F3)."""
         lane = _Lane.current()
         if lane is None:
-            raise UsageError(f'a signal of group "{self.name}" came from a thread that is none of the group\'s: use run.trigger')
+            raise UsageError(
+                f'a signal of group "{self.name}" came from a thread that is none of the group\'s: use run.trigger'
+            )
         lane.send(call)
 
     def abandon(self, what: str) -> None:
@@ -239,7 +264,7 @@ class _Lane:
         while (job := self.jobs.get()) is not None:
             try:
                 job.result = job.call(*job.arguments)
-            except BaseException as error:  # noqa: BLE001 - whatever it is belongs to the run
+            except BaseException as error:
                 job.error = error
             self.send(job)
             del job

@@ -1,7 +1,9 @@
-"""A subgraph that iterates over collections (rule G4): the inside sees the elements one by one, each to quiet before the next.
+"""A subgraph that iterates over collections (rule G4): the inside sees the elements one by one.
 
-The inside is a run of its own within the run: a core with its own idea of quiet, whose workers stand in the same groups. Outside, the subgraph is one node
-that fires. Stands on `plan` and `quiet`; waits for nothing itself.
+Each to quiet before the next.
+
+The inside is a run of its own within the run: a core with its own idea of quiet, whose workers stand in the same
+groups. Outside, the subgraph is one node that fires. Stands on `plan` and `quiet`; waits for nothing itself.
 """
 
 from __future__ import annotations
@@ -101,7 +103,10 @@ class Iteration:
         self.settle()
 
     def begin(self, arguments: Sequence[Any]) -> None:
-        """The subgraph fires: let the elements go in, one after the other; unequal lengths are an error of the firing (X1)."""
+        """The subgraph fires: let the elements go in, one after the other.
+
+        Unequal lengths are an error of the firing (X1).
+        """
         worker = self.worker
         names = list(worker.type.inputs)
         lengths = {name: len(list(value)) for name, value in zip(names, arguments, strict=True) if name in self._over}
@@ -111,7 +116,9 @@ class Iteration:
             errors.fail(worker, f"firing {worker.firings}", problem, answer=True)
             return
         count = next(iter(lengths.values()), 0)
-        columns = [list(value) if name in self._over else [value] * count for name, value in zip(names, arguments, strict=True)]
+        columns = [
+            list(value) if name in self._over else [value] * count for name, value in zip(names, arguments, strict=True)
+        ]
         self._elements = list(zip(*columns, strict=True))
         self._position = 0
         self._results = [[] for _ in self.worker.type.outputs]

@@ -9,10 +9,11 @@ import asyncio
 import concurrent.futures
 from collections import deque
 from collections.abc import AsyncIterator, Callable
+from functools import partial
 from types import TracebackType
 from typing import Any
 
-from hfg.engine.engine import Engine
+from hfg.engine.engine import Engine, answer
 from hfg.engine.sending import enqueue, put_outputs, release
 from hfg.engine.worker import ENDED, Worker
 from hfg.errors import NotRunning, UsageError
@@ -40,12 +41,17 @@ class Feed:
     async def __aenter__(self) -> Feed:
         _check_running(self._engine)
         if self._worker.blocked & ENDED:
-            raise UsageError(f'graph input "{self._worker.port_name}" has ended: an earlier feed was closed; open that one with end=False to feed it again')
+            raise UsageError(
+                f'graph input "{self._worker.port_name}" has ended: an earlier feed was closed; open that '
+                f"one with end=False to feed it again"
+            )
         self._open = True
         self._engine.hold()
         return self
 
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None) -> None:
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
         self._open = False
         try:
             if kind is None and self._end and not self._engine.core.over:
@@ -65,9 +71,14 @@ class Feed:
           TypeError: the value is not of the input's type.
         """
         if not self._open:
-            raise NotRunning(f'the feed of "{self._worker.port_name}" is closed: use it inside "async with run.feed(...)"')
+            raise NotRunning(
+                f'the feed of "{self._worker.port_name}" is closed: use it inside "async with run.feed(...)"'
+            )
         if type(value) is not Token and not isinstance(value, Marker) and not accepts(value, self._hint):
-            raise TypeError(f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got {describe(type(value))}: {value!r:.80}')
+            raise TypeError(
+                f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got '
+                f"{describe(type(value))}: {value!r:.80}"
+            )
         async with self._lock:
             await self._free()
             _check_running(self._engine)
@@ -75,7 +86,9 @@ class Feed:
             await self._free()
         _check_running(self._engine)
 
-    def send_from_thread(self, value: Any, *, activity: int | None = None, stamp: float | None = None) -> concurrent.futures.Future[None]:
+    def send_from_thread(
+        self, value: Any, *, activity: int | None = None, stamp: float | None = None
+    ) -> concurrent.futures.Future[None]:
         """Send from any other thread, in order; the future is done when the token is processed."""
         return asyncio.run_coroutine_threadsafe(self.send(value, activity=activity, stamp=stamp), self._engine.loop)
 
@@ -97,7 +110,7 @@ class Feed:
 async def until(engine: Engine, when: Callable[[Callable[[], None]], None]) -> None:
     """Wait for a barrier, or for the end of the run."""
     waiter: asyncio.Future[None] = engine.loop.create_future()
-    when(lambda: waiter.done() or waiter.set_result(None))  # type: ignore[func-returns-value,arg-type,return-value]
+    when(partial(answer, waiter, None))
     if waiter.done():
         return
     ending = asyncio.ensure_future(engine.ending.wait())
@@ -172,7 +185,9 @@ class _Tapped:
         self.wake = asyncio.Event()
 
 
-async def signal(engine: Engine, worker: Worker, slot: str, value: Any, activity: int | None, stamp: float | None) -> None:
+async def signal(
+    engine: Engine, worker: Worker, slot: str, value: Any, activity: int | None, stamp: float | None
+) -> None:
     """Bring a signal into a slot from outside, as if by an edge that is active; waits while its queue is full (F8).
 
     The signal takes its place behind all that wait already.
@@ -188,7 +203,7 @@ async def signal(engine: Engine, worker: Worker, slot: str, value: Any, activity
         outside = edge.source
         if outside.room_waiters is None:
             outside.room_waiters = []
-        outside.room_waiters.append(lambda: waiter.done() or waiter.set_result(None))  # noqa: B023
+        outside.room_waiters.append(partial(answer, waiter, None))
         await until(engine, lambda done: waiter.add_done_callback(lambda _: done()))  # noqa: B023
         _check_running(engine)
     explicit = activity or 0

@@ -16,7 +16,7 @@ from hfg.engine.scopes import Gate, Scope
 from hfg.engine.wiring import is_live, rewire
 from hfg.engine.worker import DISABLED, STARTING, RunningEvent, Worker
 from hfg.errors import GraphError, UsageError
-from hfg.graph.flat import FlatEdge, FlatGraph, FlatNode
+from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode
 from hfg.ports.edges import DelayEdge, Edge, EventEdge, SyncEdge
 
 __all__ = ["build", "prepare_slot", "watch"]
@@ -80,7 +80,8 @@ class _Ends:
         self.feeds: dict[str, Worker] = {}
         self.readers: dict[str, Worker] = {}
 
-    def of(self, end: Any) -> Worker:
+    def of(self, end: End) -> Worker:
+        """Give the worker."""
         if end.node >= 0:
             return self.workers[end.node]
         if end.node < -1:
@@ -153,7 +154,8 @@ def _worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) -> Wor
         worker.blocked &= ~STARTING
     if group.threaded and _waits(worker):
         raise GraphError(
-            f'node "{worker.path}" is async, but its group "{group.name}" is a thread: async code runs on the loop; leave out group=, or make the '
+            f'node "{worker.path}" is async, but its group "{group.name}" is a thread: async code runs on '
+            f"the loop; leave out group=, or make the "
             f"function a plain one"
         )
     return worker
@@ -170,7 +172,9 @@ def _edge(core: Core, flat: FlatEdge, ends: _Ends) -> None:
     edge: Any
     by_event = flat.source.kind in ("event", "observable")
     if by_event:
-        edge = EventEdge(index, flat.label, flat.active, flat.capacity, flat.overflow, flat.capacity_limit, flat.initial)
+        edge = EventEdge(
+            index, flat.label, flat.active, flat.capacity, flat.overflow, flat.capacity_limit, flat.initial
+        )
     elif flat.initial:
         edge = DelayEdge(index, flat.label, flat.active, flat.initial)
     else:
@@ -268,7 +272,9 @@ def prepare_slot(worker: Worker, name: str) -> EventEdge:
 
 def _out_of(edge: Edge, source: Worker, flat: FlatEdge) -> None:
     name = flat.source.name
-    if name not in source.out_names or flat.source.kind == "parameter" and name not in source.out_names[len(source.type.outputs) :]:
+    if name not in source.out_names or (
+        flat.source.kind == "parameter" and name not in source.out_names[len(source.type.outputs) :]
+    ):
         source.out_names = (*source.out_names, name)  # a parameter's output is made when it is first connected (P8)
         source.wired_out = (*source.wired_out, ())
     names = source.out_names
@@ -283,13 +289,17 @@ def _mark_scopes(core: Core) -> None:
     for scope in core.scopes:
         owner = scope.worker
         assert owner is not None
-        interesting = bool(scope.gates) or owner.active_for_s is not None or any(
-            name in owner.events for name in ("activated", "deactivated", "timeout")
+        interesting = (
+            bool(scope.gates)
+            or owner.active_for_s is not None
+            or any(name in owner.events for name in ("activated", "deactivated", "timeout"))
         )
         if interesting:
             scope.watched = True
             inside = {member.index for member in scope.members}
-            scope.inner_edges = [edge for edge in core.edges if edge.source.index in inside and edge.target.index in inside]
+            scope.inner_edges = [
+                edge for edge in core.edges if edge.source.index in inside and edge.target.index in inside
+            ]
             for member in scope.members:
                 member.scopes += (scope,)
     for worker in core.workers:

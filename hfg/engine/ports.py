@@ -53,10 +53,15 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
 
 
 def bind_automatic(worker: Worker) -> None:
-    """Let the automatic events of a node, subgraph or graph that have edges or subscribers be triggered and listened to."""
+    """Let the automatic events of a node.
+
+    Subgraph or graph that have edges or subscribers be triggered and listened to.
+    """
     if worker.node is None:
         return
-    made = [port for port in worker.node.__dict__.values() if isinstance(port, EventPort) and port.name in AUTOMATIC_EVENTS]
+    made = [
+        port for port in worker.node.__dict__.values() if isinstance(port, EventPort) and port.name in AUTOMATIC_EVENTS
+    ]
     for port in made:
         if port.name in worker.events or port._observers:
             bind_event(worker, port.name)

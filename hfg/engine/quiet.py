@@ -1,6 +1,7 @@
 """What happens when nothing moves: queues grow, events end, the run ends or has stalled (rules F8, F13, P9, R5).
 
-Decides only; `run` asks when it sees that no code runs, no worker is queued and no timer is pending. Stands on `sending`.
+Decides only; `run` asks when it sees that no code runs, no worker is queued and no timer is pending. Stands on
+`sending`.
 """
 
 from __future__ import annotations
@@ -31,8 +32,10 @@ def grow(core: Core) -> bool:
         core.host.finish(
             "failed",
             QueueLimit(
-                f'queue of "{edge.label}" holds {len(edge.queue)} signals, nothing else can move, and its capacity_limit = '
-                f"{edge.capacity_limit} forbids it to grow: raise the limit or let the consumer take more than it is sent"
+                f'queue of "{edge.label}" holds {len(edge.queue)} signals, nothing else can move, and its '
+                f"capacity_limit = "
+                f"{edge.capacity_limit} forbids it to grow: raise the limit or let the consumer take more "
+                f"than it is sent"
             ),
         )
         return True
@@ -58,7 +61,8 @@ def _held_by_queue_alone(worker: Worker) -> bool:
 def complete_operators(core: Core) -> bool:
     """P9: before the run ends each event with operators completes, so that they give out what they hold."""
     edges = [edge for edge in core.edges if type(edge) is EventEdge and edge.complete is not None]
-    return any([complete_edge(edge) for edge in edges])
+    came_out = [complete_edge(edge) for edge in edges]  # each of them, not only up to the first
+    return any(came_out)
 
 
 def complete_edge(edge: EventEdge) -> bool:
@@ -72,7 +76,10 @@ def complete_edge(edge: EventEdge) -> bool:
 
 
 def end_events(core: Core) -> bool:
-    """F13: all live event edges into inputs whose queue is empty get END, at the same moment and once; graph inputs that nobody feeds likewise."""
+    """F13: all live event edges into inputs whose queue is empty get END, at the same moment and once.
+
+    Graph inputs that nobody feeds likewise.
+    """
     edges = [
         edge
         for edge in core.edges
@@ -95,7 +102,10 @@ def end_events(core: Core) -> bool:
 
 
 def node_ended(worker: Worker) -> None:
-    """A node is over: its operators complete (P9), and sources that only feed the dead are futile when no other is left (R5)."""
+    """A node is over: its operators complete (P9).
+
+    And sources that only feed the dead are futile when no other is left (R5).
+    """
     core = worker.core
     if not worker.slot_edges:
         for edge in worker.event_edges():
@@ -126,7 +136,11 @@ def stall(core: Core) -> Stalled | None:
     reasons: list[str] = []
     stuck: dict[int, list[Any]] = {}
     for edge in core.edges:
-        if edge.untaken and (edge.live or edge.source.blocked & DISABLED) and not edge.target.blocked & (DISABLED | ENDED):
+        if (
+            edge.untaken
+            and (edge.live or edge.source.blocked & DISABLED)
+            and not edge.target.blocked & (DISABLED | ENDED)
+        ):
             stuck.setdefault(edge.target.index, [edge.target]).append(edge)
     for target, *edges in stuck.values():
         lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
@@ -138,7 +152,8 @@ def stall(core: Core) -> Stalled | None:
         return None
     shown = "; ".join(reasons[:5]) + (f"; and {len(reasons) - 5} more" if len(reasons) > 5 else "")
     return Stalled(
-        f"the run has stalled: {shown}. Nothing can change this from inside: connect or end what is missing, or run with allow_idle=True "
+        f"the run has stalled: {shown}. Nothing can change this from inside: connect or end what is "
+        f"missing, or run with allow_idle=True "
         f"if something outside will"
     )
 

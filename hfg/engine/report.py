@@ -55,7 +55,8 @@ class Report(msgspec.Struct, frozen=True):
     """How a run went.
 
     Attributes:
-      outcome: "done", "stopped" (slot `stop`, or the block was left), "until", "cancelled", "failed", "stalled", "aborted".
+      outcome: "done", "stopped" (slot `stop`, or the block was left), "until", "cancelled", "failed", "stalled",
+        "aborted".
       duration_s: on the run's clock.
       firings: all firings of all nodes.
       nodes: by path.
@@ -98,7 +99,11 @@ def edge_reports(core: Core) -> dict[str, EdgeReport]:
     """Count what every edge has carried so far."""
     return {
         edge.label: EdgeReport(
-            sent=edge.sent, dropped=edge.dropped, drained=edge.drained, untaken=edge.untaken, grown=getattr(edge, "grown", 0)
+            sent=edge.sent,
+            dropped=edge.dropped,
+            drained=edge.drained,
+            untaken=edge.untaken,
+            grown=getattr(edge, "grown", 0),
         )
         for edge in core.edges
     }

@@ -1,4 +1,6 @@
-"""Running a graph: `run`, `run_async`, `running`, and what one can do with a run from outside (ARCHITECTURE §1, rules R1, R5, R6, P10).
+"""Running a graph: `run`, `run_async`, `running`, and what one can do with a run from outside (ARCHITECTURE §1.
+
+Rules R1, R5, R6, P10).
 
 Stands on `engine` and `outside`.
 """
@@ -6,18 +8,19 @@ Stands on `engine` and `outside`.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any, Literal
 
 from hfg.engine import outside
-from hfg.engine.engine import Engine, Settings
+from hfg.engine.engine import Engine, Settings, answer
 from hfg.engine.report import Report, edge_reports, node_reports
-from hfg.engine.sending import set_active, trigger
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import Worker
-from hfg.errors import CheckFailed, GraphError, HfgError, NodeError, NotRunning, RunError, UsageError
-from hfg.graph import Graph, Subgraph
+from hfg.errors import CheckFailed, GraphError, HfgError, NotRunning, RunError, UsageError
+from hfg.graph import Graph
 from hfg.graph.flat import flatten
 from hfg.nodetype import Node
 from hfg.token import Token
@@ -38,9 +41,11 @@ class Run:
         self._held = False
         self._done: asyncio.Future[None] | None = None
 
-    # --- bringing in and taking out --------------------------------------------------------------------------------------------------
+    # --- bringing in and taking out ---------------------------------------------------------------------------------
 
-    async def trigger(self, port: Any, value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+    async def trigger(
+        self, port: Any, value: Any = None, *, activity: int | None = None, stamp: float | None = None
+    ) -> None:
         """Send a signal into a slot, or trigger an event as its node would; waits while a queue is full (F8).
 
         Args:
@@ -54,20 +59,28 @@ class Run:
             await outside.signal(self._engine, worker, port.name, value, activity, stamp)
             return
         if port.kind != "event":
-            raise UsageError(f'"{port.path}" is an {port.kind}: run.trigger is for slots and events; give tokens to a graph input with run.feed')
+            raise UsageError(
+                f'"{port.path}" is an {port.kind}: run.trigger is for slots and events; give tokens to a '
+                f"graph input with run.feed"
+            )
         from hfg.engine.ports import bind_event
 
         event = bind_event(self._worker(port.node), port.name)
         await self._engine.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
 
     def feed(self, port: Any, *, end: bool = True) -> outside.Feed:
-        """Open a feed into a graph input; use it with `async with`, which holds the run open and sends END at its end unless `end=False`."""
+        """Open a feed into a graph input; use it with `async with`.
+
+        Which holds the run open and sends END at its end unless `end=False`.
+        """
         name = getattr(port, "name", port)
         for worker in self._engine.core.feeds:
             if worker.port_name == name:
                 return outside.Feed(self._engine, worker, getattr(port, "type", Any), end=end)
         if name in self.graph.inputs:
-            raise UsageError(f'graph input "{name}" is not connected: graph.connect(graph.inputs["{name}"], ...) before the run')
+            raise UsageError(
+                f'graph input "{name}" is not connected: graph.connect(graph.inputs["{name}"], ...) before the run'
+            )
         raise UsageError(f'"{name}" is no input of graph "{self.graph.name}": it has {_names(self.graph.inputs)}')
 
     def read(self, port: Any) -> AsyncIterator[Any]:
@@ -76,10 +89,15 @@ class Run:
         for worker in self._engine.core.readers:
             if worker.port_name == name:
                 return outside.read(self._engine, worker)
-        raise UsageError(f'"{name}" is no connected output of graph "{self.graph.name}": it has {_names(self.graph.outputs)}')
+        raise UsageError(
+            f'"{name}" is no connected output of graph "{self.graph.name}": it has {_names(self.graph.outputs)}'
+        )
 
     async def tap(self, port: Any, *, size: int = 100) -> AsyncIterator[Token[Any]]:
-        """Look at an output, event or input: tokens as they are sent; the oldest of more than `size` that were not looked at are skipped."""
+        """Look at an output, event or input: tokens as they are sent.
+
+        The oldest of more than `size` that were not looked at are skipped.
+        """
         engine = self._engine
         edges = [edge for edge in engine.core.edges if self._touches(edge, port)]
         labels = {edge.label for edge in edges}
@@ -128,7 +146,7 @@ class Run:
         if core.trace is not None:
             core.trace(ParameterSet(core.now(), parameter.node.place.path, parameter.name, value))
 
-    # --- waiting ---------------------------------------------------------------------------------------------------------------------
+    # --- waiting ----------------------------------------------------------------------------------------------------
 
     async def wait_for(self, event: Any) -> Token[Any]:
         """Wait for the next signal of an event.
@@ -140,7 +158,7 @@ class Run:
         from hfg.engine.ports import bind_event
 
         bind_event(self._worker(event.node), event.name)
-        subscription = event.subscribe(lambda token: waiter.done() or waiter.set_result(token))
+        subscription = event.subscribe(partial(answer, waiter))
         ending = asyncio.ensure_future(self._engine.ending.wait())
         try:
             await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
@@ -186,11 +204,15 @@ class Run:
         await self._close()
         return self.report()
 
-    # --- looking ---------------------------------------------------------------------------------------------------------------------
+    # --- looking ----------------------------------------------------------------------------------------------------
 
     def active(self) -> list[str]:
         """The paths of all active nodes, in order of adding."""
-        return [worker.path for worker in self._engine.core.workers if worker.active and worker.scope is None and worker.node is not None]
+        return [
+            worker.path
+            for worker in self._engine.core.workers
+            if worker.active and worker.scope is None and worker.node is not None
+        ]
 
     def statistics(self) -> Report:
         """What the run has done so far."""
@@ -227,7 +249,9 @@ class Run:
         outcome = engine.outcome
         return Report(
             outcome=outcome,
-            duration_s=engine.ended_at - engine.started_at if engine.ended_at is not None else engine.now() - engine.started_at,
+            duration_s=engine.ended_at - engine.started_at
+            if engine.ended_at is not None
+            else engine.now() - engine.started_at,
             firings=sum(node.firings for node in nodes.values()),
             nodes=nodes,
             edges=edge_reports(core),
@@ -236,7 +260,7 @@ class Run:
             lost_activity=core.lost_activity,
         )
 
-    # --- inside ----------------------------------------------------------------------------------------------------------------------
+    # --- inside -----------------------------------------------------------------------------------------------------
 
     def _worker(self, node: Any) -> Worker:
         place = getattr(node, "place", None)
@@ -307,15 +331,24 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
 
 
 def _refuse_endless(flat: Any) -> None:
-    """R6: a function without inputs that has no rate never lets virtual time pass; a generator may end, so it is given a chance."""
+    """R6: a function without inputs that has no rate never lets virtual time pass; a generator may end.
+
+    So it is given a chance.
+    """
     for node in flat.nodes:
         kind = type(node.node)._type
-        if kind.is_source and kind.process_kind == "function" and not node.options.max_rate_hz and node.iteration is None:
+        if (
+            kind.is_source
+            and kind.process_kind == "function"
+            and not node.options.max_rate_hz
+            and node.iteration is None
+        ):
             gated = any(gate.target == node.index for gate in flat.gates)
             names = getattr(getattr(node.node._process_call(), "__code__", None), "co_names", ("EndOfStream",))
             if not gated and node.node._hook("ready") is None and "EndOfStream" not in names:
                 raise GraphError(
-                    f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time would stand still for ever: give it '
+                    f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time '
+                    f"would stand still for ever: give it "
                     f"max_rate_hz=, or let it raise hfg.EndOfStream"
                 )
 
@@ -358,7 +391,14 @@ async def run_async(
     Cancelling it tears the run down.
     """
     settings = Settings(
-        debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, allow_idle=allow_idle, block_warning_s=block_warning_s
+        debug=debug,
+        policy=policy,
+        seed=seed,
+        trace=trace,
+        fast=fast,
+        until_s=until_s,
+        allow_idle=allow_idle,
+        block_warning_s=block_warning_s,
     )
     return await _run_to_end(graph, clock or "real", settings)
 
@@ -403,9 +443,18 @@ def run(
     except RuntimeError:
         pass
     else:
-        raise UsageError("hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`")
+        raise UsageError(
+            "hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`"
+        )
     settings = Settings(
-        debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, allow_idle=allow_idle, block_warning_s=block_warning_s
+        debug=debug,
+        policy=policy,
+        seed=seed,
+        trace=trace,
+        fast=fast,
+        until_s=until_s,
+        allow_idle=allow_idle,
+        block_warning_s=block_warning_s,
     )
     factory = VirtualTimeLoop if clock == "virtual" else None
     with asyncio.Runner(loop_factory=factory) as runner:
@@ -427,9 +476,12 @@ async def running(
 ) -> AsyncIterator[Run]:
     """Run a graph as long as the block lasts; the block holds the run open until it calls `wait_finished`.
 
-    Leaving the block stops the run and tears it down. A failure of the run cancels what the block waits for and comes out here.
+    Leaving the block stops the run and tears it down. A failure of the run cancels what the block waits for and
+    comes out here.
     """
-    settings = Settings(debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, block_warning_s=block_warning_s)
+    settings = Settings(
+        debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, block_warning_s=block_warning_s
+    )
     run = _prepare(graph, clock or "real", settings)
     engine = run._engine
     body = asyncio.current_task()
@@ -468,10 +520,5 @@ async def running(
 
 async def _quietly(closing: Coroutine[Any, Any, None]) -> None:
     """The failure of the run is raised by whoever waits for it, not by its clean-up."""
-    try:
+    with contextlib.suppress(HfgError):
         await closing
-    except HfgError:
-        pass
-
-
-_ = (NodeError, Subgraph, set_active, trigger)

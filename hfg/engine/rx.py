@@ -1,18 +1,20 @@
-"""reactivex in a run: a scheduler on the run's clock, operators on edges, and observables that feed slots (rule P9, ARCHITECTURE §3).
+"""reactivex in a run: a scheduler on the run's clock, operators on edges, and observables that feed slots.
 
-`AsyncIOScheduler.now` is wall time, so in virtual time `delay` would never emit; and without a scheduler `debounce` runs on a thread. So the run brings its own.
-Stands on `sending`.
+(rule P9, ARCHITECTURE §3).
+
+`AsyncIOScheduler.now` is wall time, so in virtual time `delay` would never emit; and without a scheduler `debounce`
+runs on a thread. So the run brings its own. Stands on `sending`.
 """
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Any
 
 import reactivex
-from reactivex import abc
+from reactivex import abc, typing
 from reactivex.disposable import Disposable, SingleAssignmentDisposable
 from reactivex.observer import Observer
 from reactivex.scheduler.periodicscheduler import PeriodicScheduler
@@ -42,11 +44,15 @@ class RunScheduler(PeriodicScheduler):
         """Run the action at the loop's next pass."""
         return self._at(self._host.now(), action, state)
 
-    def schedule_relative(self, duetime: abc.RelativeTime, action: abc.ScheduledAction[Any], state: Any = None) -> abc.DisposableBase:
+    def schedule_relative(
+        self, duetime: typing.RelativeTime, action: abc.ScheduledAction[Any], state: Any = None
+    ) -> abc.DisposableBase:
         """Run the action `duetime` from now."""
         return self._at(self._host.now() + max(0.0, self.to_seconds(duetime)), action, state)
 
-    def schedule_absolute(self, duetime: abc.AbsoluteTime, action: abc.ScheduledAction[Any], state: Any = None) -> abc.DisposableBase:
+    def schedule_absolute(
+        self, duetime: typing.AbsoluteTime, action: abc.ScheduledAction[Any], state: Any = None
+    ) -> abc.DisposableBase:
         """Run the action at `duetime`."""
         return self._at(max(self._host.now(), self.to_seconds(duetime)), action, state)
 
@@ -57,7 +63,12 @@ class RunScheduler(PeriodicScheduler):
             inner.disposable = self.invoke_action(action, state=state)
 
         timer = self._host.call_at(when, run)
-        return Disposable(lambda: (timer.cancel(), inner.dispose()) and None)
+
+        def forget() -> None:
+            timer.cancel()
+            inner.dispose()
+
+        return Disposable(forget)
 
 
 def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], scheduler: RunScheduler) -> Callable[[], None]:
@@ -76,7 +87,7 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], scheduler: RunSchedul
             enqueue(edge, item, 0, newest[0])
         kick(edge)
 
-    subscription = subject.pipe(*operators).subscribe(
+    subscription: abc.DisposableBase = subject.pipe(*operators).subscribe(
         Observer(out, lambda error: operator_failed(edge, error), lambda: None), scheduler=scheduler
     )
     edge.pipeline = into
@@ -124,12 +135,10 @@ def feed_from_observable(
         else:
             hand_over(call)
 
-    observer = Observer(
+    observer: Observer[Any] = Observer(
         lambda item: on_loop(lambda: deliver(item)),
         lambda error: on_loop(lambda: over(error)),
         lambda: on_loop(lambda: over(None)),
     )
-    return source.pipe(*operators).subscribe(observer, scheduler=scheduler).dispose
-
-
-_ = timedelta
+    subscription: abc.DisposableBase = source.pipe(*operators).subscribe(observer, scheduler=scheduler)
+    return subscription.dispose

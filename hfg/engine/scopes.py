@@ -1,7 +1,7 @@
 """Subgraphs at run time (rule G2) and gates (rule A11): what depends on the activity of something else.
 
-A scope is a dissolved subgraph that somebody watches: it has an automatic event with an edge, `active_for_s`, or gates a node. Its activity is derived,
-never stored by a token. Stands on `worker`.
+A scope is a dissolved subgraph that somebody watches: it has an automatic event with an edge, `active_for_s`, or
+gates a node. Its activity is derived, never stored by a token. Stands on `worker`.
 """
 
 from __future__ import annotations

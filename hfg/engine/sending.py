@@ -1,6 +1,7 @@
 """What leaves a node and what that changes (rules T, P4-P7, F3, F5, F6, F8, A3-A8, A12).
 
-Plain functions over the run's state; they queue workers and never run a node's code, except the short hooks of activity. Stands on `worker`, `core`.
+Plain functions over the run's state; they queue workers and never run a node's code, except the short hooks of
+activity. Stands on `worker`, `core`.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ __all__ = [
     "discard",
     "enqueue",
     "give_back",
-    "put",
     "outputs_free",
+    "put",
     "put_outputs",
     "queue",
     "release",
@@ -49,7 +50,7 @@ __all__ = [
 ]
 
 
-# --- who may move -----------------------------------------------------------------------------------------------------------------------
+# --- who may move ---------------------------------------------------------------------------------------------------
 
 
 def queue(worker: Worker) -> None:
@@ -104,7 +105,7 @@ def unblock(worker: Worker, reason: int) -> None:
             queue(worker)
 
 
-# --- synchronous edges ------------------------------------------------------------------------------------------------------------------
+# --- synchronous edges ----------------------------------------------------------------------------------------------
 
 
 def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float | None] | None] | None) -> None:
@@ -145,7 +146,10 @@ def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float |
 
 
 def _activity_left(worker: Worker) -> None:
-    """A5: the first sending that carried +1 took the activity; the right of A3 stays until the firing or call is over."""
+    """A5: the first sending that carried +1 took the activity.
+
+    The right of A3 stays until the firing or call is over.
+    """
     if worker.active:
         worker.right = worker.stamp is not None  # in a firing or call
         set_active(worker, False, "sent")
@@ -244,7 +248,10 @@ def _flush_idle(worker: Worker) -> None:
 
 
 def release(edges: Sequence[Any]) -> None:
-    """These tokens are processed: free the producers' places, and transitively what waited for them (F5), without recursion."""
+    """These tokens are processed: free the producers' places, and transitively what waited for them (F5).
+
+    Without recursion.
+    """
     stack: list[Any] = list(reversed(edges))
     while stack:
         edge = stack.pop()
@@ -295,7 +302,7 @@ def send_end(worker: Worker) -> None:
     node_ended(worker)
 
 
-# --- events -----------------------------------------------------------------------------------------------------------------------------
+# --- events ---------------------------------------------------------------------------------------------------------
 
 
 def trigger(
@@ -323,8 +330,9 @@ def trigger(
     for edge in edges:
         if edge.overflow == "error" and edge.live and edge.overflows():
             raise QueueOverflow(
-                f'queue of "{edge.label}" is full: {edge.capacity} signals wait, policy "error" allows no more; nothing was sent: raise '
-                f'capacity= or choose another overflow='
+                f'queue of "{edge.label}" is full: {edge.capacity} signals wait, policy "error" allows no '
+                f"more; nothing was sent: raise "
+                f"capacity= or choose another overflow="
             )
     may_carry = worker.active or (extend_right and worker.right)
     carried = False
@@ -391,7 +399,7 @@ def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
         _drop(edge, edge.queue.popleft(), "overflow")
         if not into_input:
             _remove_call(target, edge)
-        elif into_input and not edge.queue:
+        elif not edge.queue:
             target.inputs.missing += 1
             target.placed = False
     edge.queue.append(token)
@@ -434,7 +442,7 @@ def freed(edge: EventEdge) -> None:
             unblock(source, FULL)
 
 
-# --- activity ---------------------------------------------------------------------------------------------------------------------------
+# --- activity -------------------------------------------------------------------------------------------------------
 
 
 def receive(worker: Worker, modifiers: Sequence[int]) -> None:
@@ -486,7 +494,7 @@ def flush_automatic(worker: Worker) -> None:
         for name, value in due:
             event = worker.events.get(name)
             if event is not None:
-                trigger(event, value, extend_right=False)
+                trigger(event, value, stamp=worker.core.now(), extend_right=False)  # T5: automatic signals: now
 
 
 def automatic(worker: Worker, name: str, value: Any = None) -> None:
@@ -497,7 +505,7 @@ def automatic(worker: Worker, name: str, value: Any = None) -> None:
         worker.events_due.append((name, value))
 
 
-# --- what is discarded ------------------------------------------------------------------------------------------------------------------
+# --- what is discarded ----------------------------------------------------------------------------------------------
 
 
 def discard(edge: Any, reason: Any) -> None:
@@ -545,4 +553,3 @@ def report_error(worker: Worker, what: str, error: BaseException, policy: str) -
     core = worker.core
     if core.trace is not None:
         core.trace(ErrorRaised(core.now(), worker.path, what, f"{type(error).__name__}: {error}", policy))
-

@@ -1,7 +1,10 @@
-"""Shorter ways for the common shapes: a closure per worker in which everything that cannot change between two edits is a local (figures in docs/speed.md).
+"""Shorter ways for the common shapes.
 
-A step is only a shortening: under every condition it does not cover it hands over to `firing.step`, whose outcome it must equal (property: engine = oracle
-with `fast` on and off). A worker's step is chosen anew whenever its wiring or somebody's interest in the trace changes. Stands on `firing`.
+A closure per worker in which everything that cannot change between two edits is a local (figures in docs/speed.md).
+
+A step is only a shortening: under every condition it does not cover it hands over to `firing.step`, whose outcome it
+must equal (property: engine = oracle with `fast` on and off). A worker's step is chosen anew whenever its wiring or
+somebody's interest in the trace changes. Stands on `firing`.
 """
 
 from __future__ import annotations
@@ -47,7 +50,13 @@ def choose(worker: Worker) -> None:
     if worker.gate is not None or worker.iteration is not None or worker.ready_hook is not None or worker.observed:
         return
     options = worker.options
-    if options.max_rate_hz or options.max_duration_s or worker.scopes or worker.watched or worker.type.parameters and _parameters_wired(worker):
+    if (
+        options.max_rate_hz
+        or options.max_duration_s
+        or worker.scopes
+        or worker.watched
+        or (worker.type.parameters and _parameters_wired(worker))
+    ):
         return
     if worker.slot_edges and not worker.in_edges and not worker.is_source:
         worker.step = _call_step(worker)
@@ -63,9 +72,19 @@ def choose(worker: Worker) -> None:
         if worker.type.process_kind == "generator" and len(outs) == 1 and worker.process is not None:
             worker.step = _generator_step(worker, outs[0])
         return
-    if len(worker.in_edges) == 1 and len(worker.live_inputs) == 1 and len(worker.unset) == 1 and not worker.wants_token[0]:
+    if (
+        len(worker.in_edges) == 1
+        and len(worker.live_inputs) == 1
+        and len(worker.unset) == 1
+        and not worker.wants_token[0]
+    ):
         edge = worker.live_inputs[0]
-        if type(edge) is SyncEdge and edge.target_kind == "input" and edge.mandatory and worker.type.process_kind in ("function", "async"):
+        if (
+            type(edge) is SyncEdge
+            and edge.target_kind == "input"
+            and edge.mandatory
+            and worker.type.process_kind in ("function", "async")
+        ):
             make = _async_step if worker.is_async else _through_step
             worker.step = make(worker, edge, outs[0] if outs else None)
 
@@ -76,7 +95,9 @@ def _leave_lying(worker: Worker) -> None:
 
 
 def _parameters_wired(worker: Worker) -> bool:
-    return len(worker.out_names) > len(worker.type.outputs) or any(edge.target_kind == "parameter" for edge in worker.in_edges)
+    return len(worker.out_names) > len(worker.type.outputs) or any(
+        edge.target_kind == "parameter" for edge in worker.in_edges
+    )
 
 
 def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step:
@@ -92,8 +113,8 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
     silent_code = worker.silent_code  # it cannot send by itself, so nobody needs to know that it runs
     general = firing.step
     target: Any = given.target if given is not None else None
-    target_inputs = target.inputs if given is not None else None
-    target_outputs = target.outputs if given is not None else None
+    target_inputs: Any = target.inputs if given is not None else None
+    target_outputs: Any = target.outputs if given is not None else None
     carries = given is not None and given.active
     only = (taken,)
 
@@ -177,7 +198,10 @@ def _failed(worker: Worker, stamp: float, taken: tuple[SyncEdge, ...], error: Ba
 
 
 def _async_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step:
-    """The same for an async function: it starts at once, and what it gives back leaves by the same short way, now or later."""
+    """The same for an async function: it starts at once, and what it gives back leaves by the same short way.
+
+    Now or later.
+    """
     core = worker.core
     host = core.host
     node = worker.node
@@ -310,7 +334,14 @@ def _generator_step(worker: Worker, given: SyncEdge) -> Step:
         except Exception as error:
             errors.fail(worker, f"firing {worker.firings}", error, answer=True)
             return
-        if value is None or type(value) is Token or worker.written is not None or worker.active or worker.right or worker.calls:
+        if (
+            value is None
+            or type(value) is Token
+            or worker.written is not None
+            or worker.active
+            or worker.right
+            or worker.calls
+        ):
             firing.complete_firing(worker, value)
             return
         worker.busy = ""
@@ -343,7 +374,8 @@ def _call_step(worker: Worker) -> Step:
         if handler is None:
             general(worker)
             return
-        calls.popleft()  # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
+        # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
+        calls.popleft()
         queue = edge.queue
         token = queue.popleft()
         worker.call_number += 1
@@ -384,7 +416,10 @@ def _call_taken(worker: Worker, edge: EventEdge) -> None:
 
 
 def emitter(event: RunningEvent) -> Callable[..., None]:
-    """What a port's `trigger` does: the short way for one plain edge into a slot that nobody watches, else `sending.trigger`."""
+    """What a port's `trigger` does: the short way for one plain edge into a slot that nobody watches.
+
+    Else `sending.trigger`.
+    """
     worker = event.worker
     core = worker.core
     general = trigger
@@ -408,7 +443,13 @@ def emitter(event: RunningEvent) -> Callable[..., None]:
     scopes = target.scopes
 
     def emit(value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:
-        if activity is not None or not core.plain or port._observers is not None or not edge.live or type(value) is Token:
+        if (
+            activity is not None
+            or not core.plain
+            or port._observers is not None
+            or not edge.live
+            or type(value) is Token
+        ):
             general(event, value, activity, stamp)
             return
         if stamp is None:

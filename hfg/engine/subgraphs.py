@@ -1,4 +1,6 @@
-"""The automatic slots of a dissolved subgraph: enable, disable, deactivate, reset for everything inside (rules F10, G2).
+"""The automatic slots of a dissolved subgraph: enable, disable, deactivate, reset for everything inside.
+
+(rules F10, G2).
 
 Stands on `lifecycle` and `activity`.
 """

@@ -1,7 +1,9 @@
-"""Virtual time: an event loop whose clock jumps to the next timer when nothing is ready and no work is in flight (rule R6).
+"""Virtual time: an event loop whose clock jumps to the next timer when nothing is ready and no work is in flight.
 
-Nodes that call plain `asyncio.sleep` are covered without knowing it. Work in threads would make the loop look idle, so whoever starts some holds the clock
-until it is back; `run_in_executor` (and so `asyncio.to_thread`) does by itself.
+(rule R6).
+
+Nodes that call plain `asyncio.sleep` are covered without knowing it. Work in threads would make the loop look idle,
+so whoever starts some holds the clock until it is back; `run_in_executor` (and so `asyncio.to_thread`) does by itself.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ __all__ = ["VirtualTimeLoop"]
 _POLL_EVERY = 64  # jumps without a look at real sockets and signals
 
 
-class _JumpingSelector(selectors.DefaultSelector):  # type: ignore[valid-type, misc]
+class _JumpingSelector(selectors.DefaultSelector):
     """Instead of waiting until the next timer, moves the clock to it."""
 
     loop: VirtualTimeLoop
@@ -25,20 +27,19 @@ class _JumpingSelector(selectors.DefaultSelector):  # type: ignore[valid-type, m
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         loop = self.loop
         if timeout is None or loop._holds:
-            ready = super().select(None if timeout is None or timeout > 0 else timeout)
-            return ready  # type: ignore[no-any-return]
+            return super().select(None if timeout is None or timeout > 0 else timeout)
         if timeout <= 0:
             self._skipped += 1
             if self._skipped < _POLL_EVERY and len(self.get_map()) <= 1:
                 return []
             self._skipped = 0
-            return super().select(0)  # type: ignore[no-any-return]
+            return super().select(0)
         self._skipped += 1
         if self._skipped >= _POLL_EVERY or len(self.get_map()) > 1:
             self._skipped = 0
             ready = super().select(0)
             if ready:
-                return ready  # type: ignore[no-any-return]
+                return ready
         loop._jump(timeout)
         return []
 
@@ -75,14 +76,14 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         """The work is back."""
         self._holds -= 1
 
-    def run_in_executor(self, executor: Any, func: Callable[..., Any], *args: Any) -> Any:
+    def run_in_executor(self, executor: Any, func: Callable[..., Any], *args: Any) -> Any:  # type: ignore[override]
         """As asyncio's, but the clock waits for it."""
         future = super().run_in_executor(executor, func, *args)
         self.hold()
         future.add_done_callback(lambda _: self.unhold())
         return future
 
-    async def shutdown_default_executor(self, timeout: float | None = None) -> None:  # type: ignore[override]
+    async def shutdown_default_executor(self, timeout: float | None = None) -> None:  # noqa: ASYNC109
         """As asyncio's, but the clock waits for the executor's threads."""
         self.hold()
         try:

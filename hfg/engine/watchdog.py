@@ -1,7 +1,8 @@
 """Tells when a node blocks the loop: one warning with its path and the remedy.
 
-A thread of the process looks from time to time which worker's code is on which loop; if it is the same firing for longer than the run's limit, it says so,
-also when the code never returns. The hot path only notes whose code runs. Stands on `core`.
+A thread of the process looks from time to time which worker's code is on which loop; if it is the same firing for
+longer than the run's limit, it says so, also when the code never returns. The hot path only notes whose code runs.
+Stands on `core`.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class Watch:
         elif now - self.since >= self.limit_s and worker.index not in self.warned:
             self.warned.add(worker.index)
             _LOGGER.warning(
-                'node "%s" has blocked the loop for more than %g s: nothing else on the loop can move; put it into a thread with '
+                'node "%s" has blocked the loop for more than %g s: nothing else on the loop can move; '
+                "put it into a thread with "
                 'graph.add(..., group="work") and graph.group("work", threads=1)',
                 worker.path,
                 self.limit_s,

@@ -1,6 +1,7 @@
 """Which edges are live, and what that makes of a worker (SEMANTICS "live edge", rules F1, F5, F10, G1).
 
-Called when the plan is made and when something is enabled, disabled, ended or edited; never per token. Stands on `worker`.
+Called when the plan is made and when something is enabled, disabled, ended or edited; never per token. Stands on
+`worker`.
 """
 
 from __future__ import annotations

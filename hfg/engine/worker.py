@@ -1,6 +1,7 @@
 """One running node: its two barriers, its agenda, and why it may not move (rules F1, F9).
 
-Plain state, decided over by `firing`, `sending` and `quiet`. A worker has at most one firing or call under way. Stands on floors 0-4.
+Plain state, decided over by `firing`, `sending` and `quiet`. A worker has at most one firing or call under way.
+Stands on floors 0-4.
 """
 
 from __future__ import annotations
@@ -65,6 +66,7 @@ class RunningEvent:
 
     @property
     def label(self) -> str:
+        """Its path, as traces name it."""
         return f"{self.worker.path}.{self.name}" if self.worker.path else self.name
 
 
@@ -79,7 +81,8 @@ class Worker:
       calls: edges whose oldest token waits for a slot call, in order of arrival; None until there is one.
       queued: it stands in its group's run queue.
       busy: "" or what is under way: "firing", "call", "asking", "ending", "setup".
-      special: something about the next firing is not ordinary (a marker lies on an input ...): the fast step steps aside.
+      special: something about the next firing is not ordinary (a marker lies on an input ...): the fast step steps
+        aside.
       step: runs its next piece of work; chosen for its shape by `steps.choose`.
       right: A3's right to carry activity that A5 took earlier in this firing or call.
       stamp: of what it sends now (T5); None outside a firing or call: the present.
@@ -175,7 +178,9 @@ class Worker:
         self.index = index
         self.path = path
         self.node = node
-        self.type = type(node)._type if node is not None else None
+        self.type: Any = (
+            type(node)._type if node is not None else None
+        )  # a NodeType; None for what stands for the outside
         self.options = options
         self.group = group
         self.push: Callable[[Worker], None] = group.push
@@ -236,7 +241,7 @@ class Worker:
         self.events_due: list[tuple[str, Any]] | None = None
         self.pending_end = False  # END leaves as soon as the outputs are free (F4)
         self.deferred: list[int] | None = None  # modifiers drained before END was sent (F12)
-        self.generator: Iterator[Any] | Any = None
+        self.generator: Any = None
         self.carrier: Any = None
         self.call_edge: Any = None
         self.in_flight = False  # its code waits or runs in a thread

@@ -1,7 +1,10 @@
-"""What a node waits for: its inputs until every live one holds a token, its outputs until every consumer has processed (rules F1, F5).
+"""What a node waits for: its inputs until every live one holds a token.
 
-A barrier is a counter with people waiting at it. The engine counts, and touches nothing else as long as nobody waits; whoever wants to wait asks the run
-(`run.wait_inputs(node)`, `run.wait_outputs(node)`), which brings the futures. Stands on nothing; never waits itself.
+Its outputs until every consumer has processed (rules F1, F5).
+
+A barrier is a counter with people waiting at it. The engine counts, and touches nothing else as long as nobody
+waits; whoever wants to wait asks the run (`run.wait_inputs(node)`, `run.wait_outputs(node)`), which brings the
+futures. Stands on nothing; never waits itself.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The edges of a running graph: what lies on them and who may put more (rules P4, P5, P7).
 
-Three state machines: a synchronous edge with one place, one with initial tokens (a delay), and an event edge with a queue. They hold tokens and count;
-the engine moves them. `source` and `target` are the engine's workers, opaque here. Stands on `token`; never waits.
+Three state machines: a synchronous edge with one place, one with initial tokens (a delay), and an event edge with a
+queue. They hold tokens and count; the engine moves them. `source` and `target` are the engine's workers, opaque
+here. Stands on `token`; never waits.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ class Edge:
       sent, dropped, drained: counts for the report; `sent` is also the number of the newest token.
       live: whether both ends are enabled (SEMANTICS, "live edge").
       ended: the consumer has taken END from it and waits for it no more (F4).
+      handler: of the slot an event edge leads into, taking the value, where that is all there is to a call; None:
+        the general way.
       via: the scopes (subgraphs) whose relays it passes; all must be enabled.
     """
 
@@ -38,6 +41,7 @@ class Edge:
         "drained",
         "dropped",
         "ended",
+        "handler",
         "index",
         "label",
         "live",
@@ -67,19 +71,7 @@ class Edge:
         self.live = True
         self.ended = False
         self.via: tuple[Any, ...] = ()
-
-    @property
-    def untaken(self) -> int:
-        """How many tokens lie on it."""
-        raise NotImplementedError
-
-    def clear(self) -> list[Token[Any]]:
-        """Take away what lies on it, oldest first."""
-        raise NotImplementedError
-
-    def contents(self) -> list[Token[Any]]:
-        """What lies on it, oldest first, without taking it."""
-        raise NotImplementedError
+        self.handler: Callable[[Any], Any] | None = None
 
 
 class SyncEdge(Edge):
@@ -101,17 +93,46 @@ class SyncEdge(Edge):
 
     @property
     def untaken(self) -> int:
+        """1 if a token lies on it, else 0."""
         return 0 if self.token is None else 1
 
     def clear(self) -> list[Token[Any]]:
+        """Take away what lies on it."""
         token, self.token = self.token, None
         return [] if token is None else [token]
 
     def contents(self) -> list[Token[Any]]:
+        """What lies on it, without taking it."""
         return [] if self.token is None else [self.token]
 
 
-class DelayEdge(Edge):
+class _QueueEdge(Edge):
+    """What both edges with a queue share: initial tokens first, then what was sent."""
+
+    __slots__ = ("initial", "queue")
+
+    def __init__(self, index: int, label: str, active: bool, initial: tuple[Any, ...]) -> None:
+        super().__init__(index, label, active)
+        self.queue: deque[Token[Any]] = deque()
+        self.initial = initial
+
+    @property
+    def untaken(self) -> int:
+        """How many tokens lie on it."""
+        return len(self.queue)
+
+    def clear(self) -> list[Token[Any]]:
+        """Take away what lies on it, oldest first."""
+        tokens = list(self.queue)
+        self.queue.clear()
+        return tokens
+
+    def contents(self) -> list[Token[Any]]:
+        """What lies on it, oldest first, without taking it."""
+        return list(self.queue)
+
+
+class DelayEdge(_QueueEdge):
     """From an output into an input, with initial tokens: the delay of synchronous data flow (P7).
 
     Attributes:
@@ -120,29 +141,15 @@ class DelayEdge(Edge):
       held: the producer's token counts as unprocessed, for more than `delay` tokens lie here.
     """
 
-    __slots__ = ("delay", "held", "initial", "queue")
+    __slots__ = ("delay", "held")
 
     def __init__(self, index: int, label: str, active: bool, initial: tuple[Any, ...]) -> None:
-        super().__init__(index, label, active)
-        self.queue: deque[Token[Any]] = deque()
-        self.initial = initial
+        super().__init__(index, label, active, initial)
         self.delay = len(initial)
         self.held = False
 
-    @property
-    def untaken(self) -> int:
-        return len(self.queue)
 
-    def clear(self) -> list[Token[Any]]:
-        tokens = list(self.queue)
-        self.queue.clear()
-        return tokens
-
-    def contents(self) -> list[Token[Any]]:
-        return list(self.queue)
-
-
-class EventEdge(Edge):
+class EventEdge(_QueueEdge):
     """From an event: a first-in first-out queue with a capacity and an overflow policy (P5).
 
     Attributes:
@@ -153,7 +160,6 @@ class EventEdge(Edge):
       full: a `wait` edge that holds `capacity` or more: its source starts nothing new (F8).
       grown: how often F8 made it longer.
       pipeline: feeds a token to the operators on the edge (P9), or None.
-      handler: of the slot it leads into, taking the value, where that is all there is to a call; None: the general way.
       complete: tells the operators that no more comes, or None.
       end_sent: END has been put on it (F13, once an edge).
     """
@@ -165,11 +171,8 @@ class EventEdge(Edge):
         "end_sent",
         "full",
         "grown",
-        "handler",
-        "initial",
         "overflow",
         "pipeline",
-        "queue",
     )
 
     def __init__(
@@ -182,30 +185,15 @@ class EventEdge(Edge):
         capacity_limit: int | None = None,
         initial: tuple[Any, ...] = (),
     ) -> None:
-        super().__init__(index, label, active)
-        self.queue: deque[Token[Any]] = deque()
+        super().__init__(index, label, active, initial)
         self.capacity = 1 if overflow == "latest" else capacity
         self.capacity_limit = capacity_limit
         self.overflow: Overflow = overflow
         self.full = False
         self.grown = 0
-        self.initial = initial
         self.end_sent = False
-        self.handler: Callable[[Any], Any] | None = None
         self.pipeline: Callable[[Token[Any]], None] | None = None
         self.complete: Callable[[], None] | None = None
-
-    @property
-    def untaken(self) -> int:
-        return len(self.queue)
-
-    def clear(self) -> list[Token[Any]]:
-        tokens = list(self.queue)
-        self.queue.clear()
-        return tokens
-
-    def contents(self) -> list[Token[Any]]:
-        return list(self.queue)
 
     def overflows(self) -> bool:
         """Whether one more token is one too many for a policy that drops or refuses (P5)."""

@@ -17,7 +17,10 @@ variable: contextvars.ContextVar[str] = contextvars.ContextVar("variable", defau
 
 
 def carried(code: Any, *more: Any) -> list[Any]:
-    """Run coroutine functions one after the other in one carrier, from a callback as the engine does; gives back what became of each."""
+    """Run coroutine functions one after the other in one carrier, from a callback as the engine does.
+
+    Gives back what became of each.
+    """
     outcomes: list[Any] = []
 
     async def main() -> None:
@@ -144,7 +147,10 @@ def test_a_cancelled_firing_does_not_cancel_the_next() -> None:
         carrier = Carrier(loop, "test", contextvars.copy_context())
         for cancel in (True, False):
             over = loop.create_future()
-            assert carrier.start(suspending(), lambda result, error, over=over: over.set_result(error or result)) is PENDING
+            assert (
+                carrier.start(suspending(), lambda result, error, over=over: over.set_result(error or result))
+                is PENDING
+            )
             if cancel:
                 carrier.cancel()
             outcomes.append(await over)
