@@ -194,6 +194,10 @@ class Firing(RunningCode):
         station.ending = True
         station.stamp = flight.stamp
         flight.writes.clear()
+        for line in flight.taken:  # nothing waits for a node that has ended (F12)
+            if not line.edge.is_event:
+                self.process(line)
+        flight.taken = []
         hook = station.node._hook("end") if station.leaf.inside is None else None
         if hook is None:
             self.end_firing(flight, "ended")

@@ -1,0 +1,333 @@
+"""Does a run do what the rules say? Its trace is replayed on the reference machine (rules T to X, F9, R5, R6).
+
+The trace's decisions (which node fires, which slot is called, when a waiting firing goes on, when time does) drive the machine; everything else in it must be
+exactly what the machine sees. Inside one decision the order is left open where the rules leave it open; nothing of one decision may be missing when the next
+one comes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+from hfg.testing.reference import Move, ReferenceMachine
+from hfg.token import END, Token
+from hfg.trace import (
+    ActivityChanged,
+    ActivityLost,
+    CallEnded,
+    CallStarted,
+    ErrorRaised,
+    EventTriggered,
+    FiringEnded,
+    FiringStarted,
+    NodeEnabled,
+    NodeEnded,
+    ParameterSet,
+    QueueGrown,
+    RunEnded,
+    RunStarted,
+    StructureChanged,
+    TokenDrained,
+    TokenDropped,
+    TokenProcessed,
+    TokenSent,
+    TokenTaken,
+    TraceEvent,
+)
+
+__all__ = ["Divergence", "Replay", "replay"]
+
+_RULES: Final[dict[type[TraceEvent], str]] = {
+    FiringStarted: "F1, F4, F5, F8, F9, F11, A11",
+    FiringEnded: "F3, F4, X1",
+    CallStarted: "F6, F8, F9",
+    CallEnded: "F6, F9",
+    TokenSent: "F3, T2-T5, A3-A5, P5, P8, F13",
+    TokenTaken: "F1, F3, F6",
+    TokenProcessed: "F5, P4, P7",
+    TokenDropped: "P5, F4, F10, R5",
+    TokenDrained: "F12, T4",
+    EventTriggered: "F3, F8, A9, A12",
+    ActivityChanged: "A5-A8, A14, G2",
+    ActivityLost: "A8",
+    NodeEnded: "F4, F12",
+    NodeEnabled: "F10, A9",
+    ErrorRaised: "X1, X2",
+    ParameterSet: "P8",
+    QueueGrown: "F8",
+    RunEnded: "R5",
+    RunStarted: "A10",
+}
+_SAME_TIME: Final = 1e-9
+
+
+class Divergence(AssertionError):  # noqa: N818 - what was found, not a fault of the code that raises it
+    """A run did something else than the rules say.
+
+    Attributes:
+      found: the event of the run that does not fit, or None if something is missing.
+      expected: what the rules say would be seen of the last decision and was not.
+    """
+
+    def __init__(self, why: str, found: TraceEvent | None, replay: Replay) -> None:
+        self.found = found
+        self.expected = list(replay.expected)
+        rule = _RULES.get(type(found or (self.expected[0] if self.expected else RunEnded(0.0, ""))), "?")
+        parts = [f"{why} (rules {rule})"]
+        if found is not None:
+            parts.append(f"  the run:   {describe(found)}")
+        if self.expected:
+            parts += ["  expected of the last decision, not seen:", *(f"    {describe(event)}" for event in self.expected[:8])]
+        moves = replay.machine.moves()
+        parts += ["  permitted now: " + (", ".join(map(str, moves[:8])) or "nothing")]
+        parts += ["  last events of the run:", *(f"    {describe(event)}" for event in replay.seen[-12:])]
+        parts += ["  last events of the reference:", *(f"    {describe(event)}" for event in replay.machine.observed[-12:])]
+        super().__init__("\n".join(parts))
+
+
+def replay(build: Callable[[], Any], events: Iterable[TraceEvent], *, until_s: float | None = None) -> None:
+    """Check the trace of a whole run, from its first event to its last.
+
+    Args:
+      build: makes the graph that was run, afresh; a graph itself will do too.
+      events: all events of the run.
+      until_s: as it was given to the run.
+
+    Raises:
+      Divergence: at the first event that the rules do not explain.
+
+    Example:
+      >>> import hfg
+      >>> @hfg.node
+      ... def count(*, to: int = 3) -> Iterator[int]:
+      ...     yield from range(to)
+      >>> @hfg.node
+      ... def show(value: int) -> None: ...
+      >>> graph, trace = hfg.Graph(), []
+      >>> _ = graph.add(count()) >> graph.add(show())
+      >>> report = hfg.run(graph, clock="virtual", trace=trace.append)
+      >>> replay(graph, trace)
+    """
+    replaying = Replay(build() if callable(build) else build, until_s=until_s)
+    for event in events:
+        replaying.see(event)
+    replaying.check_over()
+
+
+class Replay:
+    """A reference machine beside a run; `see` its events one by one as they come."""
+
+    def __init__(self, graph: Any, *, until_s: float | None = None, held_open: bool = False) -> None:
+        self.machine = ReferenceMachine(graph, until_s=until_s, held_open=held_open)
+        self.seen: list[TraceEvent] = []
+        self.expected: list[TraceEvent] = []
+        self._connected = {
+            self.machine.event_path(line.edge.source.owner, line.edge.source.name)
+            for line in self.machine.lines
+            if line.edge.source.kind == "event"
+        }
+        self._expect(self.machine.start())
+
+    def see(self, event: TraceEvent) -> None:
+        """Take the next event of the run.
+
+        Raises:
+          Divergence: the rules do not explain it.
+        """
+        if self._is_idle(event):
+            return
+        if event.time > self.machine.now + _SAME_TIME:
+            self._let_time_go(event)
+        if not self._match(event):
+            self._decide(event)
+        self.seen.append(event)
+
+    def tell(self, stimulus: Callable[[ReferenceMachine], None]) -> None:
+        """Let the world outside do to the reference what it is about to do to the run."""
+        mark = len(self.machine.observed)
+        stimulus(self.machine)
+        self._expect(self.machine.observed_since(mark))
+
+    def check_quiet(self) -> None:
+        """Check that nothing is missing and that nothing more could move before something comes from outside.
+
+        Raises:
+          Divergence: the run has stopped too early.
+        """
+        self._finish_steps()
+        if self.expected:
+            raise Divergence("the run did not do all that follows", None, self)
+        moves = self.machine.moves()
+        if moves:
+            raise Divergence("the run rests although the rules permit moves", None, self)
+
+    def check_over(self) -> None:
+        """Check that the run has ended, and rightly.
+
+        Raises:
+          Divergence: something is missing.
+        """
+        if self.expected:
+            raise Divergence("the run did not do all that follows", None, self)
+        if self.machine.outcome is None:
+            raise Divergence("the run has no end", None, self)
+
+    # --- matching
+
+    def _expect(self, events: list[TraceEvent]) -> None:
+        self.expected += [event for event in events if not self._is_idle(event)]
+
+    def _is_idle(self, event: TraceEvent) -> bool:
+        """Whether nobody could tell: events without edges, and what is not compared."""
+        if isinstance(event, EventTriggered):
+            return event.event not in self._connected
+        return isinstance(event, StructureChanged)
+
+    def _match(self, event: TraceEvent) -> bool:
+        wanted = key(event)
+        for index, expected in enumerate(self.expected):
+            if key(expected) == wanted and abs(expected.time - event.time) <= _SAME_TIME:
+                del self.expected[index]
+                return True
+        return False
+
+    def _decide(self, event: TraceEvent) -> None:
+        """Find the move that explains an event which nothing before it does, and take it."""
+        if isinstance(event, FiringStarted | CallStarted):
+            self._begin(event)
+            return
+        if isinstance(event, RunEnded):
+            self._end(event)
+            return
+        for _ in range(10_000):
+            move = self._explaining(event)
+            if move is None:
+                break
+            self._apply(move)
+            if self._match(event):
+                return
+        raise Divergence("the run did what the rules do not say", event, self)
+
+    def _begin(self, event: FiringStarted | CallStarted) -> None:
+        if self.expected:
+            raise Divergence("the run went on before all of the last decision was done", event, self)
+        for move in self.machine.moves():
+            fires = move.kind == "fire" and isinstance(event, FiringStarted)
+            calls = move.kind == "call" and isinstance(event, CallStarted) and move.edge == event.edge
+            if move.node == event.node and (fires or calls):
+                self._apply(move)
+                if not self._match(event):
+                    raise Divergence("it is another kind of firing or call", event, self)
+                return
+        raise Divergence("the run moved when the rules forbid it", event, self)
+
+    def _end(self, event: RunEnded) -> None:
+        self._finish_steps()
+        if self.expected:
+            raise Divergence("the run ended before all of the last decision was done", event, self)
+        for _ in range(1000):
+            moves = self.machine.moves()
+            finish = next((move for move in moves if move.kind == "finish"), None)
+            if finish is not None or not moves or moves[0].kind not in ("complete", "wait"):
+                break
+            self._apply(moves[0])  # steps that nothing was seen of
+        if finish is None or finish.outcome != event.outcome:
+            raise Divergence(f'the run ended as "{event.outcome}"', event, self)
+        self._apply(finish)
+        if not self._match(event):
+            raise Divergence("the run ended at another time", event, self)
+
+    def _explaining(self, event: TraceEvent) -> Move | None:
+        """The move that may lie behind an event: a step of the node it tells of, or one of those that follow from quiet."""
+        moves = self.machine.moves()
+        node = self._teller(event)
+        for move in moves:
+            if move.kind in ("go on", "time out") and move.node == node:
+                return move
+            if move.kind == "call" and isinstance(event, TokenTaken) and move.edge == event.edge:
+                return move
+            if move.kind == "grow" and isinstance(event, QueueGrown) and move.edge == event.edge:
+                return move
+            if move.kind == "complete" or (move.kind == "end events" and isinstance(event, TokenSent) and event.token.value is END):
+                return move
+            if move.kind == "wait" and move.time <= event.time + _SAME_TIME:
+                return move
+            if move.kind == "finish" and isinstance(event, TokenDropped) and event.reason == "stopped":
+                return move
+        return None
+
+    def _teller(self, event: TraceEvent) -> str | None:
+        if isinstance(event, EventTriggered):
+            return event.event.rpartition(".")[0]
+        if isinstance(event, TokenSent | TokenDropped):
+            line = self.machine.labels.get(event.edge)
+            return None if line is None else self.machine.path_of(line.edge.source.owner)
+        return getattr(event, "node", None)
+
+    def _apply(self, move: Move) -> None:
+        self._expect(self.machine.apply(move))
+
+    def _finish_steps(self) -> None:
+        """Let waiting code go on as far as it can, for in the run it has by now."""
+        while True:
+            steps = [move for move in self.machine.moves() if move.kind == "go on"]
+            if not steps:
+                return
+            self._apply(steps[0])
+
+    def _let_time_go(self, event: TraceEvent) -> None:
+        while event.time > self.machine.now + _SAME_TIME:
+            self._finish_steps()
+            if self.expected:
+                raise Divergence("time went on before all of the last decision was done", event, self)
+            moves = self.machine.moves()
+            wait = next((move for move in moves if move.kind in ("wait", "finish", "complete")), None)
+            if wait is None:
+                raise Divergence("time went on although the rules permit moves now", event, self)
+            if wait.kind == "finish":
+                if not isinstance(event, RunEnded | TokenDropped) or wait.time > event.time + _SAME_TIME:
+                    raise Divergence("time went on although the run should be over", event, self)
+                return
+            if wait.kind == "wait" and wait.time > event.time + _SAME_TIME:
+                raise Divergence(f"nothing is due before {wait.time:g} s", event, self)
+            self._apply(wait)
+
+
+def key(event: TraceEvent) -> tuple[Any, ...]:
+    """What of an event is compared; its time is compared apart."""
+    kind = type(event).__name__
+    if isinstance(event, TokenSent | TokenTaken | TokenDrained):
+        return (kind, event.edge, token_key(event.token))
+    if isinstance(event, TokenDropped):
+        return (kind, event.edge, token_key(event.token), event.reason)
+    if isinstance(event, EventTriggered):
+        return (kind, event.event, value_key(event.token.value), round(event.token.stamp, 9))
+    if isinstance(event, ErrorRaised):
+        return (kind, event.node, event.policy)
+    if isinstance(event, ParameterSet):
+        return (kind, event.node, event.parameter, value_key(event.value))
+    return (kind, *(getattr(event, name) for name in event.__struct_fields__ if name != "time"))
+
+
+def token_key(token: Token[Any]) -> tuple[Any, ...]:
+    """What of a token is compared."""
+    return (value_key(token.value), token.activity, round(token.stamp, 9), token.sequence)
+
+
+def value_key(value: Any) -> Any:
+    """Values are compared by what they look like: arrays and not-a-number have no usable equality; errors by their type."""
+    if isinstance(value, BaseException):
+        return type(value).__name__
+    return (type(value).__name__, repr(value))
+
+
+def describe(event: TraceEvent) -> str:
+    """Give an event in a few words."""
+    fields = {name: getattr(event, name) for name in event.__struct_fields__ if name not in ("time", "token")}
+    words = " ".join(str(value) for value in fields.values())
+    token = getattr(event, "token", None)
+    if token is not None:
+        sign = {1: " +1", -1: " -1"}.get(token.activity, "")
+        words += f" <- {token.value!r}{sign} @{token.stamp:g} #{token.sequence}"
+    return f"{event.time:g} s  {type(event).__name__} {words}"

@@ -1,0 +1,310 @@
+"""Making random plans: one procedure for everybody who can choose, be it Hypothesis, which shrinks, or a seeded generator, which is fast."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from hfg.testing import nodes as types
+from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
+
+__all__ = ["Allowed", "Chooser", "SeededChooser", "make_plan", "random_plan"]
+
+T = TypeVar("T")
+End = tuple[str, str, str]
+
+
+class Chooser(Protocol):
+    """Somebody who can choose."""
+
+    def number(self, least: int, most: int) -> int:
+        """Choose a whole number; `least` is the simplest."""
+
+    def one_of(self, choices: Sequence[T]) -> T:
+        """Choose one; the first is the simplest."""
+
+    def chance(self, percent: int) -> bool:
+        """Say yes so often; no is simpler."""
+
+
+class SeededChooser:
+    """Chooses by a seeded generator."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+
+    def number(self, least: int, most: int) -> int:
+        """Choose a whole number."""
+        return self._random.randint(least, most)
+
+    def one_of(self, choices: Sequence[T]) -> T:
+        """Choose one."""
+        return choices[self._random.randrange(len(choices))]
+
+    def chance(self, percent: int) -> bool:
+        """Say yes so often."""
+        return self._random.randrange(100) < percent
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What may occur in a plan; a test of one rule leaves out what has nothing to do with it."""
+
+    max_nodes: int = 7
+    events: bool = True
+    activity: bool = True
+    cycles: bool = True
+    failures: bool = True
+    boxes: bool = True
+    gates: bool = True
+    rates: bool = True
+    waiting: bool = True
+    operators: bool = True
+    lossy: bool = True
+    parameters: bool = True
+    disabling: bool = True
+    readiness: bool = True
+    threads: bool = False
+
+
+SYNCHRONOUS = Allowed(events=False, activity=False, failures=False, gates=False, operators=False, lossy=False, disabling=False, readiness=False)
+"""What rule F7 speaks of."""
+
+_INNER = ["double", "add", "some", "sink", "Passing", "Merge", "Latch", "Counter", "Pulse", "Greeter", "Stateful", "Sieve", "Tally"]
+_ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
+_BOUNDED_SLOTS = {"say", "hand_on", "hear"}
+_DELICATE_SLOTS = ["activate", "deactivate", "reset", "disable", "enable"]
+
+
+class _Making:
+    def __init__(self, choose: Chooser, allowed: Allowed) -> None:
+        self.choose = choose
+        self.allowed = allowed
+        self.nodes: list[NodePlan] = []
+        self.edges: list[EdgePlan] = []
+        self.pairs: set[tuple[End, End]] = set()
+
+    # --- nodes
+
+    def make_nodes(self) -> None:
+        choose, allowed = self.choose, self.allowed
+        sources = ["script", "Script"] + (["ascript"] if allowed.waiting else [])
+        inner = list(_INNER)
+        inner += ["Failing"] * 2 if allowed.failures else []
+        inner += ["slow_double", "Waiting", "AsyncRelay"] if allowed.waiting else []
+        inner += ["Relay", "Relay", "Doubter"] if allowed.events else []
+        inner += ["Scaled"] if allowed.parameters else []
+        inner += ["OnlyTwice"] if allowed.readiness else []
+        if not allowed.events:
+            inner = [name for name in inner if name != "AsyncRelay"]
+        count = choose.number(2, allowed.max_nodes)
+        for number in range(count):
+            kind = choose.one_of(sources) if number == 0 or choose.chance(20) else choose.one_of(inner)
+            self.nodes.append(NodePlan(f"n{number}", kind, self._parameters(kind), self._options(kind)))
+
+    def _parameters(self, kind: str) -> dict[str, Any]:
+        choose = self.choose
+        match kind:
+            case "script" | "ascript":
+                values = [choose.one_of([1, 2, 0, 3, 4, 6, None]) for _ in range(choose.number(0, 5))]
+                given: dict[str, Any] = {"values": tuple(values)}
+                if kind == "ascript":
+                    given["pause_s"] = choose.one_of([0.0, 0.004, 0.01])
+                return given
+            case "Script":
+                return {"count": choose.number(0, 5)}
+            case "some":
+                return {"modulus": choose.number(2, 3)}
+            case "Failing":
+                return {"at": choose.number(2, 3)}
+            case "slow_double" | "Waiting":
+                return {"pause_s": choose.one_of([0.0, 0.003, 0.01])}
+        return {}
+
+    def _options(self, kind: str) -> dict[str, Any]:
+        choose, allowed = self.choose, self.allowed
+        options: dict[str, Any] = {}
+        if choose.chance(25):
+            options["release"] = choose.one_of(["sequential", "pipelined"])
+        if allowed.rates and choose.chance(15):
+            options["max_rate_hz"] = choose.one_of([100.0, 30.0])
+        if kind == "Failing" or (allowed.failures and choose.chance(5)):
+            options["on_error"] = choose.one_of(["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"])
+        if allowed.activity and choose.chance(10):
+            options["active_for_s"] = choose.one_of([0.02, 0.005])
+        if allowed.disabling and choose.chance(4):
+            options["enabled"] = False
+        if allowed.threads and choose.chance(50):
+            options["group"] = choose.one_of(["left", "right"])
+        return options
+
+    # --- ends
+
+    def type_of(self, name: str) -> Any:
+        plan = next(node for node in self.nodes if node.name == name)
+        return _description(plan.type)
+
+    def outputs(self, nodes: Sequence[NodePlan]) -> list[End]:
+        return [(node.name, "output", port) for node in nodes for port in self.type_of(node.name).outputs]
+
+    def events(self, nodes: Sequence[NodePlan]) -> list[End]:
+        return [
+            (node.name, "event", port)
+            for node in nodes
+            for port, spec in self.type_of(node.name).events.items()
+            if spec.type is not None
+        ]
+
+    def signals(self, nodes: Sequence[NodePlan]) -> list[End]:
+        """Events without a value, automatic ones too."""
+        automatic = ["processed", "activated", "deactivated", "failed", "timeout"]
+        own = [(node.name, "event", port) for node in nodes for port, spec in self.type_of(node.name).events.items() if spec.type is None]
+        return own + [(node.name, "event", self.choose.one_of(automatic)) for node in nodes] + [("", "event", "start")]
+
+    # --- edges
+
+    def make_edges(self) -> None:
+        choose, allowed = self.choose, self.allowed
+        for index, node in enumerate(self.nodes):
+            for port, spec in self.type_of(node.name).inputs.items():
+                if choose.chance(92 if not spec.optional else 60):
+                    self._connect_input(index, (node.name, "input", port))
+        if allowed.events:
+            self._make_slot_edges()
+        if allowed.parameters and choose.chance(30):
+            self._make_parameter_edge()
+
+    def _connect_input(self, index: int, target: End) -> None:
+        choose, allowed = self.choose, self.allowed
+        before = self.nodes[:index]
+        candidates = self.outputs(before)
+        if allowed.events and choose.chance(30):
+            candidates = self.events(before) or candidates
+        if allowed.cycles and choose.chance(12):
+            candidates = self.outputs(self.nodes[index:])
+            if allowed.events and choose.chance(30):
+                candidates = self.events(self.nodes[index:]) or candidates
+            if candidates:
+                self._edge(choose.one_of(candidates), target, initial=[choose.number(0, 3) for _ in range(choose.number(1, 2))])
+            return
+        if candidates:
+            self._edge(choose.one_of(candidates), target)
+
+    def _make_slot_edges(self) -> None:
+        choose, allowed = self.choose, self.allowed
+        slots = [(node, port) for node in self.nodes for port in self.type_of(node.name).slots]
+        for _ in range(choose.number(0, 2 * len(self.nodes))):
+            if not slots or choose.chance(12):
+                self._delicate_edge()
+                continue
+            node, port = choose.one_of(slots)
+            index = self.nodes.index(node)
+            nearby = self.nodes if port in _BOUNDED_SLOTS and allowed.cycles else self.nodes[:index]
+            candidates = self.events(nearby) + self.outputs(nearby)
+            if port in _ANY_SLOTS:
+                candidates += self.signals(nearby)
+            if candidates:
+                self._edge(choose.one_of(candidates), (node.name, "slot", port))
+        if allowed.activity and slots and choose.chance(60):
+            begins = [(node.name, "slot", port) for node, port in slots if port in _ANY_SLOTS]
+            begins += [(node.name, "slot", "activate") for node in self.nodes]
+            self._edge(("", "event", "start"), choose.one_of(begins), active=True)
+
+    def _delicate_edge(self) -> None:
+        choose, allowed = self.choose, self.allowed
+        names = _DELICATE_SLOTS if allowed.disabling else _DELICATE_SLOTS[:2]
+        if not allowed.activity:
+            names = names[2:]
+        if not names:
+            return
+        name = choose.one_of(names)
+        index = choose.number(0, len(self.nodes) - 1)
+        nearby = self.nodes[:index] if name in ("reset", "enable") else self.nodes
+        candidates = self.events(nearby) + self.signals(nearby)
+        self._edge(choose.one_of(candidates), (self.nodes[index].name, "slot", name))
+
+    def _make_parameter_edge(self) -> None:
+        choose = self.choose
+        owners = [(index, node) for index, node in enumerate(self.nodes) if node.type == "Scaled"]
+        if not owners:
+            return
+        index, node = choose.one_of(owners)
+        candidates = self.outputs(self.nodes[:index]) + (self.events(self.nodes[:index]) if self.allowed.events else [])
+        if candidates:
+            self._edge(choose.one_of(candidates), (node.name, "parameter", "factor"))
+        targets = [(one.name, "slot", "note") for one in self.nodes[index + 1 :] if one.type == "Tally"]
+        if targets:
+            self._edge((node.name, "parameter", "offset"), choose.one_of(targets))
+
+    def _edge(self, source: End, target: End, *, initial: list[int] | None = None, active: bool | None = None) -> None:
+        choose, allowed = self.choose, self.allowed
+        if (source, target) in self.pairs or any(edge.target == target and target[1] in ("input", "parameter") for edge in self.edges):
+            return
+        options: dict[str, Any] = {}
+        active = (allowed.activity and choose.chance(35)) if active is None else active
+        if active:
+            options["active"] = True
+        if source[1] == "event" and target[1] != "parameter":
+            if choose.chance(30):
+                options["capacity"] = choose.number(1, 3)
+            if allowed.lossy and not active and choose.chance(12):
+                options["overflow"] = choose.one_of(["drop_oldest", "drop_newest", "latest"])
+                if options["overflow"] == "latest":
+                    options.pop("capacity", None)
+        if initial:
+            options["initial"] = initial
+        self.pairs.add((source, target))
+        self.edges.append(EdgePlan(source, target, options))
+
+    # --- the rest
+
+    def make_boxes(self) -> list[BoxPlan]:
+        choose = self.choose
+        boxes: list[BoxPlan] = []
+        free = [node.name for node in self.nodes if not self._has_parameter_edge(node.name)]
+        while len(boxes) < 3 and len(free) > 1 and choose.chance(40):
+            members = [name for name in free if choose.chance(45)]
+            if not members:
+                break
+            options: dict[str, Any] = {}
+            if self.allowed.disabling and choose.chance(5):
+                options["enabled"] = False
+            box = BoxPlan(f"box{len(boxes)}", tuple(members), options)
+            boxes.append(box)
+            free = [name for name in free if name not in members] + [box.name]
+        return boxes
+
+    def _has_parameter_edge(self, name: str) -> bool:
+        return any(end[0] == name and end[1] == "parameter" for edge in self.edges for end in (edge.source, edge.target))
+
+    def make_gates(self) -> list[GatePlan]:
+        choose = self.choose
+        if len(self.nodes) < 2 or not choose.chance(15):
+            return []
+        target = choose.one_of(self.nodes)
+        by = choose.one_of([node for node in self.nodes if node is not target])
+        return [GatePlan(target.name, by.name, choose.one_of([None, 100.0, 20.0]))]
+
+
+def _description(kind: str) -> Any:
+    made = getattr(types, kind)
+    return (made() if not isinstance(made, type) else made)._type
+
+
+def make_plan(choose: Chooser, allowed: Allowed | None = None) -> GraphPlan:
+    """Make a plan by asking `choose` again and again."""
+    allowed = allowed or Allowed()
+    making = _Making(choose, allowed)
+    making.make_nodes()
+    making.make_edges()
+    boxes = making.make_boxes() if allowed.boxes else []
+    gates = making.make_gates() if allowed.gates else []
+    groups = ("left", "right") if allowed.threads else ()
+    return GraphPlan(tuple(making.nodes), tuple(making.edges), tuple(boxes), tuple(gates), groups)
+
+
+def random_plan(seed: int, allowed: Allowed | None = None) -> GraphPlan:
+    """Make the plan of a seed; much faster than Hypothesis, but nothing shrinks."""
+    return make_plan(SeededChooser(seed), allowed)
