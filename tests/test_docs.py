@@ -40,7 +40,11 @@ class Block(NamedTuple):
 def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     return [
-        Block(text.count("\n", 0, match.start()) + 2, match["info"].strip(), inspect.cleandoc("\n" + match["code"]))
+        Block(
+            text.count("\n", 0, match.start()) + 2,
+            match["info"].strip(),
+            re.sub(rf"^{match['indent']}", "", match["code"], flags=re.MULTILINE).rstrip(),
+        )
         for match in FENCE.finditer(text)
     ]
 
@@ -84,7 +88,7 @@ def test_page_runs_as_written(page: Path, tmp_path: Path, monkeypatch: pytest.Mo
             if block.info == "python":
                 printed = live.run(block)
             elif block.info == "output":
-                assert printed.strip() == block.code.strip(), f"{page_id(page)}:{block.line} promises another output"
+                assert printed.rstrip() == block.code, f"{page_id(page)}:{block.line} promises another output"
     finally:
         live.close()
 
