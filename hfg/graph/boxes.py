@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Protocol, TypeGuard
 
-from hfg.nodetype import NodeType
 from hfg.graph.options import NodeOptions
+from hfg.nodetype import NodeType
 from hfg.ports import Relaying
 
 __all__ = ["Box", "is_box", "iterated"]

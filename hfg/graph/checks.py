@@ -332,7 +332,9 @@ def _successors(flat: FlatGraph, edges: Iterable[FlatEdge]) -> list[list[int]]:
 
 
 def _circle(flat: FlatGraph, ring: list[int]) -> str:
-    return " -> ".join(flat.nodes[index].path for index in [*ring, ring[0]])
+    paths = [flat.nodes[index].path for index in ring]
+    shown = paths if len(paths) <= 8 else [*paths[:6], f"{len(paths) - 7} more", paths[-1]]
+    return " -> ".join([*shown, paths[0]])
 
 
 _CHECKS: Final[tuple[Callable[[FlatGraph], Iterator[Problem]], ...]] = (

@@ -240,7 +240,9 @@ def _need_right_options(source: Any, target: Any, options: EdgeOptions) -> None:
 
 def _need_initial(source: Any, target: Any, initial: tuple[Any, ...]) -> None:
     between = f'"{end_path(source)}" -> "{target.path}"'
-    if target.kind == "slot" or (isinstance(target, InnerTarget) and target.kind == "event"):
+    # Where a relay leads is for the check to see.
+    is_relay = is_box(target.node) and target.name in target.node._type.slots
+    if target.kind == "slot" and not is_relay:
         raise errors.ConnectionError(
             f"{between}: initial tokens are for edges into inputs; "
             "leave out initial=[...], or connect to an input (rule P7)"

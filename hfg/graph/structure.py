@@ -233,7 +233,7 @@ class Graph:
         Raises:
           ConnectionError: the edge cannot be; nothing was changed.
         """
-        if source is self.start and isinstance(target, Target) and self._is_around(target):
+        if source is self.start and self._is_around(target):
             # `graph.start.activates(...)` inside a subgraph: the edge belongs where its node is (rule A10).
             inside: Graph = target.graph
             return inside.connect(
@@ -442,7 +442,7 @@ class Graph:
 
     def _is_around(self, target: Any) -> bool:
         """Whether a port lies in a graph inside this one."""
-        home = target.graph
+        home = getattr(target, "graph", None)
         return isinstance(home, Graph) and home is not self and home._root is self
 
     def _new_port(self, kind: str, name: str) -> str:

@@ -241,7 +241,9 @@ def test_nodes_of_other_graphs_are_refused(graph: Graph, camera: Camera) -> None
 @pytest.mark.rule("G3")
 def test_inner_nodes_are_reached_through_the_subgraphs_ports_only(graph: Graph, camera: Camera) -> None:
     box = graph.add(Box())
-    refused(graph, '"box/robot.look" belongs to the graph inside "box"', ".inner", source=camera.seen, target=box.robot.look)
+    refused(
+        graph, '"box/robot.look" belongs to the graph inside "box"', ".inner", source=camera.seen, target=box.robot.look
+    )
     refused(box.graph, '"camera.seen" belongs to graph "fetch"', source=camera.seen, target=box.robot.look)
 
 
@@ -253,9 +255,7 @@ def test_each_side_of_a_relay_belongs_to_its_own_graph(graph: Graph, camera: Cam
     refused(box.graph, '"box.begin" is the side outside', source=box.camera.seen, target=box.begin)
     refused(box.graph, "graph.promote", source=box.speed, target=box.robot.speed)
     other = graph.add(Box())
-    refused(
-        box.graph, 'belongs to the graph inside "box_2"', source=other.goal.inner, target=box.robot.goal
-    )
+    refused(box.graph, 'belongs to the graph inside "box_2"', source=other.goal.inner, target=box.robot.goal)
 
 
 @pytest.mark.rule("G1")
@@ -278,7 +278,9 @@ def test_subgraph_sends_by_events_what_is_asynchronous_inside_and_by_outputs_the
 
 
 @pytest.mark.rule("P4")
-@pytest.mark.parametrize("option", [{"capacity": 4}, {"overflow": "latest"}, {"through": [ops.take(1)]}, {"capacity_limit": 20}])
+@pytest.mark.parametrize(
+    "option", [{"capacity": 4}, {"overflow": "latest"}, {"through": [ops.take(1)]}, {"capacity_limit": 20}]
+)
 def test_synchronous_edges_have_no_queue(graph: Graph, camera: Camera, robot: Robot, option: dict[str, Any]) -> None:
     word = next(iter(option))
     refused(graph, word, '"camera.count" is an output', "rule P4", source=camera.count, target=robot.goal, **option)
@@ -289,7 +291,13 @@ def test_synchronous_edges_have_no_queue(graph: Graph, camera: Camera, robot: Ro
 @pytest.mark.parametrize("overflow", ["drop_oldest", "drop_newest", "latest", "error"])
 def test_active_edges_lose_nothing(graph: Graph, camera: Camera, robot: Robot, overflow: str) -> None:
     refused(
-        graph, "an active edge loses nothing", overflow, source=camera.seen, target=robot.look, active=True, overflow=overflow
+        graph,
+        "an active edge loses nothing",
+        overflow,
+        source=camera.seen,
+        target=robot.look,
+        active=True,
+        overflow=overflow,
     )
 
 

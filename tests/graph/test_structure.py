@@ -116,7 +116,12 @@ def test_node_is_in_one_graph_once(graph: Graph) -> None:
 
 @pytest.mark.parametrize(
     ("found", "remedy"),
-    [(double, r"graph\.add\(double\(\)\)"), (MapLookup, r"graph\.add\(MapLookup\(\)\)"), (print, "hfg.node"), (3, "hfg")],
+    [
+        (double, r"graph\.add\(double\(\)\)"),
+        (MapLookup, r"graph\.add\(MapLookup\(\)\)"),
+        (print, "hfg.node"),
+        (3, "hfg"),
+    ],
 )
 def test_what_is_no_node_is_refused_with_what_to_write(graph: Graph, found: Any, remedy: str) -> None:
     with pytest.raises(GraphError, match=remedy):
@@ -268,7 +273,9 @@ def test_wrong_path_names_its_first_wrong_part(graph: Graph, path: str, sentence
 def test_path_to_a_name_that_is_two_ports_says_how_to_tell_them_apart(graph: Graph) -> None:
     both = hfg.node(lambda image: image, inputs={"image": int}, outputs={"image": int})
     graph.add(both(), name="both")
-    with pytest.raises(GraphError, match=r'ambiguous.*node\.ports\.inputs\["image"\] or node\.ports\.outputs\["image"\]'):
+    with pytest.raises(
+        GraphError, match=r'ambiguous.*node\.ports\.inputs\["image"\] or node\.ports\.outputs\["image"\]'
+    ):
         graph["both.image"]
 
 
