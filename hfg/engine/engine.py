@@ -132,6 +132,7 @@ class Engine:
         self._quiet_waiters: list[asyncio.Future[None]] = []
         self._outcome: tuple[str, HfgError | None] | None = None
         self.ending: asyncio.Event = asyncio.Event()
+        self._early_signals: dict[int, list[Callable[[], None]]] = {}
         self._came_back = asyncio.Event()  # code that was cancelled at the end is over
         self._scheduled = False
         self._set_up: list[Worker] = []
@@ -196,10 +197,35 @@ class Engine:
     def _collect(self, box: deque[Any]) -> None:
         while box:
             item = box.popleft()
-            if self.core.over and not isinstance(item, Job):
-                continue
-            self._guard(partial(item.owner, item) if isinstance(item, Job) else item)
+            if isinstance(self.loop, VirtualTimeLoop):
+                self._hold_back(self.loop, box, item)
+            elif isinstance(item, Job):
+                self._guard(partial(item.owner, item))
+            elif not self.core.over:
+                self._guard(item)
         self.go_on()
+
+    def _hold_back(self, loop: VirtualTimeLoop, box: deque[Any], item: Any) -> None:
+        """In virtual time what a thread brings comes in when the clock says so.
+
+        A job with the signals before it (R6).
+        """
+        if not isinstance(item, Job):
+            self._early_signals.setdefault(id(box), []).append(item)
+            return
+        signals = self._early_signals.pop(id(box), [])
+
+        def arrive() -> None:
+            for signal in signals:
+                if not self.core.over:
+                    self._guard(signal)
+            self._guard(partial(item.owner, item))
+            self.go_on()
+
+        if item.held is None:
+            arrive()
+        else:
+            item.held.deliver = arrive
 
     def on_loop(self) -> bool:
         """Whether the caller is on the run's own thread."""
@@ -422,13 +448,11 @@ class Engine:
         group: Any = worker.group
         closing = self.core.over
         self.begin(worker)
-        self.hold_clock()
 
         def back(job: Job) -> None:
             if job is not worker_job:
                 return
             group.returned()
-            self.unhold_clock()
             worker.in_flight = False
             worker.core.in_flight -= 1
             if not self.core.over or closing:
@@ -438,18 +462,12 @@ class Engine:
 
         worker_job = Job(back, call, arguments, done)
         worker.job = worker_job
+        if isinstance(self.loop, VirtualTimeLoop):
+            limit = worker.options.max_duration_s if worker.busy == "firing" else None
+            worker_job.held = self.loop.hold(limit, lambda: self._guard(partial(errors.time_out, worker)))
+        else:
+            self._limit(worker)
         group.submit(worker_job)
-        self._limit(worker)
-
-    def hold_clock(self) -> None:
-        """Work is in flight in a thread: virtual time stands still (R6)."""
-        if self.virtual:
-            self.loop.hold()  # type: ignore[attr-defined]
-
-    def unhold_clock(self) -> None:
-        """It is back."""
-        if self.virtual:
-            self.loop.unhold()  # type: ignore[attr-defined]
 
     def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Done) -> None:
         """See `Host`."""
@@ -489,7 +507,9 @@ class Engine:
         if group.threaded:
             job = worker.job
             job.owner = lambda _job: None
-            self.unhold_clock()
+            if isinstance(self.loop, VirtualTimeLoop):
+                self.loop.drop(job.held)
+                job.held = None
             group.abandon(f'"{worker.path}", firing {worker.firings}')
         else:
             carrier, worker.carrier = worker.carrier, None

@@ -133,7 +133,7 @@ class LoopGroup(Group):
 class Job:
     """A call for a thread, and what came of it."""
 
-    __slots__ = ("arguments", "call", "done", "error", "owner", "result")
+    __slots__ = ("arguments", "call", "done", "error", "held", "owner", "result")
 
     def __init__(
         self,
@@ -146,6 +146,7 @@ class Job:
         self.call = call
         self.arguments = arguments
         self.done = done
+        self.held: Any = None  # what keeps virtual time from passing until it is back
         self.result: Any = None
         self.error: BaseException | None = None
 

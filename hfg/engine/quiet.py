@@ -145,9 +145,11 @@ def stall(core: Core) -> Stalled | None:
     for target, *edges in stuck.values():
         lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
         reasons.append(f'"{target.path}" {_waits_for(target)}, while tokens lie on {lies}')
-    for source in core.sources:
-        if not source.blocked & (ENDED | DISABLED | RESTING | FUTILE):
-            reasons.append(f'source "{source.path}" has not ended and {_waits_for(source)}')
+    reasons.extend(
+        f'source "{source.path}" has not ended and {_waits_for(source)}'
+        for source in core.sources
+        if not source.blocked & (ENDED | DISABLED | RESTING | FUTILE)
+    )
     if not reasons:
         return None
     shown = "; ".join(reasons[:5]) + (f"; and {len(reasons) - 5} more" if len(reasons) > 5 else "")

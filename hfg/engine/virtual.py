@@ -1,6 +1,4 @@
-"""Virtual time: an event loop whose clock jumps to the next timer when nothing is ready and no work is in flight.
-
-(rule R6).
+"""Virtual time: an event loop whose clock jumps to the next timer when nothing is ready (rule R6).
 
 Nodes that call plain `asyncio.sleep` are covered without knowing it. Work in threads would make the loop look idle,
 so whoever starts some holds the clock until it is back; `run_in_executor` (and so `asyncio.to_thread`) does by itself.
@@ -10,12 +8,30 @@ from __future__ import annotations
 
 import asyncio
 import selectors
+import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-__all__ = ["VirtualTimeLoop"]
+__all__ = ["Held", "VirtualTimeLoop"]
 
 _POLL_EVERY = 64  # jumps without a look at real sockets and signals
+
+
+class Held:
+    """Work in flight outside the loop, for which virtual time stands still.
+
+    Attributes:
+      deliver: brings its result in; None while it is not back.
+      give_up: called if it is not back at `give_up_at`, on the machine's own monotonic clock.
+    """
+
+    __slots__ = ("deliver", "give_up", "give_up_at")
+
+    def __init__(self, limit_s: float | None, give_up: Callable[[], None] | None) -> None:
+        self.deliver: Callable[[], None] | None = None
+        self.give_up = give_up
+        self.give_up_at = None if limit_s is None else time.monotonic() + limit_s
 
 
 class _JumpingSelector(selectors.DefaultSelector):
@@ -25,23 +41,41 @@ class _JumpingSelector(selectors.DefaultSelector):
     _skipped = 0
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        loop = self.loop
-        if timeout is None or loop._holds:
-            return super().select(None if timeout is None or timeout > 0 else timeout)
-        if timeout <= 0:
-            self._skipped += 1
-            if self._skipped < _POLL_EVERY and len(self.get_map()) <= 1:
-                return []
-            self._skipped = 0
-            return super().select(0)
         self._skipped += 1
-        if self._skipped >= _POLL_EVERY or len(self.get_map()) > 1:
+        look = self._skipped >= _POLL_EVERY or len(self.get_map()) > 1
+        if look:
             self._skipped = 0
-            ready = super().select(0)
-            if ready:
-                return ready
+        if timeout is not None and timeout <= 0:
+            return super().select(0) if look else []
+        loop = self.loop
+        if loop._held:
+            return self._wait_for_work(loop)
+        if timeout is None or loop._executor_jobs:
+            return super().select(None)
+        if look and (ready := super().select(0)):
+            return ready
         loop._jump(timeout)
         return []
+
+    def _wait_for_work(self, loop: VirtualTimeLoop) -> list[tuple[selectors.SelectorKey, int]]:
+        """Nothing else can happen now, so work that is back comes in: in the order it was begun.
+
+        Whichever was faster.
+        """
+        held = loop._held
+        first = held[0]
+        if first.deliver is not None:
+            held.popleft()
+            loop.call_soon(first.deliver)
+            return []
+        limits = [one.give_up_at for one in held if one.give_up_at is not None and one.deliver is None]
+        ready = super().select(max(0.0, min(limits) - time.monotonic()) if limits else None)
+        if limits and min(limits) <= time.monotonic():
+            for one in [one for one in held if one.give_up_at is not None and one.give_up_at <= time.monotonic()]:
+                if one.deliver is None and one.give_up is not None:
+                    one.give_up_at = None
+                    loop.call_soon(one.give_up)
+        return ready
 
 
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
@@ -58,7 +92,8 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
 
     def __init__(self) -> None:
         self._virtual_now = 0.0
-        self._holds = 0
+        self._held: deque[Held] = deque()  # the engine's work in threads, in order of its beginning
+        self._executor_jobs = 0
         selector = _JumpingSelector()
         selector.loop = self
         super().__init__(selector)
@@ -68,28 +103,38 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         """Virtual seconds since the loop was made."""
         return self._virtual_now
 
-    def hold(self) -> None:
-        """Work is in flight outside the loop: the clock stands still until as many `unhold` have followed."""
-        self._holds += 1
+    def hold(self, limit_s: float | None = None, give_up: Callable[[], None] | None = None) -> Held:
+        """Let the clock stand still until this work is back (`deliver` set, on the loop) or dropped.
 
-    def unhold(self) -> None:
-        """The work is back."""
-        self._holds -= 1
+        Results come in when nothing else is ready, and in the order in which the work was begun: so a run in virtual
+        time is the same each time, however the threads race. `give_up` is called after `limit_s` real seconds.
+        """
+        held = Held(limit_s, give_up)
+        self._held.append(held)
+        return held
+
+    def drop(self, held: Held) -> None:
+        """Nobody waits for this work any more."""
+        if held in self._held:
+            self._held.remove(held)
 
     def run_in_executor(self, executor: Any, func: Callable[..., Any], *args: Any) -> Any:  # type: ignore[override]
         """As asyncio's, but the clock waits for it."""
         future = super().run_in_executor(executor, func, *args)
-        self.hold()
-        future.add_done_callback(lambda _: self.unhold())
+        self._executor_jobs += 1
+        future.add_done_callback(self._executor_done)
         return future
+
+    def _executor_done(self, _future: object) -> None:
+        self._executor_jobs -= 1
 
     async def shutdown_default_executor(self, timeout: float | None = None) -> None:  # noqa: ASYNC109
         """As asyncio's, but the clock waits for the executor's threads."""
-        self.hold()
+        self._executor_jobs += 1
         try:
             await super().shutdown_default_executor()
         finally:
-            self.unhold()
+            self._executor_jobs -= 1
 
     def _jump(self, timeout: float) -> None:
         scheduled = self._scheduled  # type: ignore[attr-defined]
