@@ -1,4 +1,7 @@
-"""Rule G1 by structure: a graph whose nodes were put into nested subgraphs, at random, flattens to the edges it had without them."""
+"""Rule G1 by structure: grouping nodes into nested subgraphs changes no edge.
+
+A random graph is built twice, once flat and once with its nodes in random boxes, and both flatten to the same edges.
+"""
 
 from __future__ import annotations
 
@@ -104,7 +107,7 @@ class Boxing:
         self.share_out(edge["options"], parts, share)
 
     def share_out(self, options: dict[str, Any], parts: list[tuple[Where, Any, Any, bool]], share: bool) -> None:
-        """Say on each part what together gives the options; a part that others use too says nothing but that it is active."""
+        """Say on each part what together gives the options; a part that others use too is active and says no more."""
         own = [n for n, (_, _, target, _) in enumerate(parts) if not (share and target[0] == "inner")]
         said: list[dict[str, Any]] = [{"active": True} for _ in parts]
         if not options["active"]:

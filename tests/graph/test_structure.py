@@ -181,7 +181,7 @@ def test_loop_is_always_there_and_groups_belong_to_the_whole(graph: Graph) -> No
 @pytest.mark.rule("R1")
 @pytest.mark.parametrize("threads", [2, -1, True, "one"])
 def test_group_has_one_thread_or_none(graph: Graph, threads: Any) -> None:
-    with pytest.raises(GraphError, match="threads must be 0 .* or 1"):
+    with pytest.raises(GraphError, match=r"threads must be 0 .* or 1"):
         graph.group("vision", threads=threads)
     assert list(graph.groups) == ["loop"]
 

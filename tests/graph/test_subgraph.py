@@ -212,10 +212,10 @@ def test_promotions_that_cannot_be_are_refused(graph: Graph) -> None:
         graph.promote(follow.speed, slow)
     with pytest.raises(GraphError, match="not in the graph inside"):
         follow.graph.promote(follow.speed, Plan().ports.parameters["slow"])
-    with pytest.raises(GraphError, match="got 2.5 as the first"):
+    with pytest.raises(GraphError, match=r"got 2\.5 as the first"):
         follow.graph.promote(2.5, slow)  # type: ignore[arg-type]
     follow.graph.connect(limit, slow)
-    with pytest.raises(GraphError, match='is set by the edge from "follow_person/plan.limit"'):
+    with pytest.raises(GraphError, match=r'is set by the edge from "follow_person/plan\.limit"'):
         follow.graph.promote(follow.speed, slow)
     assert follow.graph._promoted == {"speed": [limit]}
 

@@ -8,9 +8,11 @@ from typing import Annotated, Any, NamedTuple, TypeVar, assert_type
 import numpy as np
 from annotated_types import Interval
 from reactivex import Observable
+from reactivex import operators as ops
 
 import hfg
 from hfg.functions import FunctionNode
+from hfg.graph import Edge, GraphInput, GraphOutput, GroupSpec
 from hfg.ports import (
     EventPort,
     InnerSource,
@@ -23,6 +25,7 @@ from hfg.ports import (
     Source,
     Target,
 )
+from hfg.problem import Problem
 from hfg.types import Image
 
 T = TypeVar("T")
@@ -179,3 +182,41 @@ class Box(hfg.Node, Relaying):
         assert_type(self.speed, ParameterPort[float])
         connect(self.begin.inner, lookup.key)
         connect(numbers().out, self.found.inner)
+
+
+# The graph: `add` gives the node's own type back, `connect` joins only what fits.
+graph = hfg.Graph("fetch")
+assert_type(graph.add(lookup, on_error="skip", release="pipelined", active_for_s=5.0), MapLookup)
+assert_type(graph.add(numbers(count=3), name="camera", group="vision", max_rate_hz=30), FunctionNode[int])
+assert_type(graph.connect(numbers().out, lookup.key, initial=[1]), Edge)
+graph.connect(lookup.unknown, lookup.aim)  # int is a float
+graph.connect(lookup.unknown, lookup.forget, capacity=100, overflow="drop_oldest", through=[ops.debounce(0.2)])
+graph.connect(graph.start, lookup.activate, active=True)
+graph.connect(lookup.done, graph.stop)
+graph.connect(observable, lookup.key)
+graph.connect(lookup.ports.parameters["tolerance"], lookup.aim)
+assert_type(graph.input("keys", int), GraphInput[int])
+assert_type(graph.output("found", dict[int, Pose]), GraphOutput[dict[int, Pose]])
+graph.connect(graph.input("more", int), lookup.key)
+graph.connect(lookup.pose, graph.output("poses", Pose))
+graph.gate(lookup, by=lookup, idle_rate_hz=1.0)
+assert_type(graph.group("vision", threads=1, policy="priority"), GroupSpec)
+assert_type(graph.check(), list[Problem])
+
+
+class FollowPerson(hfg.Subgraph):
+    person = hfg.Input(int)
+    done = hfg.Event(int)
+    speed = hfg.Parameter(2.5)
+
+    def build(self, graph: hfg.Graph) -> None:
+        inside = graph.add(MapLookup())
+        graph.connect(self.person.inner, inside.key)
+        graph.connect(inside.unknown, self.done.inner)
+        graph.promote(self.speed, inside.ports.parameters["tolerance"])
+
+
+follow = graph.add(FollowPerson(speed=3.0))
+assert_type(follow, FollowPerson)
+assert_type(follow.graph, hfg.Graph)
+graph.connect(numbers().out, follow.person)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import hfg
-from tests.typing.accepted import Box, MapLookup, ask, blur, connect, maybe, numbers, show
+from tests.typing.accepted import Box, MapLookup, ask, blur, connect, follow, graph, maybe, numbers, show
 
 lookup = MapLookup()
 
@@ -53,3 +53,18 @@ def letters() -> Iterator[str]:
 connect(letters().out, lookup.key)  # error
 hfg.Event(3)  # error
 hfg.Input()  # error
+
+# The graph.
+graph.connect(lookup.pose, lookup.key)  # error
+graph.connect(lookup.key, lookup.pose)  # error
+graph.connect(numbers(), lookup.key)  # error
+graph.connect(graph.start, lookup.key)  # error
+graph.connect(letters().out, follow.person)  # error
+graph.connect(letters().out, follow.person.inner)  # error
+graph.connect(graph.input("keys", str), lookup.key)  # error
+graph.connect(lookup.pose, graph.output("poses", int))  # error
+graph.connect(lookup.unknown, lookup.forget, overflow="forget")  # error
+graph.add(MapLookup)  # error
+graph.add(lookup, on_error="ignore")  # error
+graph.promote(follow.speed, 3)  # error
+graph.gate("lookup", by=lookup)  # error
