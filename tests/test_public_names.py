@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 import hfg
-from tests.test_layers import ALL, HFG
+from tests.test_layers import ALL, HFG, ROOT
 
 PUBLIC = [name for name in ALL if not any(part.startswith("_") for part in name.split("."))]
 
@@ -90,3 +90,9 @@ def test_virtual_time_is_at_the_door() -> None:
         assert name in hfg.__all__
     for name in ("node", "slot", "run", "run_async", "running", "now", "VirtualTimeLoop"):
         assert name in hfg.__all__
+
+
+def test_the_reference_page_has_every_name_of_the_face() -> None:
+    page = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    missing = [name for name in hfg.__all__ if f"hfg.{name}" not in page]
+    assert not missing, f"docs/reference.md says nothing of {missing}"

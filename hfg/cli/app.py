@@ -33,7 +33,7 @@ app.command("nodes")(nodes.nodes)
 
 
 @app.callback(invoke_without_command=True)
-def hfg(
+def _root(
     context: typer.Context,
     show_version: Annotated[bool, typer.Option("--version", help="Show the version and leave.")] = False,
 ) -> None:

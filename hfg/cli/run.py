@@ -25,7 +25,7 @@ from hfg.errors import HfgError, TargetError, UsageError
 from hfg.graph import Graph
 from hfg.trace import TraceEvent
 
-__all__ = ["run"]
+__all__ = ["Clock", "run"]
 
 
 class Clock(StrEnum):
