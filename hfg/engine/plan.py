@@ -14,7 +14,7 @@ from hfg.engine.core import Core
 from hfg.engine.groups import Group
 from hfg.engine.scopes import Gate, Scope
 from hfg.engine.wiring import is_live, rewire
-from hfg.engine.worker import DISABLED, STARTING, RunningEvent, Worker
+from hfg.engine.worker import DISABLED, STARTING, UNWIRED, RunningEvent, Worker
 from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode
 from hfg.ports.edges import DelayEdge, Edge, EventEdge, SyncEdge
@@ -255,6 +255,7 @@ def prepare_slot(worker: Worker, name: str) -> EventEdge:
     core = worker.core
     edge = EventEdge(len(core.edges), f"outside -> {worker.path}.{name}" if worker.path else f"outside -> {name}", True)
     edge.source = Worker(core, len(core.workers), "", None, None, worker.group)
+    edge.source.blocked |= UNWIRED  # it never fires; only its queue may be full
     edge.target = worker
     edge.target_kind = "slot"
     edge.port_name = name

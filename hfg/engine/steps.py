@@ -66,6 +66,8 @@ def choose(worker: Worker) -> None:
     outs = [edge for edges in worker.out_edges for edge in edges]
     if any(type(edge) is not SyncEdge or edge.target_kind != "input" for edge in outs):
         return
+    if any(edge.target.is_boundary_output and edge.target.process is None for edge in outs):
+        return  # a reader waits at its barrier
     if len(outs) > 1 or (worker.type.result == "fields"):
         return
     if worker.is_source:
