@@ -61,6 +61,7 @@ class Graph:
 
     Example:
       >>> import hfg
+      >>> from collections.abc import Iterator
       >>> @hfg.node
       ... def count(*, to: int = 3) -> Iterator[int]:
       ...     yield from range(to)
