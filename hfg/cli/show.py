@@ -60,11 +60,13 @@ def failure(error: BaseException) -> None:
 
 def user_traceback(error: BaseException | None) -> None:
     """Write a traceback without the frames of hfg and of what lies between it and the user's code."""
-    if error is None or (isinstance(error, HfgError) and not _debug):
+    if error is None:
         return
     shown = traceback.TracebackException.from_exception(error)
     if not _debug:
         _filter(shown)
+        if isinstance(error, HfgError) and not shown.stack:
+            return  # nothing of the user's in it, and its sentence follows
     sys.stderr.write("".join(shown.format()))
 
 

@@ -206,6 +206,15 @@ def test_target_that_fails_shows_its_own_frames(hfg: Command) -> None:
     assert "hfg/cli" not in shown.err
 
 
+def test_an_edge_that_is_refused_shows_the_line_that_draws_it(hfg: Command) -> None:
+    with Path("halves.py").open("a", encoding="utf-8") as file:
+        file.write("\ngraph.connect(source.out, graph.start)\n")
+    shown = hfg("check", TARGET)
+    assert shown.code == 2
+    assert "graph.connect(source.out, graph.start)" in shown.err
+    assert "hfg/graph" not in shown.err
+
+
 def test_check_finds_nothing_in_a_sound_graph(hfg: Command) -> None:
     shown = hfg("check", TARGET)
     assert (shown.code, shown.out.splitlines()[-1]) == (0, 'graph "halves": no errors, no warnings')
