@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 .PHONY: help demo test lint bench soak setup clean
 
 help:
-	@echo "make demo    run an example with activity in virtual time"
+	@echo "make demo    search, measure and report on real photographs, with a gate"
 	@echo "make test    run all tests (without the long ones)"
 	@echo "make lint    ruff and mypy"
 	@echo "make bench   run the benchmarks"
@@ -18,7 +18,7 @@ help:
 	@echo "make clean   remove .venv and everything tools have left"
 
 demo: $(READY)
-	$(BIN)/hfg run examples/fetch.py --clock virtual -v
+	$(BIN)/hfg run examples/photographs.py --clock virtual -v
 
 test: $(READY)
 	$(BIN)/python -m pytest

@@ -71,6 +71,12 @@ class NodeFunction(Generic[P, R_co]):
         self.__wrapped__ = function
 
     @overload
+    def __call__(self: NodeFunction[P, None], *args: P.args, **parameters: P.kwargs) -> FunctionNode[None]: ...
+    @overload
+    def __call__(
+        self: NodeFunction[P, Coroutine[Any, Any, None]], *args: P.args, **parameters: P.kwargs
+    ) -> FunctionNode[None]: ...
+    @overload
     def __call__(
         self: NodeFunction[P, Coroutine[Any, Any, T | None]], *args: P.args, **parameters: P.kwargs
     ) -> FunctionNode[T]: ...

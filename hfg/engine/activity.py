@@ -14,7 +14,7 @@ from hfg.engine.scopes import Scope
 from hfg.engine.sending import automatic, block, consider, flush_automatic, set_active, touch, trigger, unblock
 from hfg.engine.worker import RATE, RESTING, Worker
 
-__all__ = ["changed", "gate_changed", "reset_activity", "scopes_changed"]
+__all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "scopes_changed", "strip"]
 
 
 def changed(worker: Worker, active: bool) -> None:

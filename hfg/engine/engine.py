@@ -36,7 +36,7 @@ from hfg.ports.edges import DelayEdge, EventEdge
 from hfg.token import Token
 from hfg.trace import RunEnded, RunStarted, TraceEvent
 
-__all__ = ["Engine", "Settings"]
+__all__ = ["Engine", "Settings", "answer"]
 
 _LOGGER = logging.getLogger("hfg.engine")
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock

@@ -12,7 +12,7 @@ from hfg.engine.sending import automatic, block, put_outputs, report_error, unbl
 from hfg.engine.worker import BACKOFF, TORN_DOWN, Worker
 from hfg.errors import EndOfStream, FiringTimeout, HfgError, NodeError, QueueLimit
 
-__all__ = ["apply_policy", "fail", "fail_call", "time_out"]
+__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "time_out"]
 
 
 def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:

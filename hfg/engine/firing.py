@@ -41,10 +41,15 @@ from hfg.types import accepts, describe
 
 __all__ = [
     "await_call",
+    "call",
     "complete_firing",
+    "drain_left",
     "finish_call",
     "finish_firing",
+    "fire",
     "idle_again",
+    "merge",
+    "set_parameter",
     "source_ended",
     "step",
     "write",
@@ -414,6 +419,7 @@ def _end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> 
             edge.dropped += 1
             if core.trace is not None:
                 core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
+    worker.end_firings += 1
     worker.blocked |= ENDED
     worker.deferred = []
     _cancel_limit(worker)

@@ -15,7 +15,7 @@ from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge
 from hfg.trace import NodeEnabled
 
-__all__ = ["disable", "enable", "reset", "set_up", "tear_down"]
+__all__ = ["disable", "enable", "reset", "set_up", "settle_disabled", "tear_down"]
 
 Then = Callable[[NodeError | None], None]
 

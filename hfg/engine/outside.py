@@ -21,7 +21,7 @@ from hfg.ports.edges import EventEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.types import accepts, describe
 
-__all__ = ["Feed", "read", "signal"]
+__all__ = ["Feed", "collect", "read", "signal", "take", "until"]
 
 
 class Feed:

@@ -16,7 +16,7 @@ from hfg.ports.edges import EventEdge
 from hfg.token import END
 from hfg.trace import QueueGrown
 
-__all__ = ["complete_operators", "end_events", "grow", "node_ended", "only_futile_in_flight", "stall"]
+__all__ = ["complete_edge", "complete_operators", "end_events", "grow", "node_ended", "only_futile_in_flight", "stall"]
 
 
 def grow(core: Core) -> bool:

@@ -15,7 +15,8 @@ class NodeReport(msgspec.Struct, frozen=True):
     """One node.
 
     Attributes:
-      firings: firings, silent ones included.
+      firings: firings, silent ones and the one that ended it included.
+      processed: firings in which the function ran.
       silent: firings without the function (F4).
       calls: slot calls.
       failed: failed firings and calls.
@@ -25,6 +26,7 @@ class NodeReport(msgspec.Struct, frozen=True):
     """
 
     firings: int
+    processed: int
     silent: int
     calls: int
     failed: int
@@ -83,6 +85,7 @@ def node_reports(core: Core) -> dict[str, NodeReport]:
     return {
         worker.path: NodeReport(
             firings=worker.firings,
+            processed=worker.firings - worker.silent - worker.end_firings,
             silent=worker.silent,
             calls=worker.call_number,
             failed=worker.failed + worker.calls_failed,

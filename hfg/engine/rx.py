@@ -25,7 +25,7 @@ from hfg.engine.sending import enqueue, operator_failed
 from hfg.ports.edges import EventEdge
 from hfg.token import Token
 
-__all__ = ["RunScheduler", "feed_from_observable", "pipe_edge"]
+__all__ = ["RunScheduler", "feed_from_observable", "kick", "pipe_edge"]
 
 
 class RunScheduler(PeriodicScheduler):

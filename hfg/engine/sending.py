@@ -32,19 +32,28 @@ if TYPE_CHECKING:
     from hfg.engine.scopes import Scope
 
 __all__ = [
+    "add_call",
+    "arrived",
+    "automatic",
     "block",
     "consider",
     "derive_scopes",
     "discard",
     "enqueue",
+    "flush_automatic",
+    "freed",
     "give_back",
+    "operator_failed",
     "outputs_free",
     "put",
     "put_outputs",
     "queue",
+    "receive",
     "release",
+    "report_error",
     "send_end",
     "set_active",
+    "touch",
     "trigger",
     "unblock",
 ]

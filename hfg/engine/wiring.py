@@ -12,7 +12,7 @@ from hfg.engine.scopes import Scope
 from hfg.engine.worker import DISABLED, UNWIRED, RunningEvent, Worker
 from hfg.ports.edges import EventEdge
 
-__all__ = ["bind_ports", "refresh", "refresh_via", "rewire"]
+__all__ = ["bind_ports", "is_live", "refresh", "refresh_via", "rewire"]
 
 
 def is_live(edge: Any) -> bool:

@@ -105,6 +105,7 @@ class Worker:
         "carrier",
         "core",
         "deferred",
+        "end_firings",
         "events",
         "events_due",
         "failed",
@@ -259,6 +260,7 @@ class Worker:
         # counts
         self.firings = 0
         self.silent = 0
+        self.end_firings = 0
         self.call_number = 0
         self.failed = 0
         self.calls_failed = 0
