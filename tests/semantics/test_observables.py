@@ -1,0 +1,218 @@
+"""Operators on edges, events as observables, observables as feeds (rule P9)."""
+
+from __future__ import annotations
+
+import pytest
+import reactivex
+from reactivex import Subject, operators
+
+import hfg
+from tests.semantics.nodes import (
+    Burst,
+    Ear,
+    Keep,
+    KeepTokens,
+    Send,
+    Timed,
+    drive,
+    numbers,
+    run,
+    slow_numbers,
+)
+
+
+@pytest.mark.rule("P9")
+def test_operators_see_tokens_and_lie_before_the_queue(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Burst(count=6)), graph.add(KeepTokens())
+    even = operators.filter(lambda token: token.value % 2 == 0)
+    times_ten = operators.map(lambda token: token.value * 10)
+    graph.connect(source.rang, sink.value, through=[even, times_ten], capacity=2, overflow="drop_oldest")
+    report = run(graph, fast)
+    assert [token.value for token in sink.tokens] == [40, 60]
+    assert report.edges["burst.rang -> keep_tokens.value"].dropped == 1
+
+
+@pytest.mark.rule("P9", "T5")
+def test_what_comes_out_and_is_no_token_becomes_one_with_the_newest_stamp_that_went_in(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, send, sink = graph.add(slow_numbers(pause_s=2)), graph.add(Send(modifier=1)), graph.add(KeepTokens())
+    graph.connect(source.out, send.value)
+    pairs = [operators.map(lambda token: token.value), operators.buffer_with_count(2)]
+    graph.connect(send.rang, sink.value, through=pairs)
+    run(graph, fast)
+    assert [(token.value, token.stamp, token.activity) for token in sink.tokens] == [([1, 2], 2, 0), ([3], 4, 0)]
+
+
+@pytest.mark.rule("P9")
+def test_a_token_that_comes_out_keeps_its_stamp(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, send, sink = graph.add(slow_numbers(pause_s=2)), graph.add(Send(modifier=1)), graph.add(KeepTokens())
+    graph.connect(source.out, send.value)
+    graph.connect(send.rang, sink.value, through=[operators.take_last(3)])
+    run(graph, fast)
+    assert [(token.value, token.stamp, token.activity) for token in sink.tokens] == [(1, 0, 0), (2, 2, 0), (3, 4, 0)]
+
+
+@pytest.mark.rule("P9", "R6")
+def test_an_operator_of_time_runs_on_the_clock_of_the_run(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Burst(count=5)), graph.add(Timed())
+    graph.connect(source.rang, sink.value, through=[operators.delay(0.2), operators.map(lambda token: token.value)])
+    report = run(graph, fast)
+    assert sink.seen == [(number, 0.2) for number in range(1, 6)]
+    assert report.duration_s == 0.2
+
+
+@pytest.mark.rule("P9", "R6")
+def test_debounce_on_an_edge_lets_the_last_of_a_burst_through(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Burst(count=5)), graph.add(Timed())
+    graph.connect(source.rang, sink.value, through=[operators.debounce(0.2), operators.map(lambda token: token.value)])
+    assert run(graph, fast).outcome == "done"
+    assert [value for value, _ in sink.seen] == [5]
+
+
+@pytest.mark.rule("P9", "R5")
+def test_operators_give_out_what_they_hold_before_the_run_ends(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, ear = graph.add(Burst(count=5)), graph.add(Ear())
+    threes = [operators.map(lambda token: token.value), operators.buffer_with_count(3)]
+    graph.connect(source.rang, ear.hear, through=threes)
+    run(graph, fast)
+    assert ear.heard == [[1, 2, 3], [4, 5]]
+
+
+@pytest.mark.rule("P9")
+def test_operators_complete_when_the_node_of_the_event_has_ended(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Burst(count=2)), graph.add(Timed())
+    other, keep = graph.add(slow_numbers(count=1, pause_s=100)), graph.add(Keep())
+    graph.connect(other.out, keep.value)
+    graph.connect(source.rang, sink.value, through=[operators.count()])
+    run(graph, fast)
+    assert sink.seen == [(2, 0)]
+
+
+@pytest.mark.rule("P9")
+def test_an_event_is_an_observable_of_tokens(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Burst(count=3)), graph.add(Keep())
+    graph.connect(source.rang, sink.value)
+    doubled: list[int] = []
+    plain: list[int] = []
+    source.rang.pipe(operators.map(lambda token: token.value * 2)).subscribe(doubled.append)
+    source.rang.subscribe(lambda token: plain.append(token.value))
+    run(graph, fast)
+    assert (plain, doubled, sink.values) == ([1, 2, 3], [2, 4, 6], [1, 2, 3])
+
+
+@pytest.mark.rule("P9")
+def test_an_event_without_an_edge_is_observed_too_and_completes_with_the_run(fast: bool) -> None:
+    graph = hfg.Graph()
+    source = graph.add(Burst(count=3))
+    seen: list[int] = []
+    completed: list[bool] = []
+    source.rang.subscribe(lambda token: seen.append(token.value), on_completed=lambda: completed.append(True))
+    run(graph, fast)
+    assert seen == [1, 2, 3]
+    assert completed == [True]
+
+
+@pytest.mark.rule("P9")
+def test_a_subscription_that_is_disposed_of_hears_no_more(fast: bool) -> None:
+    graph = hfg.Graph()
+    source = graph.add(Burst(count=3))
+    seen: list[int] = []
+    source.rang.pipe(operators.take(2)).subscribe(lambda token: seen.append(token.value))
+    run(graph, fast)
+    assert seen == [1, 2]
+
+
+@pytest.mark.rule("P9", "R6")
+def test_debounce_of_a_subscriber_uses_the_clock_of_the_run(fast: bool) -> None:
+    async def main() -> list[tuple[int, float]]:
+        graph = hfg.Graph()
+        source = graph.add(Burst(count=3))
+        seen: list[tuple[int, float]] = []
+        async with hfg.running(graph, fast=fast) as run:
+            source.rang.pipe(operators.debounce(0.5)).subscribe(lambda token: seen.append((token.value, run.now())))
+            await run.wait_finished()
+        return seen
+
+    assert drive(main) == [(3, 0.5)]
+
+
+@pytest.mark.rule("A9", "P9")
+def test_automatic_events_are_observables_too(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(numbers(count=2)), graph.add(Keep())
+    graph.connect(source.out, sink.value)
+    seen: list[object] = []
+    sink.processed.subscribe(lambda token: seen.append(token.value))
+    run(graph, fast)
+    assert seen == [None, None]
+
+
+@pytest.mark.rule("P9")
+@pytest.mark.parametrize("target", ["input", "slot"])
+def test_an_outside_observable_feeds_a_slot_or_an_input_and_holds_the_run_open(target: str, fast: bool) -> None:
+    async def main() -> list[object]:
+        graph = hfg.Graph()
+        sink, ear = graph.add(Keep()), graph.add(Ear())
+        subject: Subject[int] = Subject()
+        if target == "input":
+            graph.connect(subject, sink.value)
+        else:
+            graph.connect(subject, ear.hear)
+        async with hfg.running(graph, fast=fast) as run:
+            subject.on_next(1)
+            subject.on_next(2)
+            await run.wait_quiet()
+            subject.on_next(3)
+            subject.on_completed()
+            report = await run.wait_finished()
+            assert report.outcome == "done"
+        return sink.values if target == "input" else ear.heard
+
+    assert drive(main) == [1, 2, 3]
+
+
+@pytest.mark.rule("P9")
+def test_each_edge_from_an_observable_has_an_observer_of_its_own(fast: bool) -> None:
+    async def main() -> list[object]:
+        graph = hfg.Graph()
+        ear = graph.add(Ear())
+        first: Subject[int] = Subject()
+        second: Subject[int] = Subject()
+        graph.connect(first, ear.hear)
+        graph.connect(second, ear.hear)
+        async with hfg.running(graph, fast=fast) as run:
+            first.on_next(1)
+            first.on_completed()
+            second.on_next(2)
+            second.on_completed()
+            await run.wait_finished()
+        return ear.heard
+
+    assert drive(main) == [1, 2]
+
+
+@pytest.mark.rule("P9", "R5")
+def test_an_observable_that_completes_at_once_feeds_all_it_has(fast: bool) -> None:
+    graph = hfg.Graph()
+    ear, sink = graph.add(Ear()), graph.add(Keep())
+    graph.connect(reactivex.of(1, 2, 3), ear.hear)
+    graph.connect(reactivex.of(4, 5), sink.value)
+    run(graph, fast)
+    assert ear.heard == [1, 2, 3]
+    assert sink.values == [4, 5]
+
+
+@pytest.mark.rule("P9", "R6")
+def test_an_observable_of_time_feeds_on_the_clock_of_the_run(fast: bool) -> None:
+    graph = hfg.Graph()
+    sink = graph.add(Timed())
+    graph.connect(reactivex.interval(0.5), sink.value, through=[operators.take(3)])
+    assert run(graph, fast).outcome == "done"
+    assert sink.seen == [(0, 0.5), (1, 1.0), (2, 1.5)]
