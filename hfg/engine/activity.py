@@ -68,22 +68,20 @@ def gate_changed(gates: Any) -> None:
     for gate in gates:
         for worker in gate.workers:
             if worker.is_source:
-                _rest(worker, gate)
+                _rest(worker)
 
 
-def _rest(worker: Worker, gate: Any) -> None:
+def _rest(worker: Worker) -> None:
     if worker.rate_timer is not None:
         worker.rate_timer.cancel()
         worker.rate_timer = None
         worker.blocked &= ~RATE
-    if gate.state.active:
-        unblock(worker, RESTING)
-        consider(worker)
-    elif gate.idle_rate_hz is None:
+    if any(gate.idle_rate_hz is None and not gate.state.active for gate in worker.gates_over):
         block(worker, RESTING)
-    else:
-        worker.placed = False
-        consider(worker)  # throttled: it may have to wait now (D7)
+        return
+    worker.placed = False  # throttled, it may have to wait now (D7)
+    unblock(worker, RESTING)
+    consider(worker)
 
 
 # --- subgraphs ------------------------------------------------------------------------------------------------------

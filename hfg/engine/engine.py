@@ -30,7 +30,7 @@ from hfg.engine.sending import consider, discard, trigger
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.watchdog import Watch, watchdog
 from hfg.engine.worker import STARTING, TORN_DOWN, RunningEvent, Worker
-from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
+from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, TeardownError
 from hfg.graph.flat import FlatGraph
 from hfg.ports.edges import DelayEdge, EventEdge
 from hfg.token import Token
@@ -42,6 +42,8 @@ _LOGGER = logging.getLogger("hfg.engine")
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
 _SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
 _VIRTUAL_SLICE_STEPS = 2048  # in virtual time a slice must not depend on how fast the machine is
+
+_MOST_AT_ONE_INSTANT = 20_000_000  # firings, before a run with `until_s` is taken to stand still
 
 Done = Callable[[Any, BaseException | None], None]
 
@@ -150,6 +152,8 @@ class Engine:
         self.leftover_threads: list[str] = []
         self._zombies: set[Any] = set()  # carriers of given-up firings
         self.ended_at: float | None = None
+        self._instant = -1.0
+        self._instant_steps = 0
         plan.build(self.core, flat, self.groups, loop=self._loop_group)
         if settings.trace is not None:
             self.add_consumer(settings.trace)
@@ -307,7 +311,10 @@ class Engine:
             worker.step(worker)
             left -= 1
             if not left:
-                if core.over or self.virtual:
+                if core.over:
+                    return
+                if self.virtual:
+                    self._same_instant()
                     return
                 now = time.monotonic()
                 if not until:
@@ -315,6 +322,22 @@ class Engine:
                 elif now >= until:
                     return
                 left = _SLICE_STEPS
+
+    def _same_instant(self) -> None:
+        """R6: with `until_s`, something that goes on and on without letting time pass is refused in the end."""
+        now = self.loop.time()
+        if now != self._instant:
+            self._instant, self._instant_steps = now, 0
+        self._instant_steps += _VIRTUAL_SLICE_STEPS
+        if self._instant_steps > _MOST_AT_ONE_INSTANT and self.settings.until_s is not None:
+            busiest = max(self.core.workers, key=lambda worker: worker.firings + worker.call_number)
+            self.finish(
+                "failed",
+                RunError(
+                    f"virtual time has stood still at {now:g} s for {self._instant_steps:,} firings, so until_s would "
+                    f'never come; "{busiest.path}" fired most: give the source in front of it max_rate_hz='
+                ),
+            )
 
     def _settle(self) -> None:
         """The run queues are empty: is the graph quiet, and if so, what follows?"""
@@ -595,8 +618,8 @@ class Engine:
     def _open_sources(self, core: Core) -> None:
         """Sources may fire from now on, as far as their gates allow."""
         for worker in core.workers:
-            if worker.gate is not None and worker.is_source:
-                gate_changed([worker.gate])
+            if worker.gates_over and worker.is_source:
+                gate_changed(worker.gates_over)
             worker.blocked &= ~STARTING
             consider(worker)
             if worker.iteration is not None:

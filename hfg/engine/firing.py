@@ -204,12 +204,12 @@ def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]], mo
         _rewire(worker)
     if silent or (edges and not has_mandatory and not has_value):
         return "silent"
-    gate = worker.gate
-    if gate is not None and not worker.is_source:
-        state = gate.state
-        state_active = after_receipt(worker.active, modifiers) if state is worker else state.active
-        if not state_active and not _idle_turn(worker, gate.idle_rate_hz):
-            return "silent"
+    if not worker.is_source:
+        for gate in worker.gates_over:
+            state = gate.state
+            state_active = after_receipt(worker.active, modifiers) if state is worker else state.active
+            if not state_active and not _idle_turn(worker, gate.idle_rate_hz):
+                return "silent"
     return "process"
 
 

@@ -60,7 +60,7 @@ def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Gro
         target = flat_gate.target
         gate.workers = list(core.scopes[-2 - target].members) if target < 0 else [workers[target]]
         for worker in gate.workers:
-            worker.gate = gate
+            worker.gates_over += (gate,)
             worker.paced = worker.paced or worker.is_source
         state.gates.append(gate)
     _mark_scopes(core)

@@ -21,7 +21,8 @@ from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import Worker
 from hfg.errors import CheckFailed, GraphError, HfgError, NotRunning, RunError, UsageError
 from hfg.graph import Graph
-from hfg.graph.flat import flatten
+from hfg.graph.checks import check_flat, runs_for_ever
+from hfg.graph.flat import FlatGraph, flatten
 from hfg.nodetype import Node
 from hfg.token import Token
 from hfg.trace import ParameterSet, TokenSent, TraceEvent
@@ -318,10 +319,10 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
             'clock="virtual" needs a loop in virtual time: hfg.run(graph, clock="virtual"), or '
             "asyncio.Runner(loop_factory=hfg.VirtualTimeLoop).run(main()) around the whole program"
         )
-    problems = graph.check()
+    flat = flatten(graph)
+    problems = check_flat(flat)
     if any(problem.severity == "error" for problem in problems):
         raise CheckFailed(problems)
-    flat = flatten(graph)
     if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
         _refuse_endless(flat)
     engine = Engine(flat, settings)
@@ -330,27 +331,16 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
     return run
 
 
-def _refuse_endless(flat: Any) -> None:
-    """R6: a function without inputs that has no rate never lets virtual time pass; a generator may end.
-
-    So it is given a chance.
-    """
+def _refuse_endless(flat: FlatGraph) -> None:
+    """R6: under a virtual clock a source that never ends and waits for nothing would hold time still for ever."""
     for node in flat.nodes:
-        kind = type(node.node)._type
-        if (
-            kind.is_source
-            and kind.process_kind == "function"
-            and not node.options.max_rate_hz
-            and node.iteration is None
-        ):
-            gated = any(gate.target == node.index for gate in flat.gates)
-            names = getattr(getattr(node.node._process_call(), "__code__", None), "co_names", ("EndOfStream",))
-            if not gated and node.node._hook("ready") is None and "EndOfStream" not in names:
-                raise GraphError(
-                    f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time '
-                    f"would stand still for ever: give it "
-                    f"max_rate_hz=, or let it raise hfg.EndOfStream"
-                )
+        gated = any(gate.target == node.index for gate in flat.gates)
+        if runs_for_ever(node.node) and not node.options.max_rate_hz and not gated:
+            raise GraphError(
+                f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time '
+                f'would stand still '
+                f"for ever: give it max_rate_hz=, or let it raise hfg.EndOfStream"
+            )
 
 
 async def _run_to_end(graph: Graph, clock: Clock, settings: Settings) -> Report:

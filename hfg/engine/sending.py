@@ -83,9 +83,10 @@ def consider(worker: Worker) -> None:
 def _must_wait(worker: Worker) -> bool:
     """F11 and D7: nothing starts before the rate allows it; the timer is set only when something would."""
     when = worker.next_start
-    gate = worker.gate
-    if gate is not None and worker.is_source and gate.idle_rate_hz is not None and not gate.state.active:
-        when = max(when, worker.gate_next + 1.0 / gate.idle_rate_hz)
+    if worker.is_source:
+        for gate in worker.gates_over:
+            if gate.idle_rate_hz is not None and not gate.state.active:
+                when = max(when, worker.gate_next + 1.0 / gate.idle_rate_hz)
     core = worker.core
     if when <= core.now():
         return False

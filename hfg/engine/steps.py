@@ -47,7 +47,7 @@ def choose(worker: Worker) -> None:
         worker.step = core.inside.step
     if not core.fast or core.trace is not None or core.debug or worker.options is None or worker.group.threaded:
         return
-    if worker.gate is not None or worker.iteration is not None or worker.ready_hook is not None or worker.observed:
+    if worker.gates_over or worker.iteration is not None or worker.ready_hook is not None or worker.observed:
         return
     options = worker.options
     if (

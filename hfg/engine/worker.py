@@ -111,9 +111,9 @@ class Worker:
         "failed",
         "firings",
         "full_edges",
-        "gate",
         "gate_next",
         "gates",
+        "gates_over",
         "generator",
         "group",
         "handlers",
@@ -219,7 +219,7 @@ class Worker:
         self.scopes: tuple[Scope, ...] = ()  # those of them that are watched
         self.own_enabled = True
         self.paced = False  # a rate or a throttling gate may hold its firings
-        self.gate: Gate | None = None
+        self.gates_over: tuple[Gate, ...] = ()  # it works only while their states are active
         self.gates: list[Any] = []  # that look at its activity
         self.active_for_s: float | None = None
         self.observed = False  # somebody waits at its barriers: no short ways
