@@ -67,6 +67,7 @@ class Allowed:
     disabling: bool = True
     readiness: bool = True
     threads: bool = False
+    failing_calls: bool = True
 
 
 SYNCHRONOUS = Allowed(events=False, activity=False, failures=False, gates=False, operators=False, lossy=False, disabling=False, readiness=False)
@@ -195,6 +196,7 @@ class _Making:
     def _make_slot_edges(self) -> None:
         choose, allowed = self.choose, self.allowed
         slots = [(node, port) for node in self.nodes for port in self.type_of(node.name).slots]
+        slots = [(node, port) for node, port in slots if port != "poke" or allowed.failing_calls]
         for _ in range(choose.number(0, 2 * len(self.nodes))):
             if not slots or choose.chance(12):
                 self._delicate_edge()

@@ -192,12 +192,21 @@ class ReferenceMachine(Calling):
         return min(full, key=lambda line: (line.capacity, line.edge.index), default=None)
 
     def events_to_end(self) -> list[Line]:
-        """F13: live event edges into inputs whose queues are empty, once an edge."""
+        """F13: live event edges into inputs whose queues are empty, once an edge; who has ended needs no telling."""
         return [
             line
             for line in self.lines
-            if line.edge.is_event and line.edge.target.kind == "input" and self.is_live(line) and not line.queue and not line.given_end
+            if line.edge.is_event
+            and line.edge.target.kind == "input"
+            and self.is_live(line)
+            and not line.queue
+            and not line.given_end
+            and not self.has_ended(line.edge.target.owner)
         ]
+
+    def has_ended(self, owner: int) -> bool:
+        """Whether the node has ended, or is about to."""
+        return owner >= 0 and self.stations[owner].ending
 
     def stalled(self) -> list[str]:
         """R5: sources that have not ended and are blocked, and edges with tokens that can never be taken."""
@@ -206,7 +215,7 @@ class ReferenceMachine(Calling):
             resting = self.is_suspended_source(index) or self.is_resting(index)
             if station.type.is_source and self.is_enabled(index) and not station.ended and not resting and not self.is_moot(index):
                 found.append(station.path)
-        return found + [line.edge.label for line in self.lines if line.queue]
+        return found + [line.edge.label for line in self.lines if line.queue and self.is_enabled(line.edge.target.owner)]
 
     def is_moot(self, index: int) -> bool:
         """R5: a source with edges only into ended nodes."""
@@ -309,16 +318,20 @@ class ReferenceMachine(Calling):
         self.settle()
 
     def finish(self, outcome: str) -> None:
-        """End the run; what is left is dropped."""
+        """End the run; what is left by one that was cut short is dropped."""
         if self.outcome is not None:
             return
         self.outcome = outcome
         if outcome == "stalled":
             self.error = Stalled(f"nothing can move any more: {', '.join(self.stalled())}")
-        for line in self.lines:
+        for line in self.lines if outcome in ("stopped", "until") else ():
             for lying in line.queue:
                 self.observe(TokenDropped(self.now, line.edge.label, lying.token, "stopped"))
         self.observe(RunEnded(self.now, outcome))
+        self.close()
+
+    def close(self) -> None:
+        """Throw away what is under way; needed only if the run is not taken to its end."""
         for station in self.stations:
             if station.flight is not None:
                 self.abandon(station.flight)

@@ -82,6 +82,7 @@ def reference_run(
     machine.start()
     while moves := machine.moves():
         if len(taken) == max_moves:
+            machine.close()
             raise RuntimeError(f"the run is not over after {max_moves} moves; give until_s, or bound its sources")
         taken.append(pick(moves))
         machine.apply(taken[-1])

@@ -220,8 +220,7 @@ class Sending(State):
             if not marker and not ended:
                 continue
             token = line.queue.pop(0).token
-            self.observe(TokenDrained(self.now, line.edge.label, token))
-            self.note_processed(line)
+            self.observe(TokenDrained(self.now, line.edge.label, token))  # says that it is processed, too
             if ended and not self.stations[target.owner].ended:
                 self.stations[target.owner].drained_modifiers.append(token.activity)
             else:

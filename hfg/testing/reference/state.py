@@ -255,7 +255,9 @@ class State:
             return False
         if ignore != "timers" and (self.is_held_by_time(index) or self.is_resting(index)):
             return False
-        return not self.is_suspended_source(index) and self.says_ready(station)
+        if self.is_suspended_source(index):
+            return False
+        return ignore == "timers" or self.says_ready(station)  # asked last: until a timer is over nobody knows
 
     def has_all_inputs(self, index: int) -> bool:
         """A source or a live input edge; a live edge at every mandatory input; a token on every edge that takes part."""
