@@ -474,7 +474,7 @@ def emitter(event: RunningEvent) -> Callable[..., None]:
             worker.full_edges += 1
             block(worker, FULL)
         calls.append(edge)
-        if not target.queued and not target.busy and not target.blocked & CALLS_BLOCKED:
+        if not target.queued:  # if it is busy or blocked its step does nothing, and it is queued again when that is over
             target.queued = True
             target.push(target)
 
