@@ -58,10 +58,16 @@ class Carrier:
 
     __slots__ = ("_context", "_coroutine", "_done", "_loop", "_must_cancel", "_outside", "_waits_for", "task")
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, name: str, context: contextvars.Context) -> None:
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        name: str,
+        outside: contextvars.Context,
+        context: contextvars.Context | None = None,
+    ) -> None:
         self._loop = loop
-        self._outside = context  # in which the engine's own code goes on
-        self._context = context.copy()
+        self._outside = outside  # in which the engine's own code goes on
+        self._context = outside.copy() if context is None else context
         self._coroutine: Any = None
         self._done: Done | None = None
         self._waits_for: Any = None

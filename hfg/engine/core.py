@@ -108,6 +108,7 @@ class Core:
         self.debug = False
         self.fast = True
         self.in_flight = 0
+        self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
         self.timers = 0
         self.pumping = False
         self.plain = False  # pumping, and nobody listens: what is triggered may take the short way

@@ -45,6 +45,8 @@ _VIRTUAL_SLICE_STEPS = 2048  # in virtual time a slice must not depend on how fa
 
 _MOST_AT_ONE_INSTANT = 20_000_000  # firings, before a run with `until_s` is taken to stand still
 
+_code_of: contextvars.ContextVar[Worker | None] = contextvars.ContextVar("hfg.code_of", default=None)
+
 Done = Callable[[Any, BaseException | None], None]
 
 
@@ -344,7 +346,10 @@ class Engine:
         core = self.core
         if core.timers:
             return
-        if core.in_flight and not (core.futile and quiet.only_futile_in_flight(core)):
+        if core.in_flight and not (
+            (core.futile and quiet.only_futile_in_flight(core))
+            or (core.waiting_room and quiet.only_waiting_for_room(core))
+        ):
             return
         self.quiet()
 
@@ -413,7 +418,7 @@ class Engine:
         """See `Host`."""
         carrier = worker.carrier
         if carrier is None:
-            carrier = worker.carrier = Carrier(self.loop, f"hfg {worker.path}", self.context)
+            carrier = worker.carrier = self._carrier(worker)
         self.core.current = worker
         try:
             result = carrier.start(coroutine, self.late(worker, done))
@@ -427,6 +432,12 @@ class Engine:
             return
         self.begin(worker)
         self._limit(worker)
+
+    def _carrier(self, worker: Worker) -> Carrier:
+        """Make the dormant task of an async node, in a context that tells whose code runs."""
+        context = self.context.copy()
+        context.run(_code_of.set, worker)
+        return Carrier(self.loop, f"hfg {worker.path}", self.context, context)
 
     def _limit(self, worker: Worker) -> None:
         """X2: the firing may not take longer than its limit."""
@@ -543,19 +554,21 @@ class Engine:
         """Trigger, then wait until no `wait` queue behind the node's events is full (F8)."""
         trigger(event, value, activity, stamp)
         worker = event.worker
-        while worker.full_edges and not self.core.over:
+        core = worker.core
+        own = _code_of.get() is worker  # its own code waits for us, not we for it
+        while worker.full_edges and core.started and not core.over:
             waiter: asyncio.Future[None] = self.loop.create_future()
             if worker.room_waiters is None:
                 worker.room_waiters = []
             worker.room_waiters.append(partial(answer, waiter, None))
-            worker.waiting_room += 1
-            worker.core.in_flight -= worker.in_flight  # it waits for us, not we for it
-            self.kick()
+            worker.waiting_room += own
+            core.waiting_room += own
+            core.host.kick()
             try:
                 await waiter
             finally:
-                worker.waiting_room -= 1
-                worker.core.in_flight += worker.in_flight
+                worker.waiting_room -= own
+                core.waiting_room -= own
 
     def adopt_event(self, port: Any) -> None:
         """Give an event the run's scheduler and thread (ARCHITECTURE §3)."""
@@ -592,7 +605,7 @@ class Engine:
             if worker.type is not None and (
                 worker.is_async or any(spec.is_async for spec in worker.type.slots.values())
             ):
-                worker.carrier = Carrier(self.loop, f"hfg {worker.path}", self.context)
+                worker.carrier = self._carrier(worker)
         for edge in core.edges:
             if isinstance(edge, DelayEdge | EventEdge):
                 edge.queue.extend(Token(value, 0, self.now(), 0) for value in edge.initial)
@@ -670,6 +683,9 @@ class Engine:
         for worker in self.all_workers():
             worker.core.over = True
             worker.blocked |= TORN_DOWN
+            if worker.room_waiters is not None:
+                for waiter in worker.room_waiters:
+                    waiter()
         for waiter in self._quiet_waiters:
             if not waiter.done():
                 waiter.set_result(None)

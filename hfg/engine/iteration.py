@@ -162,7 +162,9 @@ class Iteration:
         core = self.core
         if not self.worker.in_flight or self.worker.core.over:
             return
-        if self._queued or core.in_flight or core.timers:
+        if self._queued or core.timers:
+            return
+        if core.in_flight and not (core.waiting_room and quiet.only_waiting_for_room(core)):
             return
         came_out = False
         for reader in core.readers:

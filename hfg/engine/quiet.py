@@ -16,7 +16,16 @@ from hfg.ports.edges import EventEdge
 from hfg.token import END
 from hfg.trace import QueueGrown
 
-__all__ = ["complete_edge", "complete_operators", "end_events", "grow", "node_ended", "only_futile_in_flight", "stall"]
+__all__ = [
+    "complete_edge",
+    "complete_operators",
+    "end_events",
+    "grow",
+    "node_ended",
+    "only_futile_in_flight",
+    "only_waiting_for_room",
+    "stall",
+]
 
 
 def grow(core: Core) -> bool:
@@ -129,6 +138,11 @@ def only_futile_in_flight(core: Core) -> bool:
     """R5: a source that feeds only ended nodes does not keep the run alive, even while it waits."""
     busy = [worker for worker in core.workers if worker.in_flight]
     return bool(busy) and all(worker.blocked & FUTILE for worker in busy)
+
+
+def only_waiting_for_room(core: Core) -> bool:
+    """F8: all code under way waits until a full queue has room, so it does not keep the graph from being quiet."""
+    return sum(worker.in_flight for worker in core.workers if worker.waiting_room) >= core.in_flight
 
 
 def stall(core: Core) -> Stalled | None:
