@@ -13,7 +13,7 @@ from hfg.trace import CallEnded, CallStarted, ErrorRaised, NodeEnabled, TokenPro
 
 __all__ = ["Calling"]
 
-_AUTOMATIC = ("enable", "disable", "activate", "deactivate", "reset")
+
 
 
 class Calling(Firing):
@@ -23,9 +23,6 @@ class Calling(Firing):
         """Take the oldest token and work on it: activity first, then the handler (A6, A7)."""
         lying = line.queue.pop(0)
         name = line.edge.target.name
-        if line.edge.target.kind == "parameter":
-            self.set_between_firings(self.stations[owner], line, lying.token)
-            return
         number = self.count_call(owner)
         self.observe(CallStarted(self.now, self.path_of(owner), number, name, line.edge.label))
         self.observe(TokenTaken(self.now, line.edge.label, lying.token))
@@ -59,19 +56,11 @@ class Calling(Firing):
             return self.stations[owner].path
         return "" if owner == ROOT else self.structure.boxes[-2 - owner].path
 
-    def set_between_firings(self, station: Station, line: Line, token: Any) -> None:
-        """P8: a signal into a parameter."""
-        self.observe(TokenTaken(self.now, line.edge.label, token))
-        self.receive_activity(station.leaf.index, [token.activity])
-        try:
-            self.set_parameter(station, line.edge.target.name, token.value)
-        except ValueError as error:
-            self.fail_call_of(station, f'parameter "{line.edge.target.name}"', error)
-        self.settle()
-
     def handler_of(self, station: Station, name: str, token: Any) -> Callable[[], Any]:
-        """What runs: an automatic slot of A9, or the node's own handler."""
+        """What runs: an automatic slot of A9, the node's own handler, or the setting of a parameter between firings (P8)."""
         index = station.leaf.index
+        if name in station.type.parameters and name not in station.type.slots:
+            return lambda: self.set_parameter(station, name, token.value)
         if name in station.type.slots:
             call = station.node._slot_call(name)
             return lambda: call(token)

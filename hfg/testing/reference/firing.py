@@ -50,7 +50,7 @@ class Firing(RunningCode):
         failure = self.set_parameters(station, taken)
         if kind == "end":
             for line, lying in taken:
-                if not lying.token.is_marker and line.edge.target.kind == "input":
+                if not lying.token.is_marker:
                     self.observe(TokenDropped(self.now, line.edge.label, lying.token, "ended"))
             self.run_end(flight)
         elif failure is not None:
@@ -276,8 +276,10 @@ class Firing(RunningCode):
         options = station.leaf.options
         what = f"firing {flight.number}"
         failure = error if isinstance(error, NodeError) else NodeError(station.path, what, error)
-        self.observe(ErrorRaised(self.now, station.path, what, str(failure), options.on_error))
-        if options.on_error == "stop" or (options.on_error == "restart" and station.restarts >= options.restart_limit):
+        gives_up = options.on_error == "restart" and station.restarts >= options.restart_limit
+        policy = "stop" if gives_up else options.on_error
+        self.observe(ErrorRaised(self.now, station.path, what, str(failure), policy))
+        if policy == "stop":
             station.flight = None
             self.fail_run(failure)
             return

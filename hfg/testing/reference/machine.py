@@ -6,6 +6,7 @@ follow from quiet alone are the moves: time goes on (R6), a queue grows (F8), op
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -98,12 +99,10 @@ class ReferenceMachine(Calling):
         """Give every permitted next move; none after the end, or if only the world outside can go on."""
         if self.outcome is not None:
             return []
-        found = self.working_moves()
-        if found:
-            if self.ends_beside_sources(found):
-                found = [*found, Move("finish", outcome="done")]
-            return found
-        return self.quiet_moves()
+        found = self.working_moves() or self.quiet_moves()
+        if found and found[0].kind != "finish" and self.ends_beside_sources():
+            found = [*found, Move("finish", outcome="done")]
+        return found
 
     def working_moves(self) -> list[Move]:
         """Firings, calls, and what goes on in those under way."""
@@ -155,10 +154,13 @@ class ReferenceMachine(Calling):
             return [Move("end events")]
         return [Move("finish", outcome="stalled" if self.stalled() else "done")]
 
-    def next_timer(self) -> float | None:
+    def next_timer(self, without: Set[int] = frozenset()) -> float | None:
         """The next moment at which something could start: rate, gate, back-off, time-out with a connected event, operators, waiting code."""
-        times = [] if (due := self.loop.next_time()) is None else [due]
+        ignored = {id(self.stations[index].flight) for index in without}
+        times = [] if (due := self.loop.next_time(ignored)) is None else [due]
         for index, station in enumerate(self.stations):
+            if index in without:
+                continue
             flight, options = station.flight, station.leaf.options
             if flight is not None and flight.what == "firing" and options.max_duration_s is not None and flight.task is not None:
                 times.append(flight.began + options.max_duration_s)
@@ -223,13 +225,25 @@ class ReferenceMachine(Calling):
         targets = {line.edge.target.owner for line in lines}
         return bool(lines) and all(target >= 0 and self.stations[target].ended for target in targets)
 
-    def ends_beside_sources(self, working: list[Move]) -> bool:
+    def ends_beside_sources(self) -> bool:
         """R5: each source has ended, is disabled, or works for ended nodes only, and everything else is quiet."""
-        moot = {station.path for index, station in enumerate(self.stations) if station.type.is_source and self.is_moot(index)}
-        if not moot or any(move.node not in moot for move in working) or self.held_open:
+        if self.held_open:
             return False
-        others = [s for i, s in enumerate(self.stations) if s.type.is_source and self.is_enabled(i) and not s.ended and s.path not in moot]
-        return not others
+        moot = {index for index, station in enumerate(self.stations) if station.type.is_source and not station.ended and self.is_moot(index)}
+        others = [
+            index
+            for index, station in enumerate(self.stations)
+            if station.type.is_source and self.is_enabled(index) and not station.ended and index not in moot
+        ]
+        if not moot or others:
+            return False
+        paths = {self.stations[index].path for index in moot}
+        return (
+            not any(move.node not in paths for move in self.working_moves())
+            and self.next_timer(without=moot) is None
+            and not any(station.flight is not None and index not in moot for index, station in enumerate(self.stations))
+            and self.queue_to_grow() is None
+        )
 
     # --- what happens
 

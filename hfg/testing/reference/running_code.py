@@ -140,9 +140,10 @@ class RunningCode(Sending):
         flight.in_thread = False
         if flight.task is not None:
             flight.task.cancel()
-            with self.loop.entered():
-                while self.loop.step(flight):
-                    pass
+            while self.loop.step(flight):
+                pass
+            if not flight.task.done():
+                flight.task.get_coro().close()
         self.loop.forget(flight)
 
     def run_hook(self, station: Station, hook: Any) -> None:

@@ -7,7 +7,7 @@ Only what `asyncio.sleep`, futures, tasks and `asyncio.timeout` need is there: n
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator, Set
 from contextlib import contextmanager
 from contextvars import Context, ContextVar, copy_context
 from typing import Any, Final
@@ -95,9 +95,9 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
                 return True
         return False
 
-    def next_time(self) -> float | None:
-        """The moment of the next timer, or None."""
-        return min((timer.when() for _, timer in self._timers if not timer.cancelled()), default=None)
+    def next_time(self, without: Set[int] = frozenset()) -> float | None:
+        """The moment of the next timer, or None; owners in `without` (by `id`) are left out."""
+        return min((timer.when() for owner, timer in self._timers if not timer.cancelled() and id(owner) not in without), default=None)
 
     def ring(self) -> None:
         """Make the timers whose moment has come into steps of their owners, in order of time."""
