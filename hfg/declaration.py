@@ -92,6 +92,10 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
             raise DeclarationError(
                 f"{where}: a subgraph does not fire itself; put the work into a node and add it in build()"
             )
+        if isinstance(process, _DECLARATIONS) or not callable(process):
+            raise DeclarationError(
+                f'{where}: "process" is reserved for the function of a firing, got {process!r}; choose another name'
+            )
         signature = _read_process(cls, process, inputs, where)
         inputs = {spec.name: spec for spec in signature.inputs}
         parameters.update((spec.name, spec) for spec in signature.parameters if spec.name not in parameters)
