@@ -304,8 +304,7 @@ def test_a_tap_looks_at_tokens_without_taking_them(fast: bool) -> None:
         async with hfg.running(graph, fast=fast) as run:
 
             async def look() -> None:
-                async for token in run.tap(node.out):
-                    seen.append(token.value)
+                seen.extend([token.value async for token in run.tap(node.out)])
 
             looking = asyncio.create_task(look())
             await asyncio.sleep(0)

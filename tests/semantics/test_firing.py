@@ -76,7 +76,7 @@ def test_a_node_with_no_live_input_is_no_source_and_never_fires(fast: bool) -> N
 @pytest.mark.rule("F1")
 def test_outputs_that_lead_nowhere_are_always_free(fast: bool) -> None:
     graph = hfg.Graph()
-    source = graph.add(numbers(count=5))
+    graph.add(numbers(count=5))
     assert run(graph, fast).nodes["numbers"].firings == 6
 
 
@@ -141,13 +141,12 @@ def test_ready_is_asked_again_after_each_call(fast: bool) -> None:
         graph = hfg.Graph()
         node = graph.add(Moody())
         graph.connect(graph.input("in", int), node.value)
-        async with hfg.running(graph, fast=fast) as run:
-            async with run.feed("in") as feed:
-                await feed.send(1)
-                sending = asyncio.create_task(feed.send(2))
-                await run.wait_quiet()
-                await run.trigger(node.nudge)
-                await sending
+        async with hfg.running(graph, fast=fast) as run, run.feed("in") as feed:
+            await feed.send(1)
+            sending = asyncio.create_task(feed.send(2))
+            await run.wait_quiet()
+            await run.trigger(node.nudge)
+            await sending
         return node.values
 
     assert drive(main) == [1, 2]

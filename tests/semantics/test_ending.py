@@ -1,0 +1,663 @@
+"""Disabled and enabled, ended and drained, the end of events, the end of runs (rules F10, F12, F13, R5)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import pytest
+
+import hfg
+from hfg import END
+from hfg.trace import ActivityChanged, NodeEnabled, NodeEnded, TokenDrained, TokenDropped, TokenSent, TraceEvent
+from tests.semantics.nodes import (
+    Both,
+    Clock,
+    Countdown,
+    Ear,
+    Hooks,
+    Keep,
+    Ringing,
+    Send,
+    Total,
+    add,
+    drive,
+    firings,
+    forward,
+    forward_later,
+    merge,
+    modifiers,
+    numbers,
+    of_kind,
+    run,
+    slow_numbers,
+    traced,
+)
+
+# --- F10 ---
+
+
+@pytest.mark.rule("F10")
+def test_producers_neither_send_to_a_disabled_node_nor_wait_for_it(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, off, on = graph.add(numbers(count=3)), graph.add(Keep(), enabled=False), graph.add(Keep())
+    graph.connect(source.out, off.value)
+    graph.connect(source.out, on.value)
+    report = run(graph, fast)
+    assert (off.values, on.values) == ([], [1, 2, 3])
+    assert report.edges["numbers.out -> keep.value"].sent == 0
+
+
+@pytest.mark.rule("F10")
+def test_disabling_discards_and_counts_what_lies_on_inputs_and_in_slot_queues(fast: bool) -> None:
+    async def main() -> tuple[hfg.Report, list[object]]:
+        graph = hfg.Graph()
+        node, values, calls = graph.add(SlowBoth()), graph.add(Ear(), name="values"), graph.add(Ear(), name="calls")
+        graph.connect(values.passed, node.value)
+        graph.connect(calls.passed, node.call)
+        async with hfg.running(graph, fast=fast) as run:
+            await run.trigger(node.call, 0)
+            await asyncio.sleep(0.1)
+            await run.trigger(node.disable)  # its place is behind the call under way
+            for number in (1, 2, 3):
+                await run.trigger(calls.passed, number)
+                await run.trigger(values.passed, number)
+            await asyncio.sleep(10)
+            report = run.statistics()
+        return report, node.story
+
+    report, story = drive(main)
+    assert story == [("call", 0)]
+    for label in ("values.passed -> slow_both.value", "calls.passed -> slow_both.call"):
+        assert (report.edges[label].dropped, report.edges[label].untaken) == (3, 0)
+
+
+class SlowBoth(hfg.Node):
+    """A second for each firing and call."""
+
+    value = hfg.Input(int)
+    story = hfg.State(factory=list)
+
+    async def process(self, value: int) -> None:
+        await asyncio.sleep(1)
+        self.story.append(("fire", value))
+
+    @hfg.slot
+    async def call(self, value: int) -> None:
+        await asyncio.sleep(1)
+        self.story.append(("call", value))
+
+
+@pytest.mark.rule("F10")
+def test_a_producer_that_waits_for_a_node_goes_on_when_it_is_disabled(fast: bool) -> None:
+    async def main() -> list[object]:
+        graph = hfg.Graph()
+        joined, free = graph.add(add()), graph.add(Keep())
+        graph.connect(graph.input("in", int), joined.a)
+        never = graph.add(Ear())
+        graph.connect(never.passed, joined.b)
+        graph.connect(graph.inputs["in"], free.value)
+        async with hfg.running(graph, fast=fast) as run, run.feed("in") as feed:
+            sending = asyncio.create_task(feed.send(1))
+            await run.wait_quiet()
+            assert not sending.done()
+            await run.trigger(joined.disable)
+            await sending
+            await feed.send(2)
+        return free.values
+
+    assert drive(main) == [1, 2]
+
+
+@pytest.mark.rule("F10", "R7")
+def test_untaken_tokens_on_the_outputs_of_a_disabled_node_are_discarded_its_signals_are_delivered() -> None:
+    trace: list[TraceEvent] = []
+
+    async def main() -> list[object]:
+        graph = hfg.Graph()
+        send, busy = graph.add(Send()), graph.add(add())
+        never = graph.add(Ear())
+        graph.connect(graph.input("in", int), send.value)
+        graph.connect(send.out, busy.a)
+        graph.connect(never.passed, busy.b)
+        graph.connect(send.rang, graph.add(Lazy()).value)
+        async with hfg.running(graph, trace=trace.append) as run, run.feed("in", end=False) as feed:
+            sending = asyncio.create_task(feed.send(1))
+            await asyncio.sleep(0.1)
+            await run.trigger(send.disable)
+            await sending
+            await asyncio.sleep(5)
+            return graph["lazy"].values
+
+    assert drive(main) == [1]
+    dropped = [(event.edge, event.reason) for event in of_kind(trace, TokenDropped)]
+    assert dropped == [("send.out -> add.a", "disabled")]
+    assert [(event.node, event.enabled) for event in of_kind(trace, NodeEnabled)] == [("send", False)]
+
+
+class Lazy(hfg.Node):
+    """Waits before it is ready."""
+
+    value = hfg.Input(int)
+    values = hfg.State(factory=list)
+
+    async def ready(self) -> bool:
+        await asyncio.sleep(1)
+        return True
+
+    def process(self, value: int) -> None:
+        self.values.append(value)
+
+
+class Box(hfg.Subgraph):
+    """A slow node in a box."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        slow = graph.add(forward_later(), name="slow")
+        graph.connect(self.value.inner, slow.value)
+        graph.connect(slow.out, self.out.inner)
+
+
+@pytest.mark.rule("F10", "G2")
+def test_a_firing_under_way_is_finished_and_its_outputs_go_nowhere(fast: bool) -> None:
+    async def main() -> tuple[list[object], hfg.Report]:
+        graph = hfg.Graph()
+        box, sink = graph.add(Box()), graph.add(Keep())
+        graph.connect(graph.input("in", int), box.value)
+        graph.connect(box.out, sink.value)
+        async with hfg.running(graph, fast=fast) as run, run.feed("in", end=False) as feed:
+            sending = asyncio.create_task(feed.send(1))
+            await asyncio.sleep(0.5)
+            await run.trigger(box.disable)
+            await sending
+            assert run.now() == 0.5
+            await asyncio.sleep(2)
+            report = run.statistics()
+            await run.trigger(box.enable)
+            await run.wait_quiet()
+            await feed.send(2)
+        return sink.values, report
+
+    values, report = drive(main)
+    assert values == [2]
+    assert report.edges["box/slow.out -> keep.value"].sent == 0
+    assert report.nodes["box/slow"].firings == 1
+
+
+@pytest.mark.rule("F10", "A9")
+def test_enabling_starts_afresh_with_setup_and_a_generator_from_its_beginning(fast: bool) -> None:
+    async def main() -> tuple[list[object], list[object], list[object]]:
+        graph = hfg.Graph()
+        source, sink = graph.add(slow_numbers(count=100, pause_s=1)), graph.add(Keep())
+        hooks = graph.add(Hooks())
+        graph.connect(source.out, sink.value)
+        graph.connect(graph.input("in", int), hooks.value)
+        async with hfg.running(graph, fast=fast) as run, run.feed("in", end=False) as feed:
+            await feed.send(7)
+            await asyncio.sleep(1.5)
+            await run.trigger(source.disable)  # a call: it waits for the firing under way
+            await run.trigger(hooks.disable)
+            await asyncio.sleep(10)
+            await feed.send(8)
+            first = list(sink.values)
+            await run.trigger(source.enable)
+            await run.trigger(hooks.enable)
+            await asyncio.sleep(2.5)
+            await feed.send(9)
+            story = list(hooks.story)
+        return first, sink.values, story
+
+    first, values, story = drive(main)
+    assert first == [1, 2]
+    assert values[2:] == [1, 2]
+    assert story == ["setup", 9]  # State is set afresh too
+
+
+@pytest.mark.rule("F10", "F12")
+def test_a_node_that_has_ended_is_not_ended_any_more_when_enabled(fast: bool) -> None:
+    async def main() -> list[object]:
+        graph = hfg.Graph()
+        source, sink = graph.add(numbers(count=2)), graph.add(Keep())
+        graph.connect(source.out, sink.value)
+        async with hfg.running(graph, fast=fast) as run:
+            await run.wait_quiet()
+            for port in (sink.disable, source.disable, sink.enable, source.enable):
+                await run.trigger(port)
+                await run.wait_quiet()
+            return sink.values
+
+    assert drive(main) == [1, 2]
+
+
+@pytest.mark.rule("F10", "A8")
+def test_enabling_keeps_activity(fast: bool) -> None:
+    async def main() -> list[list[str]]:
+        graph = hfg.Graph()
+        node = graph.add(Both())
+        graph.start.activates(node.begin)
+        story = []
+        async with hfg.running(graph, fast=fast) as run:
+            for port in (node.disable, node.enable):
+                await run.wait_quiet()
+                await run.trigger(port)
+                await run.wait_quiet()
+                story.append(run.active())
+        return story
+
+    assert drive(main) == [["both"], ["both"]]
+
+
+@pytest.mark.rule("F10")
+def test_enable_works_by_an_edge_while_the_node_is_disabled(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(slow_numbers(count=3, pause_s=1)), graph.add(Keep(), enabled=False)
+    late = graph.add(Countdown(count=1))
+    graph.connect(source.out, node.value)
+    graph.connect(late.out, node.enable)
+    run(graph, fast)
+    assert node.values == [1, 2, 3]
+
+
+@pytest.mark.rule("F10", "A9")
+def test_reset_tears_down_and_sets_up_but_keeps_tokens_and_activity(fast: bool) -> None:
+    async def main() -> tuple[list[object], list[object], list[str]]:
+        graph = hfg.Graph()
+        node, source = graph.add(Resettable()), graph.add(Ear())
+        graph.connect(source.passed, node.value)
+        graph.start.activates(node.begin)
+        async with hfg.running(graph, fast=fast) as run:
+            await run.wait_quiet()
+            await run.trigger(source.passed, 1)
+            await run.trigger(node.reset)
+            await run.trigger(source.passed, 2)
+            await run.wait_quiet()
+            return node.values, Resettable.story, run.active()
+
+    Resettable.story.clear()
+    values, story, active = drive(main)
+    assert story[:3] == ["setup", "teardown", "setup"]
+    assert values in ([2], [1, 2])
+    assert active == ["resettable"]
+
+
+class Resettable(hfg.Node):
+    value = hfg.Input(int)
+    values = hfg.State(factory=list)
+    story: list[str] = []  # noqa: RUF012 - over setups
+
+    def setup(self) -> None:
+        self.story.append("setup")
+
+    def teardown(self) -> None:
+        self.story.append("teardown")
+
+    def process(self, value: int) -> None:
+        self.values.append(value)
+
+    @hfg.slot
+    def begin(self) -> None:
+        pass
+
+
+# --- F12 ---
+
+
+@pytest.mark.rule("F12")
+def test_tokens_for_an_ended_node_are_drained_without_a_firing(fast: bool) -> None:
+    graph = hfg.Graph()
+    short, long = graph.add(numbers(count=1)), graph.add(numbers(count=5))
+    node, other = graph.add(add()), graph.add(Keep())
+    graph.connect(short.out, node.a)
+    graph.connect(long.out, node.b)
+    graph.connect(long.out, other.value)
+    report = run(graph, fast)
+    assert other.values == [1, 2, 3, 4, 5]
+    assert report.nodes["add"].firings == 2
+    assert report.edges["numbers_2.out -> add.b"].drained == 4  # 3, 4, 5 and END; 2 was dropped with the end
+    assert report.edges["numbers_2.out -> add.b"].dropped == 1
+
+
+@pytest.mark.rule("F12")
+def test_the_slots_of_an_ended_node_go_on(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, late, node = graph.add(numbers(count=1)), graph.add(slow_numbers(count=2)), graph.add(Both())
+    graph.connect(source.out, node.value)
+    graph.connect(late.out, node.call)
+    graph.connect(late.out, graph.add(Keep()).value)
+    run(graph, fast)
+    assert node.story == [("fire", 1), ("call", 1), ("call", 2)]
+
+
+@pytest.mark.rule("F12", "A6")
+def test_a_drained_modifier_acts_but_not_before_the_nodes_own_end_was_sent() -> None:
+    graph = hfg.Graph()
+    none, late, send = graph.add(numbers(count=0)), graph.add(slow_numbers(count=2)), graph.add(SecondActive())
+    node, sink = graph.add(LateEnd()), graph.add(Keep())
+    graph.connect(none.out, node.value)
+    graph.connect(late.out, send.value)
+    graph.connect(send.out, node.more, active=True)
+    graph.connect(node.out, sink.value, active=True)
+    graph.connect(late.out, graph.add(Keep()).value)
+    trace = traced(graph)
+    drained = [event for event in of_kind(trace, TokenDrained) if event.edge == "second_active.out -> late_end.more"]
+    assert [(event.token.value, event.token.activity, event.time) for event in drained] == [(2, 1, 2), (END, 0, 2)]
+    assert modifiers(trace, "late_end.out -> keep.value") == [0]
+    changes = [(event.active, event.time) for event in of_kind(trace, ActivityChanged) if event.node == "late_end"]
+    assert changes == [(True, 4)]
+
+
+class SecondActive(hfg.Node):
+    """Gives activity with the value 2."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> None:
+        self.out.send(value, activity=1 if value == 2 else 0)
+
+
+class LateEnd(hfg.Node):
+    """Ends by its first input and takes its time."""
+
+    value = hfg.Input(int)
+    more = hfg.Input(int, optional=True)
+    out = hfg.Output(int)
+
+    async def process(self, value: int, more: int | None) -> None:
+        pass
+
+    async def end(self) -> None:
+        await asyncio.sleep(3)
+
+
+@pytest.mark.rule("F12")
+def test_a_node_says_that_it_has_ended_once() -> None:
+    graph = hfg.Graph()
+    source, node, sink = graph.add(numbers(count=2)), graph.add(Total()), graph.add(Keep())
+    graph.connect(source.out, node.value)
+    graph.connect(node.out, sink.value)
+    assert [event.node for event in of_kind(traced(graph), NodeEnded)] == ["numbers", "total", "keep"]
+
+
+# --- F13 ---
+
+
+@pytest.mark.rule("F13")
+def test_a_sink_fed_by_events_is_closed_properly(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node, sink = graph.add(Ringing(count=4)), graph.add(Total()), graph.add(Keep())
+    graph.connect(source.rang, node.value)
+    graph.connect(node.out, sink.value)
+    run(graph, fast)
+    assert sink.values == [1 + 2 + 3 + 4]
+
+
+@pytest.mark.rule("F13")
+def test_all_open_event_edges_get_end_at_the_same_moment_and_once() -> None:
+    graph = hfg.Graph()
+    source = graph.add(Ringing(count=2))
+    first, second, third = graph.add(Total()), graph.add(Echo()), graph.add(Keep())
+    graph.connect(source.rang, first.value)
+    graph.connect(source.rang, second.value)
+    graph.connect(second.rang, third.value)
+    trace = traced(graph)
+    ends = [(event.edge, event.time) for event in of_kind(trace, TokenSent) if event.token.value is END]
+    assert ends == [
+        ("ringing.rang -> total.value", 0),
+        ("ringing.rang -> echo.value", 0),
+        ("echo.rang -> keep.value", 0),
+    ]
+    assert third.values == [1, 2]  # a signal after END is drained: "at the same moment"
+    assert firings(trace, "keep") == ["process", "process", "end"]
+
+
+class Echo(hfg.Node):
+    """Triggers once more when it ends."""
+
+    value = hfg.Input(int)
+    rang = hfg.Event(int)
+
+    def process(self, value: int) -> None:
+        self.rang.trigger(value)
+
+    def end(self) -> None:
+        self.rang.trigger(99)
+
+
+@pytest.mark.rule("F13")
+def test_edges_that_were_busy_get_their_end_in_a_later_round(fast: bool) -> None:
+    graph = hfg.Graph()
+    rings, other = graph.add(Ringing(count=1)), graph.add(Ringing(count=3))
+    node, sink, last = graph.add(merge()), graph.add(Total3()), graph.add(Keep())
+    graph.connect(rings.rang, node.a)
+    graph.connect(other.rang, node.b)
+    graph.connect(node.out, sink.value)
+    graph.connect(sink.out, last.value)
+    report = run(graph, fast)
+    assert report.outcome == "done"
+    assert last.values == [3]  # 1 joined with 1; then END on a lets the two others through
+
+
+class Total3(hfg.Node):
+    """How many values came."""
+
+    value = hfg.Input(object)
+    out = hfg.Output(int)
+    count = hfg.State(0)
+
+    def process(self, value: object) -> None:
+        self.count += 1
+
+    def end(self) -> None:
+        self.out.send(self.count)
+
+
+@pytest.mark.rule("F13", "R5")
+def test_the_end_of_events_waits_as_long_as_somebody_outside_holds_the_run_open(fast: bool) -> None:
+    async def main() -> tuple[list[object], list[object]]:
+        graph = hfg.Graph()
+        ear, node, sink = graph.add(Ear()), graph.add(Total()), graph.add(Keep())
+        graph.connect(ear.passed, node.value)
+        graph.connect(node.out, sink.value)
+        async with hfg.running(graph, fast=fast) as run:
+            await run.trigger(ear.hear, 5)
+            await run.wait_quiet()
+            before = list(sink.values)
+            await run.wait_finished()
+        return before, sink.values
+
+    assert drive(main) == ([], [5])
+
+
+# --- R5 ---
+
+
+@pytest.mark.rule("R5")
+def test_a_run_ends_at_the_first_quiet_moment(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(slow_numbers(count=2, pause_s=3)), graph.add(Keep())
+    graph.connect(source.out, sink.value)
+    report = run(graph, fast)
+    assert (report.outcome, report.duration_s) == ("done", 6)
+
+
+@pytest.mark.rule("R5")
+def test_an_empty_graph_is_done_at_once(fast: bool) -> None:
+    assert run(hfg.Graph(), fast).outcome == "done"
+
+
+@pytest.mark.rule("R5")
+def test_a_pending_timer_keeps_the_run_open(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(numbers(count=3)), graph.add(forward(), max_rate_hz=0.5)
+    graph.connect(source.out, node.value)
+    assert run(graph, fast).duration_s >= 4
+
+
+@pytest.mark.rule("R5")
+def test_a_futile_endless_source_does_not_keep_the_run_open(fast: bool) -> None:
+    graph = hfg.Graph()
+    short, endless = graph.add(numbers(count=3)), graph.add(Clock(), max_rate_hz=10)
+    node, sink = graph.add(add()), graph.add(Keep())
+    graph.connect(short.out, node.a)
+    graph.connect(endless.out, node.b)
+    graph.connect(node.out, sink.value)
+    report = run(graph, fast)
+    assert report.outcome == "done"
+    assert sink.values == [2, 4, 6]
+
+
+@pytest.mark.rule("R5")
+def test_a_futile_source_that_waits_in_its_code_does_not_keep_the_run_open(fast: bool) -> None:
+    graph = hfg.Graph()
+    short, endless = graph.add(numbers(count=2)), graph.add(forever())
+    node = graph.add(add())
+    graph.connect(short.out, node.a)
+    graph.connect(endless.out, node.b)
+    report = run(graph, fast)
+    assert report.outcome == "done"
+    assert report.duration_s < 10
+
+
+@hfg.node
+async def forever() -> AsyncIterator[int]:
+    """A number each second, without end."""
+    number = 0
+    while True:
+        await asyncio.sleep(1)
+        number += 1
+        yield number
+
+
+@pytest.mark.rule("R5")
+def test_a_source_with_an_edge_into_a_living_node_keeps_the_run_open(fast: bool) -> None:
+    graph = hfg.Graph()
+    short, endless = graph.add(numbers(count=1)), graph.add(Clock(), max_rate_hz=1)
+    node, ear = graph.add(add()), graph.add(Keep())
+    graph.connect(short.out, node.a)
+    graph.connect(endless.out, node.b)
+    graph.connect(endless.out, ear.value)
+    assert run(graph, fast, until_s=7.5).outcome == "until"
+    assert ear.values == list(range(1, 9))
+
+
+@pytest.mark.rule("R5")
+def test_until_ends_the_run_well_and_counts_what_is_left() -> None:
+    graph = hfg.Graph()
+    source, slow = graph.add(Ringing(count=10)), graph.add(forward_later())
+    graph.connect(source.rang, slow.value)
+    trace: list[TraceEvent] = []
+    report = run(graph, until_s=2.5, trace=trace.append)
+    assert (report.outcome, report.duration_s) == ("until", 2.5)
+    assert [(event.token.value, event.reason) for event in of_kind(trace, TokenDropped)] == [
+        (number, "stopped") for number in range(4, 11)
+    ]
+
+
+@pytest.mark.rule("R5", "A10")
+def test_stop_and_abort_end_the_run_well_and_in_failure(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, ear = graph.add(Clock(), max_rate_hz=1), graph.add(Ear())
+    graph.connect(source.ticked, ear.hear)
+    third = graph.add(OnThird())
+    graph.connect(ear.passed, third.hear)
+    graph.connect(third.now, graph.stop)
+    report = run(graph, fast)
+    assert (report.outcome, report.duration_s) == ("stopped", 2)
+
+    graph = hfg.Graph()
+    source, third = graph.add(Clock(), max_rate_hz=1), graph.add(OnThird())
+    graph.connect(source.ticked, third.hear)
+    graph.connect(third.now, graph.abort)
+    with pytest.raises(hfg.errors.Aborted, match=r'slot "abort" was called by "on_third.now"') as raised:
+        run(graph, fast)
+    assert raised.value.report.outcome == "aborted"  # type: ignore[attr-defined]
+
+
+class OnThird(hfg.Node):
+    """Triggers at the third signal."""
+
+    now = hfg.Event()
+
+    @hfg.slot
+    def hear(self, value: int) -> None:
+        if value == 3:
+            self.now.trigger()
+
+
+@pytest.mark.rule("R5")
+def test_allow_idle_keeps_a_quiet_graph_open() -> None:
+    async def main() -> str:
+        graph = hfg.Graph()
+        ear = graph.add(Ear())
+        task = asyncio.create_task(hfg.run_async(graph, allow_idle=True))
+        await asyncio.sleep(100)
+        assert not task.done()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        return str(ear.active)
+
+    assert drive(main) == "False"
+
+
+def stalled(build: object, fast: bool) -> str:
+    graph = hfg.Graph()
+    build(graph)  # type: ignore[operator]
+    with pytest.raises(hfg.errors.Stalled) as raised:
+        run(graph, fast)
+    assert raised.value.report.outcome == "stalled"  # type: ignore[attr-defined]
+    return str(raised.value)
+
+
+def _unready(graph: hfg.Graph) -> None:
+    source, node = graph.add(numbers(count=2)), graph.add(Never())
+    graph.connect(source.out, node.value)
+
+
+class Never(hfg.Node):
+    """Never ready."""
+
+    value = hfg.Input(int)
+
+    def ready(self) -> bool:
+        return False
+
+    def process(self, value: int) -> None:
+        pass
+
+
+def _half_fed(graph: hfg.Graph) -> None:
+    rings, ear, node = graph.add(Countdown(count=2)), graph.add(Ear()), graph.add(add())
+    graph.connect(rings.out, node.a)
+    graph.connect(graph.add(Unfed()).out, node.b)
+    graph.connect(rings.out, ear.hear)
+
+
+class Unfed(hfg.Node):
+    """Its input is not connected."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        return value
+
+
+@pytest.mark.rule("R5")
+@pytest.mark.parametrize(
+    ("build", "sentence"),
+    [
+        (_unready, '"never" says by ready() that it is not ready, while tokens lie on "numbers.out -> never.value"'),
+        (_half_fed, '"add" waits for "b", while tokens lie on "countdown.out -> add.a"'),
+        (
+            _half_fed,
+            'source "countdown" has not ended and waits until its token is processed on "countdown.out -> add.a"',
+        ),
+    ],
+)
+def test_a_stall_says_who_waits_for_what(build: object, sentence: str, fast: bool) -> None:
+    assert sentence in stalled(build, fast)
