@@ -55,9 +55,8 @@ def _time_out_later(worker: Worker, active: bool) -> None:
 
         def over() -> None:
             worker.active_timer = None
-            worker.right = False
-            event = worker.events["timeout"]
-            trigger(event, stamp=worker.core.now(), extend_right=False)
+            trigger(worker.events["timeout"], stamp=worker.core.now(), extend_right=False)
+            worker.right = False  # behind the sending, which may have given it (A3)
             flush_automatic(worker)
 
         worker.active_timer = worker.core.after(limit, over)
