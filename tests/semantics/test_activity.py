@@ -1,0 +1,658 @@
+"""Activity: who has it, how it moves, forks, comes back (rules A1-A10, A14)."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+import hfg
+from hfg.trace import ActivityChanged, EventTriggered, RunStarted, TokenSent, TraceEvent
+from tests.semantics.nodes import (
+    Both,
+    Countdown,
+    Ear,
+    Fork,
+    Keep,
+    KeepTokens,
+    Ringing,
+    Send,
+    activity,
+    drive,
+    fail_on,
+    forward,
+    gaps,
+    modifiers,
+    numbers,
+    of_kind,
+    run,
+    slow_numbers,
+    traced,
+)
+
+
+class Runner(hfg.Node):
+    """Can be made active, then fires."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    rang = hfg.Event(int)
+    seen = hfg.State(factory=list)
+
+    @hfg.slot
+    def begin(self) -> None:
+        pass
+
+    @hfg.slot
+    def ring(self, value: int) -> None:
+        self.rang.trigger(value)
+
+    def process(self, value: int) -> int | None:
+        self.seen.append(self.active)
+        return value if value % 2 else None
+
+
+# --- A1, A2, A7 ---
+
+
+@pytest.mark.rule("A1")
+def test_no_node_is_active_at_the_start_and_afterwards_none_is_either(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(numbers(count=2)), graph.add(Runner())
+    graph.connect(source.out, node.value)
+    run(graph, fast)
+    assert node.seen == [False, False]
+    assert not node.active
+    graph.start.activates(node.begin)
+    run(graph, fast)
+    assert node.seen == [True, True]
+    assert not node.active  # outside a run
+    assert not graph.edges[0].active
+    assert graph.edges[1].active
+
+
+@pytest.mark.rule("A2")
+def test_activity_does_not_change_whether_or_how_a_node_fires() -> None:
+    stories = []
+    for active in (False, True):
+        graph = hfg.Graph()
+        source, node, sink = graph.add(numbers(count=4)), graph.add(Runner()), graph.add(Keep())
+        graph.connect(source.out, node.value)
+        graph.connect(node.out, sink.value)
+        graph.connect(graph.start, node.begin, active=active)
+        trace = [event for event in traced(graph) if not isinstance(event, ActivityChanged | EventTriggered)]
+        stories.append([str(event).replace("activity=1", "activity=0") for event in trace])
+    assert stories[0] == stories[1]
+
+
+@pytest.mark.rule("A7")
+def test_an_edge_that_is_not_active_changes_nothing_by_its_tokens() -> None:
+    graph = hfg.Graph()
+    source, send = graph.add(numbers(count=1)), graph.add(Send(modifier=1))
+    ear, sink = graph.add(Ear()), graph.add(Keep())
+    graph.connect(source.out, send.value)
+    graph.connect(send.rang, ear.hear)
+    graph.connect(send.out, sink.value)
+    assert of_kind(traced(graph), ActivityChanged) == []
+
+
+@pytest.mark.rule("A7", "A9")
+def test_the_slots_activate_and_deactivate_act_on_any_edge(fast: bool) -> None:
+    graph = hfg.Graph()
+    node = graph.add(Both())
+    first, second = graph.add(Countdown(count=1)), graph.add(slow_numbers(count=1, pause_s=5))
+    graph.connect(first.out, node.activate)
+    graph.connect(second.out, node.deactivate)
+    report = run(graph, fast)
+    assert report.nodes["both"].active is False
+    assert activity(traced(graph), "both") == [True, False]
+
+
+# --- A3, A5 ---
+
+
+@pytest.mark.rule("A3", "A5")
+def test_activity_moves_along_an_active_edge_with_the_first_token(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node, sink = graph.add(numbers(count=2)), graph.add(Runner()), graph.add(KeepTokens())
+    graph.connect(source.out, node.value)
+    graph.start.activates(node.begin)
+    graph.connect(node.out, sink.value, active=True)
+    report = run(graph, fast)
+    assert [token.activity for token in sink.tokens] == [1]
+    assert (report.nodes["runner"].active, report.nodes["keep_tokens"].active) == (False, True)
+    assert node.seen == [True, False]
+
+
+@pytest.mark.rule("A5", "T3")
+def test_sending_only_silence_keeps_activity(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node, sink = graph.add(gaps(count=3)), graph.add(Runner()), graph.add(Keep())
+    late = graph.add(Ear())
+    graph.connect(source.out, node.value)
+    graph.connect(node.out, sink.value, active=True)
+    graph.start.activates(late.begin)
+    report = run(graph, fast)
+    assert report.nodes["ear"].active
+    assert sink.values == [1, 3]
+
+
+@pytest.mark.rule("A5")
+def test_sending_only_over_edges_that_are_not_active_keeps_activity(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node, sink = graph.add(numbers(count=3)), graph.add(Runner()), graph.add(KeepTokens())
+    graph.connect(source.out, node.value)
+    graph.start.activates(node.begin)
+    graph.connect(node.out, sink.value)
+    report = run(graph, fast)
+    assert node.seen == [True, True, True]
+    assert report.nodes["runner"].active
+    assert [token.activity for token in sink.tokens] == [0, 0]
+
+
+@pytest.mark.rule("A3", "A5")
+def test_one_firing_forks_activity_over_several_sendings(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, fork = graph.add(numbers(count=2)), graph.add(ForkWithSlot())
+    ears, sinks = [graph.add(Ear()) for _ in range(3)], [graph.add(KeepTokens()) for _ in range(2)]
+    graph.connect(source.out, fork.value)
+    graph.start.activates(fork.begin)
+    graph.connect(fork.first, ears[0].hear, active=True)
+    graph.connect(fork.first, ears[1].hear, active=True)
+    graph.connect(fork.second, ears[2].hear, active=True)
+    graph.connect(fork.a, sinks[0].value, active=True)
+    graph.connect(fork.b, sinks[1].value, active=True)
+    report = run(graph, fast)
+    assert [report.nodes[f"ear{end}"].active for end in ("", "_2", "_3")] == [True, True, True]
+    assert [[token.activity for token in sink.tokens] for sink in sinks] == [[1, 0], [1, 0]]
+    assert not report.nodes["fork_with_slot"].active
+
+
+class ForkWithSlot(Fork):
+    """A fork that can be made active."""
+
+    @hfg.slot
+    def begin(self) -> None:
+        pass
+
+
+@pytest.mark.rule("A3", "A5")
+def test_one_call_forks_activity_too(fast: bool) -> None:
+    graph = hfg.Graph()
+    fork, ears = graph.add(Fork()), [graph.add(Ear()) for _ in range(2)]
+    graph.start.activates(fork.poke)
+    graph.connect(fork.first, ears[0].hear, active=True)
+    graph.connect(fork.second, ears[1].hear, active=True)
+    report = run(graph, fast)
+    assert [report.nodes[name].active for name in ("fork", "ear", "ear_2")] == [False, True, True]
+
+
+@pytest.mark.rule("A3")
+def test_the_right_to_fork_ends_with_the_firing_or_call(fast: bool) -> None:
+    graph = hfg.Graph()
+    rings, node = graph.add(Ringing(count=2)), graph.add(Runner())
+    ear = graph.add(KeepsModifiers())
+    graph.connect(graph.start, node.activate)
+    graph.connect(rings.rang, node.ring)
+    graph.connect(node.rang, ear.hear, active=True)
+    run(graph, fast)
+    assert ear.seen == [1, 0]
+
+
+class KeepsModifiers(hfg.Node):
+    seen = hfg.State(factory=list)
+    passed = hfg.Event(object)
+
+    @hfg.slot
+    def hear(self, token: hfg.Token[object]) -> None:
+        self.seen.append(token.activity)
+        self.passed.trigger(token.value)
+
+
+@pytest.mark.rule("A3", "A12")
+def test_a_timeout_takes_the_right_to_fork_away() -> None:
+    graph = hfg.Graph()
+    node, first, second = graph.add(Waits(), active_for_s=0.5), graph.add(KeepsModifiers()), graph.add(KeepsModifiers())
+    graph.start.activates(node.begin)
+    graph.connect(node.rang, first.hear)
+    graph.connect(node.later, second.hear, active=True)
+    graph.connect(node.timeout, first.hear, active=True)
+    trace = traced(graph)
+    assert modifiers(trace, "waits.timeout -> keeps_modifiers.hear") == [1]
+    assert modifiers(trace, "waits.later -> keeps_modifiers_2.hear") == [0]
+
+
+@pytest.mark.rule("A3", "G2")
+def test_deactivating_the_box_around_a_node_takes_the_right_to_fork_away(fast: bool) -> None:
+    class Box(hfg.Subgraph):
+        begin = hfg.slot(type=object)
+        rang = hfg.Event(int)
+        later = hfg.Event(int)
+
+        def build(self, graph: hfg.Graph) -> None:
+            node = graph.add(Waits())
+            graph.connect(self.begin.inner, node.begin, active=True)
+            graph.connect(node.rang, self.rang.inner, active=True)
+            graph.connect(node.later, self.later.inner, active=True)
+
+    async def main() -> list[list[int]]:
+        graph = hfg.Graph()
+        box, first, second = graph.add(Box()), graph.add(KeepsModifiers()), graph.add(KeepsModifiers())
+        graph.start.activates(box.begin)
+        graph.connect(box.rang, first.hear, active=True)
+        graph.connect(box.later, second.hear, active=True)
+        async with hfg.running(graph, fast=fast) as run:
+            await asyncio.sleep(0.5)
+            await run.trigger(box.deactivate)
+            await run.wait_quiet()
+        return [first.seen, second.seen]
+
+    assert drive(main) == [[1], [0]]
+
+
+class Waits(hfg.Node):
+    """Triggers now and a second later, in one call."""
+
+    rang = hfg.Event(int)
+    later = hfg.Event(int)
+
+    @hfg.slot
+    async def begin(self) -> None:
+        self.rang.trigger(1)
+        await asyncio.sleep(1)
+        self.later.trigger(2)
+
+
+# --- A4 ---
+
+
+@pytest.mark.rule("A4")
+@pytest.mark.parametrize("modifier", [1, -1, 0])
+def test_an_explicit_modifier_is_kept_on_active_edges_and_does_not_take_the_senders_activity(
+    modifier: int, fast: bool
+) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(numbers(count=1)), graph.add(SendWithSlot(modifier=modifier))
+    ear, sink, plain = graph.add(KeepsModifiers()), graph.add(KeepTokens()), graph.add(KeepTokens())
+    graph.connect(source.out, node.value)
+    graph.start.activates(node.begin)
+    graph.connect(node.rang, ear.hear, active=True)
+    graph.connect(node.out, sink.value, active=True)
+    graph.connect(node.out, plain.value)
+    trace: list[TraceEvent] = []
+    run(graph, fast, trace=trace.append)
+    assert ear.seen == [modifier]
+    assert [token.activity for token in sink.tokens] == [modifier]
+    assert [token.activity for token in plain.tokens] == [0]
+    assert modifiers(trace, "send_with_slot.out -> keep_tokens.value") == [modifier, 1]  # END takes what was kept
+
+
+class SendWithSlot(Send):
+    """Can be made active."""
+
+    @hfg.slot
+    def begin(self) -> None:
+        pass
+
+
+@pytest.mark.rule("A4")
+def test_an_inactive_node_can_give_activity(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node, ear = graph.add(numbers(count=1)), graph.add(Send(modifier=1)), graph.add(Ear())
+    graph.connect(source.out, node.value)
+    graph.connect(node.rang, ear.hear, active=True)
+    report = run(graph, fast)
+    assert report.nodes["ear"].active
+
+
+class PassesOn(hfg.Node):
+    """Passes on the token, or its value."""
+
+    value = hfg.Input(int)
+    whole = hfg.Output(int)
+    part = hfg.Output(int)
+
+    def process(self, value: hfg.Token[int]) -> None:
+        self.whole.send(value)
+        self.part.send(value.value)
+
+
+@pytest.mark.rule("A4")
+def test_a_token_passed_on_keeps_its_modifier_its_value_does_not() -> None:
+    graph = hfg.Graph()
+    source, send, node = graph.add(numbers(count=1)), graph.add(Send(modifier=-1)), graph.add(PassesOn())
+    whole, part = graph.add(KeepTokens()), graph.add(KeepTokens())
+    graph.connect(source.out, send.value)
+    graph.connect(send.out, node.value, active=True)
+    graph.connect(node.whole, whole.value, active=True)
+    graph.connect(node.part, part.value, active=True)
+    trace = traced(graph)
+    assert modifiers(trace, "passes_on.whole -> keep_tokens.value") == [-1, 0]
+    assert modifiers(trace, "passes_on.part -> keep_tokens_2.value") == [0, 0]
+
+
+# --- A6 ---
+
+
+class Pair(hfg.Node):
+    """Two inputs, so that two modifiers arrive in one firing."""
+
+    a = hfg.Input(object)
+    b = hfg.Input(object)
+    seen = hfg.State(factory=list)
+
+    def process(self, a: object, b: object) -> None:
+        self.seen.append(self.active)
+
+
+@pytest.mark.rule("A6")
+@pytest.mark.parametrize(
+    ("before", "a", "b", "after", "changes"),
+    [
+        (False, 1, 0, True, 1),
+        (False, -1, 1, True, 1),
+        (True, -1, 1, True, 0),
+        (True, 1, -1, True, 0),
+        (True, -1, 0, False, 1),
+        (False, -1, -1, False, 0),
+        (True, 0, 0, True, 0),
+    ],
+)
+def test_minus_acts_first_then_plus_and_only_the_net_change_counts(
+    before: bool, a: int, b: int, after: bool, changes: int
+) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(Countdown(count=1)), graph.add(PairWithSlot())
+    one, two = graph.add(Send(modifier=a)), graph.add(Send(modifier=b))
+    graph.connect(source.out, one.value)
+    graph.connect(source.out, two.value)
+    graph.connect(one.out, node.a, active=True)
+    graph.connect(two.out, node.b, active=True)
+    if before:
+        graph.start.activates(node.begin)
+    trace = traced(graph)
+    assert node.seen == [after]
+    assert len(activity(trace, "pair_with_slot")) == changes + before
+
+
+class PairWithSlot(Pair):
+    """Can be made active."""
+
+    @hfg.slot
+    def begin(self) -> None:
+        pass
+
+
+@pytest.mark.rule("A6")
+def test_a_slots_token_acts_before_its_handler(fast: bool) -> None:
+    graph = hfg.Graph()
+    node = graph.add(Looks())
+    graph.start.activates(node.begin)
+    run(graph, fast)
+    assert node.seen == [True]
+
+
+class Looks(hfg.Node):
+    seen = hfg.State(factory=list)
+
+    @hfg.slot
+    def begin(self) -> None:
+        self.seen.append(self.active)
+
+
+@pytest.mark.rule("A6", "F4")
+def test_modifiers_act_in_a_silent_firing_too(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, holes, send, node = (
+        graph.add(numbers(count=1)),
+        graph.add(Silent()),
+        graph.add(Send(modifier=1)),
+        graph.add(Pair()),
+    )
+    graph.connect(source.out, holes.value)
+    graph.connect(holes.out, node.a)
+    graph.connect(source.out, send.value)
+    graph.connect(send.out, node.b, active=True)
+    report = run(graph, fast)
+    assert node.seen == []
+    assert report.nodes["pair"].active
+
+
+class Silent(hfg.Node):
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> None:
+        pass
+
+
+# --- A8 ---
+
+
+@pytest.mark.rule("A8")
+def test_an_active_edge_that_is_not_live_transfers_nothing(fast: bool) -> None:
+    graph = hfg.Graph()
+    node, off = graph.add(Runner()), graph.add(Keep(), enabled=False)
+    source = graph.add(numbers(count=2))
+    graph.connect(source.out, node.value)
+    graph.start.activates(node.begin)
+    graph.connect(node.out, off.value, active=True)
+    report = run(graph, fast)
+    assert report.nodes["runner"].active
+    assert node.seen == [True, True]
+
+
+@pytest.mark.rule("A8", "F10")
+def test_a_discarded_plus_gives_the_activity_back_to_its_sender(fast: bool) -> None:
+    async def main() -> list[list[str]]:
+        graph = hfg.Graph()
+        node, busy = graph.add(Ear()), graph.add(Pair())
+        graph.connect(node.passed, busy.a, active=True)
+        graph.start.activates(node.begin)
+        never = graph.add(Ear(), name="never")
+        graph.connect(never.passed, busy.b)
+        story = []
+        async with hfg.running(graph, fast=fast) as run:
+            await run.wait_quiet()
+            story.append(run.active())
+            await run.trigger(node.hear, 1)
+            await run.wait_quiet()
+            story.append(run.active())
+            await run.trigger(busy.disable)
+            await run.wait_quiet()
+            story.append(run.active())
+        return story
+
+    assert drive(main) == [["ear"], [], ["ear"]]
+
+
+@pytest.mark.rule("A8")
+def test_activity_that_nobody_can_have_back_is_counted_as_lost(fast: bool) -> None:
+    async def main() -> int:
+        graph = hfg.Graph()
+        node = graph.add(Pair())
+        graph.connect(graph.start, node.a, active=True)  # from the graph itself, which is no node
+        graph.connect(graph.add(Ear()).passed, node.b)
+        async with hfg.running(graph, fast=fast) as run:
+            await run.wait_quiet()
+            await run.trigger(node.disable)
+            await run.wait_quiet()
+            return run.statistics().lost_activity
+
+    assert drive(main) == 1
+
+
+@pytest.mark.rule("A8", "X1")
+def test_errors_do_not_change_activity(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node, sink = (
+        graph.add(numbers(count=3)),
+        graph.add(fail_on(bad=2), on_error="skip"),
+        graph.add(KeepTokens()),
+    )
+    graph.connect(source.out, node.value)
+    graph.connect(node.out, sink.value)
+    graph.start.activates(node.activate)
+    report = run(graph, fast)
+    assert report.nodes["fail_on"].active
+
+
+# --- A9 ---
+
+
+@pytest.mark.rule("A9")
+def test_processed_follows_the_outputs_as_a_sending_of_its_own() -> None:
+    graph = hfg.Graph()
+    source, node, sink, ear = graph.add(gaps(count=3)), graph.add(forward()), graph.add(Keep()), graph.add(Ear())
+    graph.connect(source.out, node.value)
+    graph.connect(node.out, sink.value)
+    graph.connect(node.processed, ear.hear)
+    trace = traced(graph)
+    order = [event.edge.split(" ")[0] for event in of_kind(trace, TokenSent) if event.edge.startswith("forward")]
+    # not behind the silent firing and not behind the end
+    assert order == [
+        "forward.out",
+        "forward.processed",
+        "forward.out",
+        "forward.out",
+        "forward.processed",
+        "forward.out",
+    ]
+
+
+@pytest.mark.rule("A9")
+@pytest.mark.parametrize(("output_active", "carried"), [(True, [0, 0]), (False, [1, 0])])
+def test_processed_carries_activity_only_if_the_outputs_did_not(
+    output_active: bool, carried: list[int], fast: bool
+) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(ones()), graph.add(Runner())
+    sink, ear = graph.add(KeepTokens()), graph.add(KeepsModifiers())
+    graph.connect(source.out, node.value)
+    graph.start.activates(node.begin)
+    graph.connect(node.out, sink.value, active=output_active)
+    graph.connect(node.processed, ear.hear, active=True)
+    run(graph, fast)
+    assert ear.seen == carried
+
+
+class ones(hfg.Node):  # noqa: N801 - reads like the other sources
+    """1, twice."""
+
+    out = hfg.Output(int)
+    left = hfg.State(2)
+
+    def process(self) -> int:
+        if not self.left:
+            raise hfg.EndOfStream
+        self.left -= 1
+        return 1
+
+
+@pytest.mark.rule("A9")
+def test_activated_and_deactivated_follow_each_change(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node, sink = graph.add(numbers(count=2)), graph.add(Runner()), graph.add(Keep())
+    up, down = graph.add(Ear(), name="up"), graph.add(Ear(), name="down")
+    graph.connect(source.out, node.value)
+    graph.start.activates(node.begin)
+    graph.connect(node.out, sink.value, active=True)
+    graph.connect(node.activated, up.hear)
+    graph.connect(node.deactivated, down.hear)
+    run(graph, fast)
+    assert (up.heard, down.heard) == ([None], [None])
+
+
+@pytest.mark.rule("A9")
+def test_activity_may_leave_at_once_by_activated(fast: bool) -> None:
+    graph = hfg.Graph()
+    node, ear = graph.add(Runner()), graph.add(Ear())
+    graph.start.activates(node.begin)
+    graph.connect(node.activated, ear.hear, active=True)
+    report = run(graph, fast)
+    assert (report.nodes["runner"].active, report.nodes["ear"].active) == (False, True)
+
+
+class HooksOfActivity(hfg.Node):
+    """Writes down its hooks of activity."""
+
+    story = hfg.State(factory=list)
+
+    def on_activated(self) -> None:
+        self.story.append("activated")
+
+    async def on_deactivated(self) -> None:
+        await asyncio.sleep(1)
+        self.story.append("deactivated")
+
+
+@pytest.mark.rule("A9")
+def test_the_hooks_of_activity_are_called(fast: bool) -> None:
+    graph = hfg.Graph()
+    node, rings = graph.add(HooksOfActivity()), graph.add(Countdown(count=1))
+    graph.start.activates(node.activate)
+    graph.connect(rings.out, node.deactivate)
+    run(graph, fast)
+    assert node.story == ["activated", "deactivated"]
+
+
+# --- A10, A14 ---
+
+
+@pytest.mark.rule("A10")
+def test_start_comes_when_all_is_set_up_and_before_any_source(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(numbers(count=1)), graph.add(Runner())
+    graph.connect(source.out, node.value)
+    graph.start.activates(node.begin)
+    trace = traced(graph)
+    kinds = [type(event).__name__ for event in trace]
+    assert kinds[:3] == ["RunStarted", "EventTriggered", "TokenSent"]
+    assert isinstance(trace[0], RunStarted)
+    assert [event.event for event in of_kind(trace, EventTriggered)] == ["start"]
+    assert node.seen == [True]
+
+
+@pytest.mark.rule("A14")
+def test_reset_of_activity_takes_all_away_and_starts_again(fast: bool) -> None:
+    async def main() -> tuple[list[list[str]], list[object]]:
+        graph = hfg.Graph()
+        first, second = graph.add(Ear(), name="first"), graph.add(Ear(), name="second")
+        waiting = graph.add(Pair())
+        graph.start.activates(first.begin)
+        graph.connect(first.passed, second.hear, active=True)
+        graph.connect(second.passed, waiting.a, active=True)
+        graph.connect(graph.add(Ear(), name="never").passed, waiting.b)
+        story = []
+        async with hfg.running(graph, fast=fast) as run:
+            await run.wait_quiet()
+            story.append(run.active())
+            await run.trigger(first.hear, 1)
+            await run.wait_quiet()
+            story.append(run.active())  # under way on the edge into `waiting`
+            run.reset_activity()
+            await run.wait_quiet()
+            story.append(run.active())
+        return story, [first.begun]
+
+    assert drive(main) == ([["first"], [], ["first"]], [2])
+
+
+@pytest.mark.rule("A14")
+def test_reset_takes_modifiers_off_the_tokens_under_way(fast: bool) -> None:
+    async def main() -> list[bool]:
+        graph = hfg.Graph()
+        first, pair = graph.add(Ear(), name="first"), graph.add(Pair())
+        other = graph.add(Ear(), name="other")
+        graph.start.activates(other.begin)
+        graph.connect(first.passed, pair.a, active=True)
+        graph.connect(other.passed, pair.b)
+        async with hfg.running(graph, fast=fast) as run:
+            await run.trigger(first.passed, 1, activity=1)
+            await run.wait_quiet()
+            run.reset_activity()
+            await run.trigger(other.passed, 1)
+            await run.wait_quiet()
+            return pair.seen
+
+    assert drive(main) == [False]
