@@ -1,7 +1,9 @@
 """Does a run do what the rules say? Its trace is replayed on the reference machine (rules T to X, F9, R5, R6).
 
-The trace's decisions (which node fires, which slot is called, when a waiting firing goes on, when time does) drive the machine; everything else in it must be
-exactly what the machine sees. Inside one decision the order is left open where the rules leave it open; nothing of one decision may be missing when the next
+The trace's decisions (which node fires, which slot is called, when a waiting firing goes on, when time does) drive the
+machine; everything else in it must be
+exactly what the machine sees. Inside one decision the order is left open where the rules leave it open; nothing of one
+decision may be missing when the next
 one comes.
 """
 
@@ -62,7 +64,7 @@ _RULES: Final[dict[type[TraceEvent], str]] = {
 _SAME_TIME: Final = 1e-9
 
 
-class Divergence(AssertionError):  # noqa: N818 - what was found, not a fault of the code that raises it
+class Divergence(AssertionError):
     """A run did something else than the rules say.
 
     Attributes:
@@ -78,15 +80,21 @@ class Divergence(AssertionError):  # noqa: N818 - what was found, not a fault of
         if found is not None:
             parts.append(f"  the run:   {describe(found)}")
         if self.expected:
-            parts += ["  expected of the last decision, not seen:", *(f"    {describe(event)}" for event in self.expected[:8])]
+            parts += [
+                "  expected of the last decision, not seen:",
+                *(f"    {describe(event)}" for event in self.expected[:8]),
+            ]
         moves = replay.machine.moves()
         parts += ["  permitted now: " + (", ".join(map(str, moves[:8])) or "nothing")]
         parts += ["  last events of the run:", *(f"    {describe(event)}" for event in replay.seen[-12:])]
-        parts += ["  last events of the reference:", *(f"    {describe(event)}" for event in replay.machine.observed[-12:])]
+        parts += [
+            "  last events of the reference:",
+            *(f"    {describe(event)}" for event in replay.machine.observed[-12:]),
+        ]
         super().__init__("\n".join(parts))
 
 
-def replay(build: Callable[[], Any], events: Iterable[TraceEvent], *, until_s: float | None = None) -> None:
+def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = None) -> None:
     """Check the trace of a whole run, from its first event to its last.
 
     Args:
@@ -99,13 +107,9 @@ def replay(build: Callable[[], Any], events: Iterable[TraceEvent], *, until_s: f
 
     Example:
       >>> import hfg
-      >>> @hfg.node
-      ... def count(*, to: int = 3) -> Iterator[int]:
-      ...     yield from range(to)
-      >>> @hfg.node
-      ... def show(value: int) -> None: ...
+      >>> from hfg.testing.nodes import script, sink
       >>> graph, trace = hfg.Graph(), []
-      >>> _ = graph.add(count()) >> graph.add(show())
+      >>> _ = graph.add(script()) >> graph.add(sink())
       >>> report = hfg.run(graph, clock="virtual", trace=trace.append)
       >>> replay(graph, trace)
     """
@@ -243,7 +247,7 @@ class Replay:
             raise Divergence("the run ended at another time", event, self)
 
     def _explaining(self, event: TraceEvent) -> Move | None:
-        """The move that may lie behind an event: a step of the node it tells of, or one of those that follow from quiet."""
+        """The move that may lie behind an event: a step of its node, or one of those that follow from quiet."""
         moves = self.machine.moves()
         node = self._teller(event)
         for move in moves:
@@ -253,7 +257,9 @@ class Replay:
                 return move
             if move.kind == "grow" and isinstance(event, QueueGrown) and move.edge == event.edge:
                 return move
-            if move.kind == "complete" or (move.kind == "end events" and isinstance(event, TokenSent) and event.token.value is END):
+            if move.kind == "complete" or (
+                move.kind == "end events" and isinstance(event, TokenSent) and event.token.value is END
+            ):
                 return move
             if move.kind == "wait" and move.time <= event.time + _SAME_TIME:
                 return move
@@ -320,7 +326,7 @@ def token_key(token: Token[Any]) -> tuple[Any, ...]:
 
 
 def value_key(value: Any) -> Any:
-    """Values are compared by what they look like: arrays and not-a-number have no usable equality; errors by their type."""
+    """Values are compared by what they look like, errors by their type: arrays and NaN have no usable equality."""
     if isinstance(value, BaseException):
         return type(value).__name__
     return (type(value).__name__, repr(value))

@@ -1,4 +1,7 @@
-"""Making random plans: one procedure for everybody who can choose, be it Hypothesis, which shrinks, or a seeded generator, which is fast."""
+"""Making random plans: one procedure for everybody who can choose.
+
+Hypothesis chooses so that it can shrink; a seeded generator chooses fast.
+"""
 
 from __future__ import annotations
 
@@ -70,10 +73,33 @@ class Allowed:
     failing_calls: bool = True
 
 
-SYNCHRONOUS = Allowed(events=False, activity=False, failures=False, gates=False, operators=False, lossy=False, disabling=False, readiness=False)
+SYNCHRONOUS = Allowed(
+    events=False,
+    activity=False,
+    failures=False,
+    gates=False,
+    operators=False,
+    lossy=False,
+    disabling=False,
+    readiness=False,
+)
 """What rule F7 speaks of."""
 
-_INNER = ["double", "add", "some", "sink", "Passing", "Merge", "Latch", "Counter", "Pulse", "Greeter", "Stateful", "Sieve", "Tally"]
+_INNER = [
+    "double",
+    "add",
+    "some",
+    "sink",
+    "Passing",
+    "Merge",
+    "Latch",
+    "Counter",
+    "Pulse",
+    "Greeter",
+    "Stateful",
+    "Sieve",
+    "Tally",
+]
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear"}
 _DELICATE_SLOTS = ["activate", "deactivate", "reset", "disable", "enable"]
@@ -132,7 +158,9 @@ class _Making:
         if allowed.rates and choose.chance(15):
             options["max_rate_hz"] = choose.one_of([100.0, 30.0])
         if kind == "Failing" or (allowed.failures and choose.chance(5)):
-            options["on_error"] = choose.one_of(["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"])
+            options["on_error"] = choose.one_of(
+                ["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"]
+            )
         if allowed.activity and choose.chance(10):
             options["active_for_s"] = choose.one_of([0.02, 0.005])
         if allowed.disabling and choose.chance(4):
@@ -161,7 +189,12 @@ class _Making:
     def signals(self, nodes: Sequence[NodePlan]) -> list[End]:
         """Events without a value, automatic ones too."""
         automatic = ["processed", "activated", "deactivated", "failed", "timeout"]
-        own = [(node.name, "event", port) for node in nodes for port, spec in self.type_of(node.name).events.items() if spec.type is None]
+        own = [
+            (node.name, "event", port)
+            for node in nodes
+            for port, spec in self.type_of(node.name).events.items()
+            if spec.type is None
+        ]
         return own + [(node.name, "event", self.choose.one_of(automatic)) for node in nodes] + [("", "event", "start")]
 
     # --- edges
@@ -188,7 +221,9 @@ class _Making:
             if allowed.events and choose.chance(30):
                 candidates = self.events(self.nodes[index:]) or candidates
             if candidates:
-                self._edge(choose.one_of(candidates), target, initial=[choose.number(0, 3) for _ in range(choose.number(1, 2))])
+                self._edge(
+                    choose.one_of(candidates), target, initial=[choose.number(0, 3) for _ in range(choose.number(1, 2))]
+                )
             return
         if candidates:
             self._edge(choose.one_of(candidates), target)
@@ -242,7 +277,9 @@ class _Making:
 
     def _edge(self, source: End, target: End, *, initial: list[int] | None = None, active: bool | None = None) -> None:
         choose, allowed = self.choose, self.allowed
-        if (source, target) in self.pairs or any(edge.target == target and target[1] in ("input", "parameter") for edge in self.edges):
+        if (source, target) in self.pairs or any(
+            edge.target == target and target[1] in ("input", "parameter") for edge in self.edges
+        ):
             return
         options: dict[str, Any] = {}
         active = (allowed.activity and choose.chance(35)) if active is None else active
@@ -279,7 +316,9 @@ class _Making:
         return boxes
 
     def _has_parameter_edge(self, name: str) -> bool:
-        return any(end[0] == name and end[1] == "parameter" for edge in self.edges for end in (edge.source, edge.target))
+        return any(
+            end[0] == name and end[1] == "parameter" for edge in self.edges for end in (edge.source, edge.target)
+        )
 
     def make_gates(self) -> list[GatePlan]:
         choose = self.choose
@@ -291,8 +330,8 @@ class _Making:
 
 
 def _description(kind: str) -> Any:
-    made = getattr(types, kind)
-    return (made() if not isinstance(made, type) else made)._type
+    made: Any = getattr(types, kind)
+    return (made if isinstance(made, type) else type(made()))._type  # type: ignore[attr-defined]
 
 
 def make_plan(choose: Chooser, allowed: Allowed | None = None) -> GraphPlan:

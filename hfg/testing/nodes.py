@@ -1,6 +1,7 @@
 """Node types for tests: small, deterministic, found by name, and with every kind of port between them.
 
-What they do depends on what they are given alone, never on time or chance, so that a run of the engine and one of the reference can be compared.
+What they do depends on what they are given alone, never on time or chance, so that a run of the engine and one of the
+reference can be compared.
 """
 
 from __future__ import annotations

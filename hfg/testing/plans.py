@@ -1,13 +1,14 @@
 """Descriptions of random graphs: plain data that builds the same graph each time and prints as a program.
 
-A plan is flat; boxes only group its nodes, and the relays that their borders need are made while it is built. So the same plan with and without boxes is the
+A plan is flat; boxes only group its nodes, and the relays that their borders need are made while it is built. So the
+same plan with and without boxes is the
 same graph in the sense of rule G1.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 from hfg.graph import Graph, Subgraph
 from hfg.ports import Event, Input, Output, slot
@@ -126,7 +127,7 @@ class _Drawing:
         self.plan = plan
         self.around = plan._around()
         self.relays: dict[str, list[tuple[str, str]]] = {box.name: [] for box in plan.boxes}  # name and kind
-        self.segments: dict[str, list[_Segment]] = {"": []} | {box.name: [] for box in plan.boxes}
+        self.segments: dict[str, list[_Segment]] = {name: [] for name in ("", *(box.name for box in plan.boxes))}
         for index, edge in enumerate(plan.edges):
             self._draw(index, edge)
 
@@ -182,6 +183,9 @@ def _port(end: tuple[str, str, str]) -> str:
     return f"graph.{name}" if node == "" else f"{node}.ports.{kind}s[{name!r}]"
 
 
+_RELAYS: Final[dict[str, Any]] = {"input": Input, "output": Output, "event": Event}
+
+
 class _Building:
     """Builds what is drawn."""
 
@@ -204,7 +208,9 @@ class _Building:
             graph.add(node, name=one.name, **one.options)
             self.made[one.name] = node
         for segment in self.drawing.segments[box]:
-            graph.connect(self._end(segment.source, graph, owner), self._end(segment.target, graph, owner), **segment.options)
+            graph.connect(
+                self._end(segment.source, graph, owner), self._end(segment.target, graph, owner), **segment.options
+            )
 
     def _end(self, text: str, graph: Graph, owner: Any) -> Any:
         if text.startswith("graph."):
@@ -223,7 +229,7 @@ class _Building:
 
         body: dict[str, Any] = {"build": build, "__module__": __name__}
         for name, kind in self.drawing.relays[plan.name]:
-            body[name] = {"input": lambda: Input(Any), "output": lambda: Output(Any), "event": lambda: Event(Any), "slot": lambda: slot(type=Any)}[kind]()
+            body[name] = slot(type=Any) if kind == "slot" else _RELAYS[kind](Any)
         return type(plan.name.capitalize(), (Subgraph,), body)
 
 
@@ -235,7 +241,7 @@ class _Writing:
         self.drawing = _Drawing(plan)
 
     def text(self) -> str:
-        lines = ["import hfg", "from typing import Any", "from hfg.testing.nodes import *", ""]
+        lines = ["import hfg", "from typing import Any, Final", "from hfg.testing.nodes import *", ""]
         for box in self.plan.boxes:
             lines += self._class(box)
         lines.append("graph = hfg.Graph()")
@@ -251,7 +257,12 @@ class _Writing:
         return f"graph[{path!r}]"
 
     def _class(self, box: BoxPlan) -> list[str]:
-        kinds = {"input": "hfg.Input(Any)", "output": "hfg.Output(Any)", "event": "hfg.Event(Any)", "slot": "hfg.slot(type=Any)"}
+        kinds = {
+            "input": "hfg.Input(Any)",
+            "output": "hfg.Output(Any)",
+            "event": "hfg.Event(Any)",
+            "slot": "hfg.slot(type=Any)",
+        }
         lines = [f"class {box.name.capitalize()}(hfg.Subgraph):"]
         lines += [f"    {name} = {kinds[kind]}" for name, kind in self.drawing.relays[box.name]]
         lines.append("    def build(self, graph):")
@@ -265,9 +276,10 @@ class _Writing:
             else:
                 made = f"{one.name.capitalize()}()"
             lines.append(f"{one.name} = graph.add({made}, name={one.name!r}{_arguments(one.options, ', ')})")
-        for segment in self.drawing.segments[box]:
-            lines.append(f"graph.connect({segment.source}, {segment.target}{_arguments(segment.options, ', ')})")
-        return lines
+        return lines + [
+            f"graph.connect({segment.source}, {segment.target}{_arguments(segment.options, ', ')})"
+            for segment in self.drawing.segments[box]
+        ]
 
 
 def _arguments(values: dict[str, Any], before: str = "") -> str:

@@ -1,4 +1,6 @@
-"""The oracle: what the rules say a graph does, written slowly and obviously, as a machine whose every decision is taken from outside.
+"""The oracle.
+
+What the rules say a graph does, written slowly and obviously, as a machine whose every decision is taken from outside.
 
     structure      a graph as plain data, subgraphs dissolved
     waiting        an event loop turned by hand, for async node code

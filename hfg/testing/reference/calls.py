@@ -14,8 +14,6 @@ from hfg.trace import CallEnded, CallStarted, ErrorRaised, NodeEnabled, TokenPro
 __all__ = ["Calling"]
 
 
-
-
 class Calling(Firing):
     """A machine whose slots can be called."""
 
@@ -57,7 +55,7 @@ class Calling(Firing):
         return "" if owner == ROOT else self.structure.boxes[-2 - owner].path
 
     def handler_of(self, station: Station, name: str, token: Any) -> Callable[[], Any]:
-        """What runs: an automatic slot of A9, the node's own handler, or the setting of a parameter between firings (P8)."""
+        """What runs: an automatic slot of A9, the node's own handler, or the setting of a parameter (P8)."""
         index = station.leaf.index
         if name in station.type.parameters and name not in station.type.slots:
             return lambda: self.set_parameter(station, name, token.value)

@@ -31,7 +31,7 @@ class Firing(RunningCode):
     """A machine whose nodes can fire."""
 
     def start_firing(self, index: int) -> None:
-        """Take a token from every edge, let activity and parameters act, decide what kind of firing it is, and begin (D3)."""
+        """Take a token from every edge, let activity and parameters act, decide what kind of firing it is, begin."""
         station = self.stations[index]
         station.place = None
         station.firings += 1
@@ -131,7 +131,9 @@ class Firing(RunningCode):
             else:
                 arguments.append(token if spec.token else token.value)
         self.begin_in_group(flight, station.type.process_kind in ("async", "async generator"))
-        self.launch(flight, self.what_to_run(station, arguments), lambda result, error: self.end_process(flight, result, error))
+        self.launch(
+            flight, self.what_to_run(station, arguments), lambda result, error: self.end_process(flight, result, error)
+        )
 
     def begin_in_group(self, flight: Flight, is_async: bool) -> None:
         """Code that does not wait runs in the thread of its group, if that has one (R1)."""
@@ -214,8 +216,13 @@ class Firing(RunningCode):
 
     # --- the end of a firing
 
-    def end_firing(self, flight: Flight, outcome: Literal["done", "silent", "ended", "failed", "abandoned"], failure: NodeError | None = None) -> None:
-        """Outputs leave together, then automatic events in the order they arose (D3); then the firing is over."""
+    def end_firing(
+        self,
+        flight: Flight,
+        outcome: Literal["done", "silent", "ended", "failed", "abandoned"],
+        failure: NodeError | None = None,
+    ) -> None:
+        """Outputs leave together, then automatic events in the order they arose; then the firing is over."""
         station = flight.station
         index = station.leaf.index
         if not flight.void and (outcome != "ended" or flight.writes):
@@ -241,7 +248,7 @@ class Firing(RunningCode):
         self.settle()
 
     def shipments(self, flight: Flight, *, silent: bool) -> list[tuple[Line, Any, int | None, float]]:
-        """Exactly one token for every edge of every output (F3); parameters send their values unless the firing is silent (P8)."""
+        """One token for every edge of every output (F3); parameters send theirs unless the firing is silent (P8)."""
         station = flight.station
         shipments: list[tuple[Line, Any, int | None, float]] = []
         for line in self.in_order_of_outputs(station):
@@ -257,7 +264,9 @@ class Firing(RunningCode):
                 activity = value.activity if activity is None else activity
                 stamp = value.stamp if stamp is None else stamp
                 value = value.value
-            shipments.append((line, NO_MESSAGE if value is None else value, activity, flight.stamp if stamp is None else stamp))
+            shipments.append(
+                (line, NO_MESSAGE if value is None else value, activity, flight.stamp if stamp is None else stamp)
+            )
         return shipments
 
     def is_pipelined(self, line: Line) -> bool:
@@ -270,7 +279,9 @@ class Firing(RunningCode):
 
     # --- X1
 
-    def fail_firing(self, flight: Flight, error: BaseException, outcome: Literal["failed", "abandoned"] = "failed") -> None:
+    def fail_firing(
+        self, flight: Flight, error: BaseException, outcome: Literal["failed", "abandoned"] = "failed"
+    ) -> None:
         """An exception in a node's code: its policy decides."""
         station = flight.station
         options = station.leaf.options

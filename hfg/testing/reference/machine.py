@@ -1,7 +1,9 @@
 """The reference machine: which moves the rules permit, and what each of them does.
 
-`moves()` lists every decision that a scheduler may take now; `apply(move)` takes one and gives what an observer sees of it. Where it is quiet, the steps that
-follow from quiet alone are the moves: time goes on (R6), a queue grows (F8), operators complete (P9), events end (F13), the run ends (R5).
+`moves()` lists every decision that a scheduler may take now; `apply(move)` takes one and gives what an observer sees of
+it. Where it is quiet, the steps that
+follow from quiet alone are the moves: time goes on (R6), a queue grows (F8), operators complete (P9), events end (F13),
+  the run ends (R5).
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ class Move:
     """One permitted step.
 
     Attributes:
-      kind: "fire" node; "call" a slot of node with the token of `edge`; "go on" with the firing or call of node; "time out" the firing of node (X2);
+      kind: "fire" node; "call" a slot of node with the token of `edge`; "go on" with the firing or call of node; "time
+        out" the firing of node (X2);
         "wait" until `time`; "grow" the queue of `edge`; "complete" operators; "end events"; "finish" the run.
       outcome: of "finish".
     """
@@ -70,7 +73,7 @@ class ReferenceMachine(Calling):
         self.labels = {line.edge.label: line for line in self.lines}
 
     def start(self) -> list[TraceEvent]:
-        """Set up all nodes, lay the initial tokens, trigger `start` (A10, D6)."""
+        """Set up all nodes, lay the initial tokens, trigger `start` (A10)."""
         self.connect_ports()
         self.make_operators()
         for station in self.stations:
@@ -84,7 +87,7 @@ class ReferenceMachine(Calling):
         return self.observed_since(0)
 
     def lay(self, line: Line, value: Any) -> None:
-        """Lay an initial token (P7, D8)."""
+        """Lay an initial token (P7)."""
         from hfg.testing.reference.state import Lying
 
         line.queue.append(Lying(Token(value, 0, self.now, 0), self.next_tick(), line.edge.source.owner))
@@ -117,7 +120,12 @@ class ReferenceMachine(Calling):
                 if self.can_go_on(flight):
                     found.append(Move("go on", station.path))
                 limit = station.leaf.options.max_duration_s
-                if limit is not None and flight.what == "firing" and flight.task is not None and self.now >= flight.began + limit:
+                if (
+                    limit is not None
+                    and flight.what == "firing"
+                    and flight.task is not None
+                    and self.now >= flight.began + limit
+                ):
                     found.append(Move("time out", station.path))
                 continue
             move = self.next_of(index)
@@ -155,21 +163,32 @@ class ReferenceMachine(Calling):
         return [Move("finish", outcome="stalled" if self.stalled() else "done")]
 
     def next_timer(self, without: Set[int] = frozenset()) -> float | None:
-        """The next moment at which something could start: rate, gate, back-off, time-out with a connected event, operators, waiting code."""
+        """The next moment at which something could start: rate, gate, back-off, time-out, operator, waiting code."""
         ignored = {id(self.stations[index].flight) for index in without}
         times = [] if (due := self.loop.next_time(ignored)) is None else [due]
         for index, station in enumerate(self.stations):
             if index in without:
                 continue
             flight, options = station.flight, station.leaf.options
-            if flight is not None and flight.what == "firing" and options.max_duration_s is not None and flight.task is not None:
+            if (
+                flight is not None
+                and flight.what == "firing"
+                and options.max_duration_s is not None
+                and flight.task is not None
+            ):
                 times.append(flight.began + options.max_duration_s)
             if station.resting_until is not None:
                 times.append(station.resting_until)
             if flight is None and station.place is None and self.may_fire(index, ignore="timers"):
                 times += [station.hold_until] if station.hold_until > self.now else []
-                times += [station.last_function + 1 / rate for rate in self.gates_of(index) if rate and self.is_resting(index)]
-            if options.active_for_s is not None and station.active_since is not None and self.lines_from(index, "event", "timeout"):
+                times += [
+                    station.last_function + 1 / rate for rate in self.gates_of(index) if rate and self.is_resting(index)
+                ]
+            if (
+                options.active_for_s is not None
+                and station.active_since is not None
+                and self.lines_from(index, "event", "timeout")
+            ):
                 times.append(station.active_since + options.active_for_s)
         for box in self.structure.boxes:
             since, limit = self.box_since[box.index], box.options.active_for_s
@@ -185,7 +204,9 @@ class ReferenceMachine(Calling):
         full: list[Line] = []
         for index, station in enumerate(self.stations):
             waits = station.flight is not None and station.flight.waiting_for
-            held = station.flight is None and (self.may_fire(index, ignore="queues") or self.next_call(index) is not None)
+            held = station.flight is None and (
+                self.may_fire(index, ignore="queues") or self.next_call(index) is not None
+            )
             if waits or (held and station.resting_until is None):
                 full += self.full_lines(index)
         for box in self.structure.boxes:
@@ -215,9 +236,17 @@ class ReferenceMachine(Calling):
         found = []
         for index, station in enumerate(self.stations):
             resting = self.is_suspended_source(index) or self.is_resting(index)
-            if station.type.is_source and self.is_enabled(index) and not station.ended and not resting and not self.is_moot(index):
+            if (
+                station.type.is_source
+                and self.is_enabled(index)
+                and not station.ended
+                and not resting
+                and not self.is_moot(index)
+            ):
                 found.append(station.path)
-        return found + [line.edge.label for line in self.lines if line.queue and self.is_enabled(line.edge.target.owner)]
+        return found + [
+            line.edge.label for line in self.lines if line.queue and self.is_enabled(line.edge.target.owner)
+        ]
 
     def is_moot(self, index: int) -> bool:
         """R5: a source with edges only into ended nodes."""
@@ -229,7 +258,11 @@ class ReferenceMachine(Calling):
         """R5: each source has ended, is disabled, or works for ended nodes only, and everything else is quiet."""
         if self.held_open:
             return False
-        moot = {index for index, station in enumerate(self.stations) if station.type.is_source and not station.ended and self.is_moot(index)}
+        moot = {
+            index
+            for index, station in enumerate(self.stations)
+            if station.type.is_source and not station.ended and self.is_moot(index)
+        }
         others = [
             index
             for index, station in enumerate(self.stations)

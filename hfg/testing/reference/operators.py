@@ -1,6 +1,7 @@
 """Reactivex operators on an edge (rule P9), in the time of whoever holds the machine.
 
-Tokens are pushed in, what comes out is given on as tokens; timers of operators wait until `advance`. Stands on reactivex and tokens.
+Tokens are pushed in, what comes out is given on as tokens; timers of operators wait until `advance`. Stands on
+reactivex and tokens.
 """
 
 from __future__ import annotations
@@ -101,4 +102,3 @@ class Operators:
 
     def _failed(self, error: Exception) -> None:
         self.error = error
-

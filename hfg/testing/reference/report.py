@@ -20,7 +20,8 @@ class ReferenceReport:
     """What a reference run did.
 
     Attributes:
-      outcome: as in the report of a run: "done", "stopped", "until", "failed", "stalled", "aborted"; "waiting" if code waits for what never comes.
+      outcome: as in the report of a run: "done", "stopped", "until", "failed", "stalled", "aborted"; "waiting" if code
+        waits for what never comes.
       tokens: what was put on each edge, in order.
       activity: each change of A(v): path and new value, in order.
       dropped, drained, grown: how often, by edge.
@@ -66,19 +67,15 @@ def reference_run(
 
     Example:
       >>> import hfg
-      >>> @hfg.node
-      ... def count(*, to: int = 3) -> Iterator[int]:
-      ...     yield from range(to)
-      >>> @hfg.node
-      ... def show(value: int) -> None: ...
+      >>> from hfg.testing.nodes import script, sink
       >>> graph = hfg.Graph()
-      >>> _ = graph.add(count()) >> graph.add(show())
-      >>> reference_run(graph).values("count.out -> show.value")
-      [0, 1, 2, END]
+      >>> _ = graph.add(script()) >> graph.add(sink())
+      >>> reference_run(graph).values("script.out -> sink.value")
+      [1, 2, 3, END]
     """
     machine = ReferenceMachine(graph, until_s=until_s)
     pick = choose or (random.Random(seed).choice if seed is not None else lambda moves: moves[0])
-    taken = []
+    taken: list[Move] = []
     machine.start()
     while moves := machine.moves():
         if len(taken) == max_moves:
@@ -99,7 +96,9 @@ def _report(machine: ReferenceMachine, moves: list[Move]) -> ReferenceReport:
         outcome=machine.outcome or "waiting",
         tokens=tokens,
         activity=[(event.node, event.active) for event in events if isinstance(event, ActivityChanged)],
-        dropped=dict(Counter(event.edge for event in events if isinstance(event, TokenDropped) and event.reason != "stopped")),
+        dropped=dict(
+            Counter(event.edge for event in events if isinstance(event, TokenDropped) and event.reason != "stopped")
+        ),
         drained=dict(Counter(event.edge for event in events if isinstance(event, TokenDrained))),
         grown=dict(Counter(event.edge for event in events if isinstance(event, QueueGrown))),
         events=events,

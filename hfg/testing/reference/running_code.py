@@ -1,6 +1,9 @@
-"""How a machine runs the code of nodes: at once on the loop, in steps where it waits, out of sight in a thread (rules F3, R1, X2).
+"""How a machine runs the code of nodes.
 
-A `Flight` is a firing or call under way. What its code writes is kept in it; what it triggers leaves at once, or from a thread when the machine delivers it.
+At once on the loop, in steps where it waits, out of sight in a thread (rules F3, R1, X2).
+
+A `Flight` is a firing or call under way. What its code writes is kept in it; what it triggers leaves at once, or from a
+thread when the machine delivers it.
 """
 
 from __future__ import annotations
@@ -81,17 +84,19 @@ class RunningCode(Sending):
         finally:
             current_clock.reset(reset)
 
-    def launch(self, flight: Flight, function: Callable[[], Any], then: Callable[[Any, BaseException | None], None]) -> None:
+    def launch(
+        self, flight: Flight, function: Callable[[], Any], then: Callable[[Any, BaseException | None], None]
+    ) -> None:
         """Run `function`; `then` gets its result or error, now or when the flight has been carried on to its end."""
         flight.then = then
         flight.began = self.now
+        result: Any = None
+        failure: Exception | None = None
         try:
             with self.amid_code():
                 result = function()
-        except Exception as error:  # noqa: BLE001 - whatever a node raises is judged by X1
-            result, failure = None, error
-        else:
-            failure = None
+        except Exception as error:
+            failure = error
         if inspect.iscoroutine(result):
             with self.amid_code():
                 flight.task = self.loop.start(flight, result)
@@ -157,5 +162,7 @@ class RunningCode(Sending):
         while not task.done():
             if not self.loop.step(owner):
                 self.loop.forget(owner)
-                raise NotImplementedError(f'a hook of "{station.path}" waits for time to go by, which the reference does not do')
+                raise NotImplementedError(
+                    f'a hook of "{station.path}" waits for time to go by, which the reference does not do'
+                )
         task.result()

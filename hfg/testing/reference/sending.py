@@ -1,12 +1,14 @@
 """What happens to tokens that leave, and to activity with them (rules T1-T5, P5, F3, F12, A3-A9).
 
-One sending is all edges of one output set, or of one trigger. It is put in full before anything follows from it; what follows (automatic events, tokens that
+One sending is all edges of one output set, or of one trigger. It is put in full before anything follows from it; what
+follows (automatic events, tokens that
 are processed at once, outputs that become free) is done by `settle` until nothing changes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import Any, Literal
 
 from hfg.errors import QueueOverflow
@@ -136,7 +138,12 @@ class Sending(State):
             stamp = self.now if flight is None else flight.stamp
         lines = self.lines_from(owner, "event", name)
         for line in lines:
-            if line.edge.overflow == "error" and self.is_live(line) and line.operators is None and len(line.queue) >= line.capacity:
+            if (
+                line.edge.overflow == "error"
+                and self.is_live(line)
+                and line.operators is None
+                and len(line.queue) >= line.capacity
+            ):
                 raise QueueOverflow(f'"{line.edge.label}" holds {line.capacity} signals and takes no more')
         if lines or not self.is_automatic(owner, name):
             path = self.event_path(owner, name)
@@ -156,7 +163,7 @@ class Sending(State):
     # --- activity
 
     def set_active(self, owner: int, active: bool, cause: Cause) -> None:
-        """Change A(v), which is seen, restarts its time-out (A12), is told to its code and raises an automatic event (A9)."""
+        """Change A(v): it is seen, restarts the time-out (A12), is told to the code, raises an automatic event (A9)."""
         station = self.stations[owner]
         if station.active == active:
             return
@@ -184,13 +191,15 @@ class Sending(State):
         self.set_active(owner, active, "token")
 
     def flush_changes(self, station: Station) -> None:
-        """Send the automatic events that arose, each a sending of its own that carries +1 only if the node is active at that moment (D3)."""
+        """Send the automatic events that arose, each a sending of its own: +1 only if the node is active right then."""
         while station.changes:
             self.trigger(station.leaf.index, station.changes.pop(0))
 
     # --- discarding
 
-    def discard(self, line: Line, lying: Lying, reason: Literal["overflow", "disabled", "ended", "removed", "stopped"]) -> None:
+    def discard(
+        self, line: Line, lying: Lying, reason: Literal["overflow", "disabled", "ended", "removed", "stopped"]
+    ) -> None:
         """Throw a token away; activity on it goes back to its sender (A8)."""
         line.queue.remove(lying)
         self.observe(TokenDropped(self.now, line.edge.label, lying.token, reason))
@@ -215,7 +224,11 @@ class Sending(State):
             target = line.edge.target
             if not line.queue or target.owner == ROOT:
                 continue
-            marker = target.kind in ("slot", "parameter") and line in self.lines_called(target.owner) and line.queue[0].token.is_marker
+            marker = (
+                target.kind in ("slot", "parameter")
+                and line in self.lines_called(target.owner)
+                and line.queue[0].token.is_marker
+            )
             ended = target.owner >= 0 and self.stations[target.owner].ending and line in self.lines_joined(target.owner)
             if not marker and not ended:
                 continue
@@ -238,7 +251,11 @@ class Sending(State):
     def release_once(self) -> bool:
         """What a sequential firing took is processed when what it put is (F5)."""
         for station in self.stations:
-            if station.owed and self.outputs_are_free(station.leaf.index) and not (station.ending and not station.ended):
+            if (
+                station.owed
+                and self.outputs_are_free(station.leaf.index)
+                and not (station.ending and not station.ended)
+            ):
                 owed, station.owed = station.owed, []
                 for line in owed:
                     self.process(line)
@@ -252,12 +269,12 @@ class Sending(State):
             self.observe(TokenProcessed(self.now, line.edge.label))
 
     def end_once(self) -> bool:
-        """END follows on all outputs as soon as they are free (F4, D5); then drained modifiers act (F12)."""
+        """END follows on all outputs as soon as they are free (F4); then drained modifiers act (F12)."""
         for station in self.stations:
             index = station.leaf.index
             if station.ending and not station.ended and station.flight is None and self.outputs_are_free(index):
                 station.ended = True
-                lines = [line for line in self.in_order_of_outputs(station)]
+                lines = self.in_order_of_outputs(station)
                 self.send(index, [(line, END, None, station.stamp) for line in lines])
                 self.observe(NodeEnded(self.now, station.path))
                 self.complete_operators(station)
@@ -275,8 +292,10 @@ class Sending(State):
                 line.operators.complete()
 
     def in_order_of_outputs(self, station: Station) -> list[Line]:
-        """The synchronous edges of a node: outputs in order of declaration, then parameters, each in order of connecting."""
-        order = [("output", name) for name in station.type.outputs] + [("parameter", name) for name in station.type.parameters]
+        """The synchronous edges of a node: outputs as declared, then parameters, each in order of connecting."""
+        order = [("output", name) for name in station.type.outputs] + [
+            ("parameter", name) for name in station.type.parameters
+        ]
         return [line for kind, name in order for line in self.lines_from(station.leaf.index, kind, name)]
 
     def flush_once(self) -> bool:
@@ -299,7 +318,7 @@ class Sending(State):
         return False
 
     def note_places(self) -> None:
-        """Give a place to each node that has become enabled for a firing, and take it from those that are not any more (F9, D1)."""
+        """Give a place to each node that has become enabled for a firing, and take it from those that are not (F9)."""
         for station in self.stations:
             if not self.may_fire(station.leaf.index):
                 station.place = None
@@ -310,7 +329,10 @@ class Sending(State):
         """Put the operators of P9 in front of their queues."""
         for line in self.lines:
             if line.edge.through:
-                line.operators = Operators(line.edge.through, lambda token, line=line: self.enqueue(line, token, line.edge.source.owner))
+                line.operators = Operators(line.edge.through, partial(self._out_of_operators, line))
+
+    def _out_of_operators(self, line: Line, token: Token[Any]) -> None:
+        self.enqueue(line, token, line.edge.source.owner)
 
 
 def _with(token: Token[Any], *, activity: int | None = None, sequence: int | None = None) -> Token[Any]:

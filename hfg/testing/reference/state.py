@@ -1,6 +1,7 @@
 """The state of a reference machine: what lies on each edge, what each node is doing, and what has been observed.
 
-Nothing is clever here: token lists are lists, flags are flags. `State` answers the questions that the rules ask about one moment (is the edge live, is the
+Nothing is clever here: token lists are lists, flags are flags. `State` answers the questions that the rules ask about
+one moment (is the edge live, is the
 output free, may the node fire) and changes nothing.
 """
 
@@ -12,7 +13,7 @@ from typing import Any, Literal
 
 from hfg.errors import EndOfStream
 from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, dissolve
-from hfg.testing.reference.waiting import HandTurnedLoop
+from hfg.testing.reference.waiting import hand_turned_loop
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import TraceEvent
 
@@ -125,7 +126,7 @@ class State:
         self.box_active = [False] * len(self.structure.boxes)
         self.box_since: list[float | None] = [None] * len(self.structure.boxes)
         self.box_calls: dict[int, int] = {}
-        self.loop = HandTurnedLoop(lambda: self.now)
+        self.loop = hand_turned_loop(lambda: self.now)
         self.held_open = False
         self.readers: set[str] = set()
         self.outcome: str | None = None
@@ -188,7 +189,7 @@ class State:
         return all(self.box_enabled[one] for one in around)
 
     def takes_part(self, line: Line) -> bool:
-        """Whether a firing waits for the edge: a live one, or one with signals that a node sent before it was disabled (F10)."""
+        """Whether a firing waits for the edge: a live one, or one with signals sent before the sender was disabled."""
         if self.is_live(line):
             return not (line.ended and not line.queue and self.is_optional(line))
         return line.edge.is_event and bool(line.queue) and self.is_enabled(line.edge.target.owner)
@@ -245,7 +246,10 @@ class State:
     # --- F1
 
     def may_fire(self, index: int, *, ignore: str = "") -> bool:
-        """F1, all but "not busy" (D1: this is what a place is for). `ignore`: "queues" leaves F8 out, "timers" F11, A11 and back-off."""
+        """F1, all but "not busy": from then on the node has a place (F9).
+
+        `ignore`: "queues" leaves F8 out; "timers" leaves out F11, A11 and back-off.
+        """
         station = self.stations[index]
         if not self.is_enabled(index) or station.ending or station.ended or station.type.process_kind == "none":
             return False
@@ -260,7 +264,7 @@ class State:
         return ignore == "timers" or self.says_ready(station)  # asked last: until a timer is over nobody knows
 
     def has_all_inputs(self, index: int) -> bool:
-        """A source or a live input edge; a live edge at every mandatory input; a token on every edge that takes part."""
+        """A source or a live input edge; a live edge at each mandatory input; a token on all that take part."""
         station = self.stations[index]
         joined = self.lines_joined(index)
         waited = [line for line in joined if self.takes_part(line)]
@@ -292,7 +296,7 @@ class State:
         return self.stations[index].type.is_source and any(rate is None for rate in self.gates_of(index))
 
     def is_resting(self, index: int) -> bool:
-        """A throttled source that has had its firing for now (D7)."""
+        """A throttled source that has had its firing for now (A11)."""
         return self.stations[index].type.is_source and not self.within_idle_rate(index)
 
     def within_idle_rate(self, index: int) -> bool:
@@ -301,14 +305,14 @@ class State:
         return all(rate is not None and self.now >= station.last_function + 1 / rate for rate in self.gates_of(index))
 
     def is_held_by_time(self, index: int) -> bool:
-        """F11's hold (D2: no firing at all within it), or the back-off of a restart."""
+        """F11's hold, within which no firing at all starts, or the back-off of a restart."""
         station = self.stations[index]
         return self.now < station.hold_until or station.resting_until is not None
 
     # --- what is next for one node (F9)
 
     def next_call(self, owner: int) -> Line | None:
-        """The edge with the oldest token that waits for a slot call of the node; of a disabled one only `enable` answers."""
+        """The edge with the oldest token that waits for a call; of a disabled node only `enable` answers."""
         candidates = [
             line
             for line in self.lines_called(owner)

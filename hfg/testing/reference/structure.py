@@ -1,6 +1,7 @@
 """What a graph is made of once its subgraphs are dissolved, as plain data (rule G1).
 
-Walks `graph.nodes` and `graph.edges` by itself: an edge that ends at a relay goes on with every edge that begins at the relay's other side, until it meets
+Walks `graph.nodes` and `graph.edges` by itself: an edge that ends at a relay goes on with every edge that begins at the
+relay's other side, until it meets
 the port of a plain node, of an iterating subgraph, or of the root graph. Knows no rule but G1 and decides nothing.
 """
 
@@ -26,7 +27,10 @@ class End(NamedTuple):
 
 @dataclass
 class Leaf:
-    """A node that is not dissolved. `boxes`: the subgraphs around it, outermost first. `inside`: for an iterating subgraph (G4), its own structure."""
+    """A node that is not dissolved.
+
+    `boxes`: the subgraphs around it, outermost first. `inside`: for an iterating subgraph (G4), its own structure.
+    """
 
     index: int
     path: str
@@ -50,7 +54,7 @@ class Box:
 
 @dataclass
 class Edge:
-    """A real edge. `via`: the boxes whose relays it passes; `initial`: the tokens it begins with, next to be taken first."""
+    """A real edge; `via`: the boxes whose relays it passes; `initial`: what lies on it, next to be taken first."""
 
     index: int
     label: str
@@ -72,7 +76,7 @@ class Edge:
 
 @dataclass
 class Gate:
-    """Rule A11: `targets` work as activity of `by` (a leaf, or box k as -2 - k) allows; `idle_rate_hz` None suspends."""
+    """Rule A11: `targets` work as the activity of `by` (box k is -2 - k) allows; `idle_rate_hz` None suspends."""
 
     targets: list[int]
     by: int
@@ -135,9 +139,9 @@ class _Dissolving:
     # --- edges: rule G1
 
     def _is_relay(self, port: Any) -> bool:
-        """Whether tokens only pass here: a declared port of a dissolved subgraph, from either side; parameters are promoted instead."""
+        """Whether tokens only pass here: a declared port of a dissolved subgraph, seen from either side."""
         outer = getattr(port, "outer", port)
-        node = getattr(outer, "node", None)
+        node: Any = getattr(outer, "node", None)
         if id(node) not in self.box_of or outer.kind == "parameter":
             return False
         return outer.name in getattr(node._type, f"{outer.kind}s")
@@ -229,7 +233,9 @@ class _Dissolving:
         box = self.box_of.get(id(gate.target))
         targets = [self.leaf_of[id(gate.target)]] if box is None else self.result.boxes[box].members
         by = self.leaf_of.get(id(gate.by))
-        self.result.gates.append(Gate(list(targets), -2 - self.box_of[id(gate.by)] if by is None else by, gate.idle_rate_hz))
+        self.result.gates.append(
+            Gate(list(targets), -2 - self.box_of[id(gate.by)] if by is None else by, gate.idle_rate_hz)
+        )
 
 
 class _Options:

@@ -1,6 +1,9 @@
-"""A tiny event loop that a machine can turn by hand: async node code runs in it one step at a time, in the machine's own time.
+"""A tiny event loop that a machine can turn by hand.
 
-Each firing or call that waits has an owner; its steps and timers are kept apart, so that whoever holds the machine decides which coroutine goes on next.
+Async node code runs in it one step at a time, in the machine's own time.
+
+Each firing or call that waits has an owner; its steps and timers are kept apart, so that whoever holds the machine
+decides which coroutine goes on next.
 Only what `asyncio.sleep`, futures, tasks and `asyncio.timeout` need is there: no sockets, no threads, no signals.
 """
 
@@ -12,7 +15,7 @@ from contextlib import contextmanager
 from contextvars import Context, ContextVar, copy_context
 from typing import Any, Final
 
-__all__ = ["HandTurnedLoop"]
+__all__ = ["HandTurnedLoop", "hand_turned_loop"]
 
 _OWNER: Final[ContextVar[object]] = ContextVar("hfg.testing.owner", default=None)
 
@@ -47,21 +50,29 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         """Make a future that wakes its waiter through this loop."""
         return asyncio.Future(loop=self)
 
-    def create_task(self, coro: Any, *, name: Any = None, context: Context | None = None, **_: Any) -> asyncio.Task[Any]:
+    def create_task(
+        self, coro: Any, *, name: Any = None, context: Context | None = None, **_: Any
+    ) -> asyncio.Task[Any]:
         """Make a task; its first step is one of the owner's next steps."""
         return asyncio.Task(coro, loop=self, name=name, context=context)
 
-    def call_soon(self, callback: Any, *args: Any, context: Context | None = None) -> asyncio.Handle:
+    def call_soon(  # type: ignore[override]
+        self, callback: Any, *args: Any, context: Context | None = None
+    ) -> asyncio.Handle:
         """Add a step to those that the owner may do next."""
         handle = asyncio.Handle(callback, args, self, context)
         self._ready.append((_owner_of(context), handle))
         return handle
 
-    def call_later(self, delay: float, callback: Any, *args: Any, context: Context | None = None) -> asyncio.TimerHandle:
+    def call_later(  # type: ignore[override]
+        self, delay: float, callback: Any, *args: Any, context: Context | None = None
+    ) -> asyncio.TimerHandle:
         """Add a step for later."""
         return self.call_at(self._now() + delay, callback, *args, context=context)
 
-    def call_at(self, when: float, callback: Any, *args: Any, context: Context | None = None) -> asyncio.TimerHandle:
+    def call_at(  # type: ignore[override]
+        self, when: float, callback: Any, *args: Any, context: Context | None = None
+    ) -> asyncio.TimerHandle:
         """Add a step for a moment of the machine's time."""
         timer = asyncio.TimerHandle(when, callback, args, self, context)
         self._timers.append((_owner_of(context), timer))
@@ -97,7 +108,8 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
 
     def next_time(self, without: Set[int] = frozenset()) -> float | None:
         """The moment of the next timer, or None; owners in `without` (by `id`) are left out."""
-        return min((timer.when() for owner, timer in self._timers if not timer.cancelled() and id(owner) not in without), default=None)
+        waiting = [timer for owner, timer in self._timers if not timer.cancelled() and id(owner) not in without]
+        return min((timer.when() for timer in waiting), default=None)
 
     def ring(self) -> None:
         """Make the timers whose moment has come into steps of their owners, in order of time."""
@@ -120,6 +132,11 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
             yield
         finally:
             asyncio._set_running_loop(outside)
+
+
+def hand_turned_loop(now: Callable[[], float]) -> HandTurnedLoop:
+    """Make a loop whose time is what `now` says."""
+    return HandTurnedLoop(now)  # type: ignore[abstract]  # all the rest of a loop stays unimplemented
 
 
 def _owner_of(context: Context | None) -> object:

@@ -1,0 +1,160 @@
+"""Explore a graph: run it under many schedules and look for one that breaks something."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import hfg
+from hfg.errors import RunError
+from hfg.graph import Graph
+from hfg.testing.conformance import Divergence, describe, replay
+from hfg.testing.invariants import Invariant, broken, of_graph
+from hfg.testing.recording import Recorder
+from hfg.testing.reference.structure import dissolve
+from hfg.trace import CallStarted, FiringStarted
+
+__all__ = ["Exploration", "ScheduleFailure", "explore"]
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """What was found: nothing wrong.
+
+    Attributes:
+      runs: how many schedules were tried.
+      outcomes: how often runs ended how.
+      results: how many different results there were; 1 where rule F7 holds.
+    """
+
+    runs: int
+    outcomes: dict[str, int]
+    results: int
+
+
+class ScheduleFailure(AssertionError):
+    """A schedule breaks an invariant, or gives another result than the first one.
+
+    Attributes:
+      seed: `hfg.run(build(), clock="virtual", policy="random", seed=seed)` does it again.
+      trace: of that run.
+    """
+
+    def __init__(self, why: str, seed: int, trace: Recorder) -> None:
+        self.seed = seed
+        self.trace = trace
+        decisions = [event for event in trace if isinstance(event, FiringStarted | CallStarted)]
+        schedule = [f"    {describe(event)}" for event in decisions[:40]]
+        if len(decisions) > 40:
+            schedule.append(f"    ... and {len(decisions) - 40} more")
+        again = f'hfg.run(build(), clock="virtual", policy="random", seed={seed})'
+        super().__init__(
+            "\n".join([why, f"  again with {again}", f"  its schedule ({len(decisions)} decisions):", *schedule])
+        )
+
+
+@dataclass
+class _Tried:
+    seed: int
+    trace: Recorder
+    outcome: str
+    result: Any
+    wrong: list[str]
+
+    @property
+    def length(self) -> int:
+        return sum(isinstance(event, FiringStarted | CallStarted) for event in self.trace)
+
+
+def explore(
+    build: Callable[[], Graph],
+    *,
+    runs: int = 100,
+    invariants: Iterable[Invariant] | None = None,
+    result: Callable[[Recorder], Any] | None = None,
+    seed: int = 0,
+    until_s: float | None = None,
+    conform: bool = False,
+) -> Exploration:
+    """Run a graph under many seeded schedules in virtual time.
+
+    Args:
+      build: makes the graph, afresh for every run.
+      runs: how many schedules.
+      invariants: functions over traces that give sentences about what is wrong; by default all of
+        `hfg.testing.invariants`.
+      result: what must be the same for every schedule; by default how the run ended and, if the graph has synchronous
+        edges alone, every sequence of
+        tokens (rule F7).
+      seed: of the seeds.
+      until_s: ends every run at that time.
+      conform: also compares each run with the reference oracle.
+
+    Raises:
+      ScheduleFailure: with the shortest of the schedules that fail.
+
+    Example:
+      >>> from hfg.testing.nodes import double, script, sink
+      >>> def build() -> Graph:
+      ...     graph = hfg.Graph()
+      ...     _ = graph.add(script()) >> graph.add(double()) >> graph.add(sink())
+      ...     return graph
+      >>> explore(build, runs=5)
+      Exploration(runs=5, outcomes={'done': 5}, results=1)
+    """
+    checks = list(of_graph(build()) if invariants is None else invariants)
+    measure = result or _default_result(build())
+    seeds = random.Random(seed)
+    tried = [_try(build, seeds.randrange(2**31), checks, measure, until_s, conform) for _ in range(runs)]
+    failing = sorted((one for one in tried if one.wrong), key=lambda one: one.length)
+    if failing:
+        shortest = failing[0]
+        raise ScheduleFailure(
+            f"{len(failing)} of {runs} schedules fail:\n  " + "\n  ".join(shortest.wrong), shortest.seed, shortest.trace
+        )
+    others = sorted((one for one in tried if one.result != tried[0].result), key=lambda one: one.length)
+    if others:
+        raise ScheduleFailure(
+            f"the result depends on the schedule:\n  {tried[0].result!r} with seed {tried[0].seed}\n"
+            f"  {others[0].result!r} with seed {others[0].seed}",
+            others[0].seed,
+            others[0].trace,
+        )
+    return Exploration(runs, dict(Counter(one.outcome for one in tried)), min(runs, 1))
+
+
+def _try(
+    build: Callable[[], Graph],
+    seed: int,
+    checks: list[Invariant],
+    measure: Callable[[Recorder], Any],
+    until_s: float | None,
+    conform: bool,
+) -> _Tried:
+    trace = Recorder()
+    outcome = "failed"
+    try:
+        outcome = hfg.run(build(), clock="virtual", policy="random", seed=seed, until_s=until_s, trace=trace).outcome
+    except RunError as error:
+        outcome = trace.outcome or type(error).__name__
+    wrong = broken(trace, checks)
+    if conform and not wrong:
+        try:
+            replay(build, trace, until_s=until_s)
+        except Divergence as divergence:
+            wrong = [str(divergence)]
+    return _Tried(seed, trace, outcome, measure(trace), wrong)
+
+
+def _default_result(graph: Graph) -> Callable[[Recorder], Any]:
+    edges = dissolve(graph).edges
+    if any(edge.is_event for edge in edges):
+        return lambda trace: trace.outcome
+    labels = [edge.label for edge in edges]
+    return lambda trace: (
+        trace.outcome,
+        {label: [(repr(t.value), t.activity) for t in trace.tokens(label)] for label in labels},
+    )

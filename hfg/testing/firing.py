@@ -1,0 +1,269 @@
+"""Fire one node without a graph: give it inputs, get what it sends.
+
+Runs the node's own code and nothing else: no edges, no markers, no rules of activity. Async code runs in virtual time.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+from weakref import WeakSet
+
+from hfg.clock import current_clock
+from hfg.errors import EndOfStream, UsageError
+from hfg.nodetype import Node
+from hfg.testing.reference.waiting import hand_turned_loop
+from hfg.token import Token
+
+__all__ = ["Firing", "Sent", "fire"]
+
+_SET_UP: Final[WeakSet[Node]] = WeakSet()
+_OVER: Final = object()
+
+
+@dataclass(frozen=True)
+class Sent:
+    """A signal or output as the node sent it; `activity` None leaves it to rule A3, `stamp` None to T5."""
+
+    name: str
+    value: Any
+    activity: int | None = None
+    stamp: float | None = None
+
+
+@dataclass(frozen=True)
+class Firing:
+    """What one firing or call did.
+
+    Attributes:
+      outputs: what was written, by output; silence is not there.
+      events: signals in order, as (event, value).
+      sent: both with their modifiers and stamps, events first.
+      ended: the source has nothing more to give.
+    """
+
+    outputs: dict[str, Any]
+    events: list[tuple[str, Any]]
+    sent: list[Sent] = field(repr=False, default_factory=list)
+    ended: bool = False
+
+
+def fire(
+    node: Node,
+    /,
+    *,
+    slot: str | None = None,
+    hook: str | None = None,
+    active: bool | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    **values: Any,
+) -> Firing:
+    """Run one firing of a node, one call of a slot, or one hook; state is kept from one to the next.
+
+    `setup()` runs before the first. A value may be a token where the node wants to see one.
+
+    Args:
+      node: belongs to no run at the moment.
+      slot: calls this slot instead, with `value=`, if it takes one.
+      hook: runs this hook instead: "end", "teardown", "on_activated" ...
+      active: what `node.active` says from now on.
+      parameters: are set before.
+      values: by input; those left out must be optional.
+
+    Raises:
+      UsageError: an input is missing or unknown, or an output was written twice.
+      TypeError: the result does not fit the outputs.
+
+    Example:
+      >>> import hfg
+      >>> class Door(hfg.Node):
+      ...     steps = hfg.State(0)
+      ...     opened = hfg.Event(int)
+      ...     def process(self, push: bool) -> int:
+      ...         self.steps += push
+      ...         if self.steps == 2:
+      ...             self.opened.trigger(self.steps)
+      ...         return self.steps
+      ...     @hfg.slot
+      ...     def close(self) -> None:
+      ...         self.steps = 0
+      >>> door = Door()
+      >>> fire(door, push=True)
+      Firing(outputs={'out': 1}, events=[], ended=False)
+      >>> fire(door, push=True).events
+      [('opened', 2)]
+      >>> fire(door, slot="close").outputs
+      {}
+      >>> fire(door, push=True).outputs
+      {'out': 1}
+    """
+    place = node.place
+    if place is not None and place.graph._root._run is not None:
+        raise UsageError(f'"{place.path}" is running: fire a node that no run has')
+    for name, value in (parameters or {}).items():
+        node._set_parameter(name, value)
+    if active is not None:
+        node._active = active
+    firing = _Firing(node)
+    if node not in _SET_UP:
+        node._reset_states()
+        setup = node._hook("setup")
+        if setup is not None:
+            firing.run(setup)
+        _SET_UP.add(node)
+    if hook is not None:
+        return firing.of_hook(hook)
+    if slot is not None:
+        return firing.of_slot(slot, values)
+    return firing.of_process(values)
+
+
+class _Firing:
+    def __init__(self, node: Node) -> None:
+        self.node = node
+        self.type = node._type
+        self.now = 0.0
+        self.loop = hand_turned_loop(lambda: self.now)
+        self.outputs: dict[str, Sent] = {}
+        self.signals: list[Sent] = []
+        self.ended = False
+        for name in self.type.outputs:
+            node.ports.outputs[name]._emit = self._writer(name)
+        for name in (*self.type.events, "processed", "activated", "deactivated", "failed", "timeout"):
+            port = node.ports.events[name] if not self.type.is_subgraph else None
+            if port is not None:
+                port._emit = self._trigger(name)
+                port._emit_wait = self._wait(name)
+
+    def of_process(self, values: dict[str, Any]) -> Firing:
+        if self.type.process_kind == "none":
+            raise UsageError(f'{self.type.name} has no process function; name one of its slots: fire(node, slot="...")')
+        kind = self.type.process_kind
+        arguments = self._arguments(values)
+        try:
+            if kind in ("generator", "async generator"):
+                result = self._next(kind)
+            else:
+                result = self.run(lambda: self.node._process_call()(*arguments))
+        except EndOfStream:
+            self.ended = True
+            return self.result()
+        if result is _OVER:
+            self.ended = True
+            return self.result()
+        for name, value in zip(self.type.outputs, self.node._split(result), strict=False):
+            if value is not None:
+                self._writer(name)(value, None, None)
+        return self.result()
+
+    def of_slot(self, slot: str, values: dict[str, Any]) -> Firing:
+        if slot not in self.type.slots:
+            raise UsageError(f'{self.type.name} has no slot "{slot}"; it has {_names(self.type.slots)}')
+        if strange := set(values) - {"value"}:
+            raise UsageError(f"a slot takes value=..., got {_names(strange)}")
+        value = values.get("value")
+        token = value if isinstance(value, Token) else Token(value, 0, self.now)
+        self.run(lambda: self.node._slot_call(slot)(token))
+        return self.result()
+
+    def of_hook(self, name: str) -> Firing:
+        found = self.node._hook(name)
+        if found is not None:
+            self.run(found)
+        if name == "teardown":
+            _SET_UP.discard(self.node)
+        return self.result()
+
+    def result(self) -> Firing:
+        outputs = {sent.name: _plain(sent.value) for sent in self.outputs.values() if _plain(sent.value) is not None}
+        events = [(sent.name, _plain(sent.value)) for sent in self.signals]
+        return Firing(outputs, events, [*self.signals, *self.outputs.values()], self.ended)
+
+    def run(self, function: Callable[[], Any]) -> Any:
+        """Run code to its end, waiting included."""
+        clock = current_clock.set(lambda: self.now)
+        try:
+            with self.loop.entered():
+                result = function()
+                if not inspect.iscoroutine(result):
+                    return result
+                task = self.loop.start(self, result)
+            while not task.done():
+                if self.loop.step(self):
+                    continue
+                due = self.loop.next_time()
+                if due is None:
+                    task.get_coro().close()
+                    raise UsageError(f'"{self.type.name}" waits for something that never comes when it is alone')
+                self.now = due
+                self.loop.ring()
+            return task.result()
+        finally:
+            current_clock.reset(clock)
+
+    def _next(self, kind: str) -> Any:
+        iterator = self.node.__dict__.get("_fired_iterator")
+        if iterator is None:
+            iterator = self.node._process_call()()
+            self.node.__dict__["_fired_iterator"] = iterator
+        if kind == "generator":
+            return self.run(lambda: next(iterator, _OVER))
+
+        async def step() -> Any:
+            return await anext(iterator, _OVER)
+
+        return self.run(step)
+
+    def _arguments(self, values: dict[str, Any]) -> list[Any]:
+        if unknown := set(values) - set(self.type.inputs):
+            raise UsageError(
+                f"{self.type.name} has no input {_names(unknown)}; its inputs are {_names(self.type.inputs)}"
+            )
+        arguments = []
+        for name, spec in self.type.inputs.items():
+            if name in values:
+                value = values[name]
+                if spec.token:
+                    arguments.append(value if isinstance(value, Token) else Token(value, 0, self.now))
+                else:
+                    arguments.append(_plain(value))
+            elif spec.optional:
+                arguments.append(spec.default)
+            else:
+                raise UsageError(f'{self.type.name} needs a value for "{name}": fire(node, {name}=...)')
+        return arguments
+
+    def _writer(self, name: str) -> Callable[[Any, int | None, float | None], None]:
+        def write(value: Any, activity: int | None, stamp: float | None) -> None:
+            if name in self.outputs:
+                raise UsageError(f'"{self.type.name}.{name}" was written twice in one firing')
+            self.outputs[name] = _sent(name, value, activity, stamp)
+
+        return write
+
+    def _trigger(self, name: str) -> Callable[[Any, int | None, float | None], None]:
+        return lambda value, activity, stamp: self.signals.append(_sent(name, value, activity, stamp))
+
+    def _wait(self, name: str) -> Callable[[Any, int | None, float | None], Any]:
+        async def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
+            self.signals.append(_sent(name, value, activity, stamp))
+
+        return trigger
+
+
+def _sent(name: str, value: Any, activity: int | None, stamp: float | None) -> Sent:
+    if isinstance(value, Token):  # A4: a token passed on keeps its modifier and stamp
+        return Sent(
+            name, value.value, value.activity if activity is None else activity, value.stamp if stamp is None else stamp
+        )
+    return Sent(name, value, activity, stamp)
+
+
+def _plain(value: Any) -> Any:
+    return value.value if isinstance(value, Token) else value
+
+
+def _names(names: Any) -> str:
+    return ", ".join(f'"{name}"' for name in names) or "none"

@@ -1,0 +1,244 @@
+"""What holds in every run of every graph, as functions over its trace; each says what is wrong, or gives an empty list.
+
+They need no oracle, so they can be asked of a user's own graph: `explore(build, invariants=[no_token_lost, ...])`.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from typing import Any, Final
+
+from hfg.token import NO_MESSAGE
+from hfg.trace import (
+    ActivityChanged,
+    ActivityLost,
+    CallEnded,
+    CallStarted,
+    FiringEnded,
+    FiringStarted,
+    NodeEnabled,
+    NodeEnded,
+    RunEnded,
+    TokenDrained,
+    TokenDropped,
+    TokenProcessed,
+    TokenSent,
+    TokenTaken,
+    TraceEvent,
+)
+
+__all__ = [
+    "ALL",
+    "Invariant",
+    "activity_changes_alternate",
+    "activity_is_carried",
+    "broken",
+    "ended_nodes_rest",
+    "modifiers_fit",
+    "no_token_lost",
+    "numbers_rise",
+    "of_graph",
+    "one_thing_at_a_time",
+    "one_unprocessed_token",
+    "order_is_kept",
+    "time_never_goes_back",
+]
+
+Invariant = Callable[[list[TraceEvent]], list[str]]
+
+
+def no_token_lost(events: list[TraceEvent]) -> list[str]:
+    """Every token that was put is taken, drained or dropped once if the run ends by itself (F8, P5)."""
+    put: dict[str, list[int]] = defaultdict(list)
+    gone: dict[str, list[int]] = defaultdict(list)
+    for event in events:
+        match event:
+            case TokenSent(edge=edge, token=token):
+                put[edge].append(token.sequence)
+            case TokenTaken(edge=edge, token=token) | TokenDrained(edge=edge, token=token):
+                gone[edge].append(token.sequence)
+            case TokenDropped(edge=edge, token=token, reason=reason):
+                if reason != "ended":  # taken before
+                    gone[edge].append(token.sequence)
+    done = any(isinstance(event, RunEnded) and event.outcome == "done" for event in events)
+    found = []
+    for edge in {**put, **gone}:
+        numbers = [number for number in gone[edge] if number]  # initial tokens have none
+        if len(set(numbers)) != len(numbers):
+            found.append(f'on "{edge}" a token was used twice: {_doubles(numbers)}')
+        if strange := sorted(set(numbers) - set(put[edge])):
+            found.append(f'on "{edge}" tokens were used that nobody sent: {strange}')
+        if done and (lost := sorted(set(put[edge]) - set(numbers))) and not _left(events, edge):
+            found.append(f'on "{edge}" tokens were lost: {lost}')
+    return found
+
+
+def order_is_kept(events: list[TraceEvent]) -> list[str]:
+    """Tokens of one edge are used in the order in which they were put (P5)."""
+    last: dict[str, int] = {}
+    found = []
+    for event in events:
+        if isinstance(event, TokenTaken | TokenDrained) and event.token.sequence:
+            if event.token.sequence <= last.get(event.edge, 0):
+                found.append(f'on "{event.edge}" number {event.token.sequence} was used after {last[event.edge]}')
+            last[event.edge] = event.token.sequence
+    return found
+
+
+def numbers_rise(events: list[TraceEvent]) -> list[str]:
+    """The numbers on an edge are 1, 2, 3 ... (T5)."""
+    last: dict[str, int] = defaultdict(int)
+    found = []
+    for event in events:
+        if isinstance(event, TokenSent):
+            if event.token.sequence != last[event.edge] + 1:
+                found.append(f'on "{event.edge}" number {event.token.sequence} follows {last[event.edge]}')
+            last[event.edge] = event.token.sequence
+    return found
+
+
+def one_unprocessed_token(synchronous: Iterable[str]) -> Invariant:
+    """Make the invariant that the given edges hold at most one unprocessed token (P4)."""
+    labels = frozenset(synchronous)
+
+    def one_token(events: list[TraceEvent]) -> list[str]:
+        held: dict[str, int] = defaultdict(int)
+        found = []
+        for event in events:
+            edge = getattr(event, "edge", None)
+            if edge not in labels:
+                continue
+            if isinstance(event, TokenSent):
+                held[edge] += 1
+                if held[edge] > 1:
+                    found.append(f'"{edge}" holds {held[edge]} unprocessed tokens at number {event.token.sequence}')
+            elif isinstance(event, TokenProcessed | TokenDrained) or (
+                isinstance(event, TokenDropped) and event.reason == "disabled"
+            ):
+                held[edge] = max(0, held[edge] - 1)
+        return found
+
+    return one_token
+
+
+def modifiers_fit(events: list[TraceEvent]) -> list[str]:
+    """NO_MESSAGE never carries a modifier (T3), and there are only three (eq. 8)."""
+    return [
+        f'on "{event.edge}" {event.token.value!r} carries {event.token.activity}'
+        for event in events
+        if isinstance(event, TokenSent)
+        and (event.token.activity not in (-1, 0, 1) or (event.token.value is NO_MESSAGE and event.token.activity != 0))
+    ]
+
+
+def activity_changes_alternate(events: list[TraceEvent]) -> list[str]:
+    """A(v) begins at 0 and changes are changes (A1)."""
+    state: dict[str, bool] = defaultdict(bool)
+    found = []
+    for event in events:
+        if isinstance(event, ActivityChanged):
+            if state[event.node] == event.active:
+                found.append(f'"{event.node}" became {"active" if event.active else "inactive"} twice')
+            state[event.node] = event.active
+    return found
+
+
+def activity_is_carried(active_edges: Iterable[str]) -> Invariant:
+    """Make the invariant that only the given edges carry modifiers (T1, A7)."""
+    labels = frozenset(active_edges)
+
+    def carried(events: list[TraceEvent]) -> list[str]:
+        return [
+            f'"{event.edge}" is not active but carries {event.token.activity}'
+            for event in events
+            if isinstance(event, TokenSent) and event.token.activity != 0 and event.edge not in labels
+        ]
+
+    return carried
+
+
+def one_thing_at_a_time(events: list[TraceEvent]) -> list[str]:
+    """Firings and calls of one node never overlap (F9)."""
+    busy: dict[str, str] = {}
+    found = []
+    for event in events:
+        if isinstance(event, FiringStarted | CallStarted) and event.node:
+            if event.node in busy:
+                found.append(f'"{event.node}" began {_name(event)} during {busy[event.node]}')
+            busy[event.node] = _name(event)
+        elif isinstance(event, FiringEnded | CallEnded):
+            busy.pop(event.node, None)
+    return found
+
+
+def ended_nodes_rest(events: list[TraceEvent]) -> list[str]:
+    """A node that has ended fires no more, unless it is set up afresh (F12)."""
+    ended: set[str] = set()
+    found = []
+    for event in events:
+        if isinstance(event, NodeEnded):
+            ended.add(event.node)
+        elif isinstance(event, NodeEnabled) or (isinstance(event, CallStarted) and event.slot in ("reset", "enable")):
+            ended = {node for node in ended if not (node == event.node or node.startswith(f"{event.node}/"))}
+        elif isinstance(event, FiringStarted) and event.node in ended:
+            found.append(f'"{event.node}" fired after its end')
+    return found
+
+
+def time_never_goes_back(events: list[TraceEvent]) -> list[str]:
+    """Time stands or goes on (R6)."""
+    return [
+        f"{type(later).__name__} at {later.time} after {earlier.time}"
+        for earlier, later in pairwise(events)
+        if later.time < earlier.time
+    ]
+
+
+ALL: Final[tuple[Invariant, ...]] = (
+    no_token_lost,
+    order_is_kept,
+    numbers_rise,
+    modifiers_fit,
+    activity_changes_alternate,
+    one_thing_at_a_time,
+    ended_nodes_rest,
+    time_never_goes_back,
+)
+"""Those that need to know nothing of the graph."""
+
+
+def of_graph(graph: Any) -> list[Invariant]:
+    """Give all invariants, those included that ask which edges are active or synchronous."""
+    from hfg.testing.reference.structure import dissolve
+
+    edges = dissolve(graph).edges
+    synchronous = [edge.label for edge in edges if not edge.is_event and not edge.initial and edge.target.owner != -1]
+    return [*ALL, one_unprocessed_token(synchronous), activity_is_carried(edge.label for edge in edges if edge.active)]
+
+
+def broken(events: list[TraceEvent], invariants: Iterable[Invariant] = ALL) -> list[str]:
+    """Ask all of them; give every sentence that says what is wrong."""
+    return [f"{_title(invariant)}: {sentence}" for invariant in invariants for sentence in invariant(events)]
+
+
+def _title(invariant: Invariant) -> str:
+    return str(getattr(invariant, "__name__", invariant)).replace("_", " ")
+
+
+def _name(event: FiringStarted | CallStarted) -> str:
+    return f"firing {event.number}" if isinstance(event, FiringStarted) else f"call {event.number} of {event.slot}"
+
+
+def _doubles(numbers: list[int]) -> list[int]:
+    return sorted({number for number in numbers if numbers.count(number) > 1})
+
+
+def _left(events: list[TraceEvent], edge: str) -> bool:
+    """Whether activity on the edge was accounted for otherwise; and what lies at a disabled node may stay there."""
+    lost = any(isinstance(event, ActivityLost) and event.edge == edge for event in events)
+    target = edge.partition(" -> ")[2].rpartition(".")[0]
+    return lost or any(
+        isinstance(event, NodeEnabled) and not event.enabled and target.startswith(event.node) for event in events
+    )

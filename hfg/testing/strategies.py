@@ -1,0 +1,70 @@
+"""Hypothesis strategies: tokens, graphs, schedules.
+
+What fails is shrunk to a small graph whose `repr` is the program that builds it.
+
+Example:
+  >>> from hypothesis import given
+  >>> @given(graphs(), schedules())
+  ... def test_no_token_is_lost(build, seed): ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+from hypothesis import strategies as st
+
+from hfg.testing.making import SYNCHRONOUS, Allowed, make_plan
+from hfg.testing.plans import GraphPlan
+from hfg.token import END, NO_MESSAGE, Token
+
+__all__ = ["SYNCHRONOUS", "Allowed", "graphs", "schedules", "tokens"]
+
+T = TypeVar("T")
+
+
+class _DrawingChooser:
+    """Chooses by drawing, so that Hypothesis can shrink the choices."""
+
+    def __init__(self, draw: st.DrawFn) -> None:
+        self._draw = draw
+
+    def number(self, least: int, most: int) -> int:
+        return self._draw(st.integers(least, most))
+
+    def one_of(self, choices: Sequence[T]) -> T:
+        return choices[self._draw(st.integers(0, len(choices) - 1))]
+
+    def chance(self, percent: int) -> bool:
+        return self._draw(st.integers(0, 99)) >= 100 - percent
+
+
+@st.composite
+def graphs(draw: st.DrawFn, allowed: Allowed | None = None) -> GraphPlan:
+    """Give plans of graphs: call one to build its graph, afresh each time.
+
+    Args:
+      allowed: what may occur; `SYNCHRONOUS` is what rule F7 speaks of.
+    """
+    return make_plan(_DrawingChooser(draw), allowed)
+
+
+def tokens(values: st.SearchStrategy[Any] | None = None, *, markers: bool = True) -> st.SearchStrategy[Token[Any]]:
+    """Give tokens with every modifier; NO_MESSAGE always has none (T3)."""
+    value = st.integers(-9, 9) if values is None else values
+    stamp = st.floats(0, 1000, allow_nan=False)
+    number = st.integers(1, 99)
+    found = st.builds(Token, value, st.sampled_from([0, 1, -1]), stamp, number)
+    if markers:
+        found |= st.builds(Token, st.just(NO_MESSAGE), st.just(0), stamp, number)
+        found |= st.builds(Token, st.just(END), st.sampled_from([0, 1]), stamp, number)
+    return found
+
+
+def schedules() -> st.SearchStrategy[int]:
+    """Give seeds: each is one order in which what may run is run.
+
+    For `hfg.run(graph, policy="random", seed=seed)` and `reference_run(graph, seed=seed)`.
+    """
+    return st.integers(0, 2**16)
