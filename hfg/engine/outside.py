@@ -13,7 +13,8 @@ from functools import partial
 from types import TracebackType
 from typing import Any
 
-from hfg.engine.engine import Engine, answer
+from hfg.engine.code import answer
+from hfg.engine.engine import Engine
 from hfg.engine.sending import enqueue, put_outputs, release
 from hfg.engine.worker import ENDED, Worker
 from hfg.errors import NotRunning, UsageError
@@ -27,7 +28,8 @@ __all__ = ["Feed", "collect", "read", "signal", "take", "until"]
 class Feed:
     """Brings tokens into a graph input; while it is open it holds the run open (R5).
 
-    Leaving the block sends END behind the last token, unless `end=False` or an exception leaves it.
+    Leaving the block sends END behind the last token, unless `end=False` or an exception leaves it. It waits until
+    threads have sent what they had begun to send, but not for END's place.
     """
 
     def __init__(self, engine: Engine, worker: Worker, hint: Any, *, end: bool) -> None:
@@ -40,11 +42,7 @@ class Feed:
 
     async def __aenter__(self) -> Feed:
         _check_running(self._engine)
-        if self._worker.blocked & ENDED:
-            raise UsageError(
-                f'graph input "{self._worker.port_name}" has ended: an earlier feed was closed; open that '
-                f"one with end=False to feed it again"
-            )
+        self._check_not_ended()
         self._open = True
         self._engine.hold()
         return self
@@ -54,17 +52,14 @@ class Feed:
     ) -> None:
         self._open = False
         try:
-            if kind is None and self._end and not self._engine.core.over:
+            if kind is None and self._end:
                 async with self._lock:
-                    await self._free()
-                    if not self._engine.core.over:
-                        self._worker.blocked |= ENDED
-                        self._put(END, None, None)
+                    self._put_end()
         finally:
             self._engine.unhold()
 
     async def send(self, value: Any, *, activity: int | None = None, stamp: float | None = None) -> None:
-        """Send one token and wait until the graph has processed it (P10).
+        """Send one token and wait until the graph has processed it (P10); None is silence.
 
         Raises:
           NotRunning: the feed is closed, or the run ended before the token was processed.
@@ -74,7 +69,7 @@ class Feed:
             raise NotRunning(
                 f'the feed of "{self._worker.port_name}" is closed: use it inside "async with run.feed(...)"'
             )
-        if type(value) is not Token and not isinstance(value, Marker) and not accepts(value, self._hint):
+        if value is not None and not isinstance(value, Token | Marker) and not accepts(value, self._hint):
             raise TypeError(
                 f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got '
                 f"{describe(type(value))}: {value!r:.80}"
@@ -82,6 +77,7 @@ class Feed:
         async with self._lock:
             await self._free()
             _check_running(self._engine)
+            self._check_not_ended()
             self._put(value, activity, stamp)
             await self._free()
         _check_running(self._engine)
@@ -91,6 +87,26 @@ class Feed:
     ) -> concurrent.futures.Future[None]:
         """Send from any other thread, in order; the future is done when the token is processed."""
         return asyncio.run_coroutine_threadsafe(self.send(value, activity=activity, stamp=stamp), self._engine.loop)
+
+    def _check_not_ended(self) -> None:
+        if self._worker.blocked & ENDED:
+            raise UsageError(
+                f'graph input "{self._worker.port_name}" has ended: another feed of it was closed; open that '
+                f"one with end=False to feed it again"
+            )
+
+    def _put_end(self) -> None:
+        worker = self._worker
+        if self._engine.core.over or worker.blocked & ENDED:
+            return
+        if worker.outputs.missing:
+            worker.outputs.when_complete(self._put_end_soon)
+            return
+        worker.blocked |= ENDED
+        self._put(END, None, None)
+
+    def _put_end_soon(self) -> None:
+        self._engine.loop.call_soon(self._put_end)  # not in the middle of what the engine does now
 
     def _put(self, value: Any, activity: int | None, stamp: float | None) -> None:
         if value is None:
@@ -104,7 +120,10 @@ class Feed:
 
     async def _free(self) -> None:
         """Wait until the input's edges are free, or the run is over."""
-        await until(self._engine, self._worker.outputs.when_complete)
+        while True:
+            await until(self._engine, self._worker.outputs.when_complete)
+            if not self._worker.outputs.missing or self._engine.core.over:
+                return
 
 
 async def until(engine: Engine, when: Callable[[Callable[[], None]], None]) -> None:
@@ -150,17 +169,24 @@ async def read(engine: Engine, worker: Worker) -> AsyncIterator[Any]:
     """Give out the values of a graph output, with back-pressure, until END or the end of the run (P10)."""
     if not worker.live_inputs:
         raise UsageError(f'graph output "{worker.port_name}" is not connected: nothing will come out of it')
-    while True:
-        if worker.inputs.missing:
-            await until(engine, worker.inputs.when_complete)
-            if worker.inputs.missing:
+    engine.readers.append(worker)
+    try:
+        while True:
+            while worker.inputs.missing:  # another reader may have been faster
+                if engine.core.over or worker in engine.read_out:
+                    return
+                await until(engine, worker.inputs.when_complete)
+            token = take(worker)
+            engine.kick()
+            if token.value is END:
+                engine.read_out.add(worker)
                 return
-        token = take(worker)
+            engine.read_out.discard(worker)
+            if token.value is not NO_MESSAGE:
+                yield token.value
+    finally:
+        engine.readers.remove(worker)
         engine.kick()
-        if token.value is END:
-            return
-        if token.value is not NO_MESSAGE:
-            yield token.value
 
 
 def collect(engine: Engine, worker: Worker, values: list[Any]) -> None:

@@ -154,11 +154,13 @@ def stall(core: Core) -> Stalled | None:
             edge.untaken
             and (edge.live or edge.source.blocked & DISABLED)
             and not edge.target.blocked & (DISABLED | ENDED)
+            and not (edge.target.is_boundary_output and all(token.value is END for token in edge.contents()))
         ):
             stuck.setdefault(edge.target.index, [edge.target]).append(edge)
     for target, *edges in stuck.values():
         lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
-        reasons.append(f'"{target.path}" {_waits_for(target)}, while tokens lie on {lies}')
+        who = "" if target.is_boundary_output else f'"{target.path}" '
+        reasons.append(f"{who}{_waits_for(target)}, while tokens lie on {lies}")
     reasons.extend(
         f'source "{source.path}" has not ended and {_waits_for(source)}'
         for source in core.sources
@@ -176,7 +178,7 @@ def stall(core: Core) -> Stalled | None:
 
 def _waits_for(worker: Worker) -> str:
     if worker.is_boundary_output:
-        return f'graph output "{worker.port_name}" is not read'
+        return f'graph output "{worker.port_name}" is not read (`async for value in run.read(...)` would)'
     blocked = worker.blocked
     if blocked & UNWIRED:
         fed = {edge.port_name for edge in worker.live_inputs}

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal
 
 from hfg.engine import outside
-from hfg.engine.engine import Engine, Settings, answer
+from hfg.engine.code import answer
+from hfg.engine.engine import Engine
 from hfg.engine.report import Report, edge_reports, node_reports
+from hfg.engine.settings import Settings
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import Worker
 from hfg.errors import CheckFailed, GraphError, HfgError, NotRunning, RunError, UsageError
@@ -74,24 +76,25 @@ class Run:
 
         Which holds the run open and sends END at its end unless `end=False`.
         """
-        name = getattr(port, "name", port)
+        name = self._boundary(port, self.graph.inputs)
         for worker in self._engine.core.feeds:
             if worker.port_name == name:
-                return outside.Feed(self._engine, worker, getattr(port, "type", Any), end=end)
-        if name in self.graph.inputs:
-            raise UsageError(
-                f'graph input "{name}" is not connected: graph.connect(graph.inputs["{name}"], ...) before the run'
-            )
-        raise UsageError(f'"{name}" is no input of graph "{self.graph.name}": it has {_names(self.graph.inputs)}')
+                return outside.Feed(self._engine, worker, self.graph.inputs[name].type, end=end)
+        raise UsageError(
+            f'graph input "{name}" is not connected: graph.connect(graph.inputs["{name}"], ...) before the run'
+        )
 
     def read(self, port: Any) -> AsyncIterator[Any]:
-        """Read a graph output, value by value and lossless: a reader that does not read holds the graph back (P10)."""
-        name = getattr(port, "name", port)
+        """Read a graph output, value by value and lossless: a reader that does not read holds the graph back (P10).
+
+        While something lies before a reader that goes on, the run does not end.
+        """
+        name = self._boundary(port, self.graph.outputs)
         for worker in self._engine.core.readers:
             if worker.port_name == name:
                 return outside.read(self._engine, worker)
         raise UsageError(
-            f'"{name}" is no connected output of graph "{self.graph.name}": it has {_names(self.graph.outputs)}'
+            f'graph output "{name}" is not connected: graph.connect(..., graph.outputs["{name}"]) before the run'
         )
 
     async def tap(self, port: Any, *, size: int = 100) -> AsyncIterator[Token[Any]]:
@@ -200,6 +203,7 @@ class Run:
         Raises:
           RunError: the run failed, stalled or was aborted.
         """
+        await asyncio.sleep(0)  # tasks that were begun beside us open their feeds and readers first
         self._release()
         await self._engine.ending.wait()
         await self._close()
@@ -275,6 +279,18 @@ class Run:
             raise UsageError(f"{node!r} is no node of this run: its graph is another one, or it was never added")
         return worker
 
+    def _boundary(self, port: Any, ports: Mapping[str, Any]) -> str:
+        """Find one of the graph's own ports, given itself or by name."""
+        name = str(getattr(port, "name", port))
+        if name in ports and (port == name or port is ports[name]):
+            return name
+        kind, verb = ("input", "feed") if ports is self.graph.inputs else ("output", "read")
+        found = f'"{getattr(port, "path", port)}"' if isinstance(port, str) or hasattr(port, "name") else repr(port)
+        raise UsageError(
+            f'{found} is no {kind} of graph "{self.graph.name}", which has {_names(ports)}: '
+            f'run.{verb} takes what graph.{kind}("name", type) gave'
+        )
+
     def _hold(self) -> None:
         self._held = True
         self._engine.hold()
@@ -338,7 +354,7 @@ def _refuse_endless(flat: FlatGraph) -> None:
         if runs_for_ever(node.node) and not node.options.max_rate_hz and not gated:
             raise GraphError(
                 f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time '
-                f'would stand still '
+                f"would stand still "
                 f"for ever: give it max_rate_hz=, or let it raise hfg.EndOfStream"
             )
 

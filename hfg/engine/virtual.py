@@ -11,7 +11,10 @@ import selectors
 import time
 from collections import deque
 from collections.abc import Callable
+from contextvars import Context, copy_context
 from typing import Any
+
+from hfg.clock import current_clock
 
 __all__ = ["Held", "VirtualTimeLoop"]
 
@@ -102,6 +105,13 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         """Virtual seconds since the loop was made."""
         return self._virtual_now
+
+    def create_task(self, coro: Any, *, context: Context | None = None, **options: Any) -> asyncio.Task[Any]:
+        """As asyncio's; `hfg.now()` is this loop's time in every task that belongs to no run."""
+        context = copy_context() if context is None else context
+        if current_clock not in context:
+            context.run(current_clock.set, self.time)
+        return super().create_task(coro, context=context, **options)
 
     def hold(self, limit_s: float | None = None, give_up: Callable[[], None] | None = None) -> Held:
         """Let the clock stand still until this work is back (`deliver` set, on the loop) or dropped.
