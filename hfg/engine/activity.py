@@ -51,15 +51,24 @@ def _time_out_later(worker: Worker, active: bool) -> None:
         worker.active_timer.cancel()
         worker.active_timer = None
     limit = worker.active_for_s
-    if active and limit is not None and worker.timeout_leads_somewhere():
+    if active and limit is not None:
+        core = worker.core
+        leads = worker.timeout_leads_somewhere()
+        worker.active_timer = core.host.call_at(core.now() + limit, lambda: _time_out(worker), counts=leads)
 
-        def over() -> None:
-            worker.active_timer = None
-            trigger(worker.events["timeout"], stamp=worker.core.now(), extend_right=False)
-            worker.right = False  # behind the sending, which may have given it (A3)
-            flush_automatic(worker)
 
-        worker.active_timer = worker.core.after(limit, over)
+def _time_out(worker: Worker) -> None:
+    worker.active_timer = None
+    event = worker.events.get("timeout")
+    if event is None:
+        return
+    before = worker.active
+    trigger(event, stamp=worker.core.now(), extend_right=False)
+    worker.right = False  # behind the sending, which may have given it (A3)
+    if worker.scope is not None and before and not worker.active:
+        deactivate_inside(worker.scope)
+    scopes_changed(worker.core)
+    flush_automatic(worker)
 
 
 def gate_changed(gates: Any) -> None:
@@ -118,6 +127,8 @@ def _flush_scope(scope: Scope) -> None:
 
 def deactivate_inside(scope: Scope) -> None:
     """Take all activity from the inside: of nodes, and of tokens under way."""
+    if not scope.watched:
+        scope.find_inner_edges()
     for edge in scope.inner_edges:
         strip(edge)
     for worker in scope.members:

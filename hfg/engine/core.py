@@ -41,10 +41,10 @@ class Host(Protocol):
     def now(self) -> float:
         """Seconds on the run's clock."""
 
-    def call_at(self, when: float, callback: Callable[[], None]) -> Timer:
+    def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> Timer:
         """Call back at `when` on the run's clock.
 
-        The timer counts as one that could start something (quiet waits for it).
+        If it counts it is one that could start something: quiet waits for it.
         """
 
     def kick(self) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 
 from hfg.clock import current_clock
 from hfg.engine import plan, quiet, rx, steps
-from hfg.engine.code import CodeRunner
+from hfg.engine.code import CodeRunner, answer
 from hfg.engine.core import Core
 from hfg.engine.groups import Fifo, Group, LoopGroup, ThreadGroup, make_policy
 from hfg.engine.lifetime import Lifetime
@@ -88,7 +88,7 @@ class Engine:
         self._epoch = 0.0 if self.virtual else time.time() - self.loop.time()
         self.context = contextvars.copy_context()
         self.context.run(current_clock.set, self.now)
-        self.core = Core(self)
+        self.core: Core = Core(self)
         self._consumers: list[Callable[[TraceEvent], None]] = []
         self.core.debug = settings.debug
         self.core.fast = settings.fast
@@ -221,6 +221,7 @@ class Engine:
         self.finish("failed", problem)
 
     def guard(self, call: Callable[[], None]) -> None:
+        """Call something of ours in a callback of the loop; what it raises ends the run."""
         try:
             call()
         except Exception as error:
@@ -287,10 +288,7 @@ class Engine:
         core = self.core
         if quiet.grow(core):
             return
-        for waiter in self._quiet_waiters:
-            if not waiter.done():
-                waiter.set_result(None)
-        self._quiet_waiters.clear()
+        self._answer_quiet()
         if self.holds or any(reader.inputs_ready() for reader in self.readers):
             return
         if quiet.complete_operators(core):
@@ -303,6 +301,11 @@ class Engine:
             return
         stalled = quiet.stall(core)
         self.finish("done" if stalled is None else "stalled", stalled)
+
+    def _answer_quiet(self) -> None:
+        waiters, self._quiet_waiters = self._quiet_waiters, []
+        for waiter in waiters:
+            answer(waiter, None)
 
     async def wait_quiet(self) -> None:
         """Wait until only something outside can change anything; returns at once if the run is over."""
@@ -348,10 +351,7 @@ class Engine:
             if worker.room_waiters is not None:
                 for waiter in worker.room_waiters:
                     waiter()
-        for waiter in self._quiet_waiters:
-            if not waiter.done():
-                waiter.set_result(None)
-        self._quiet_waiters.clear()
+        self._answer_quiet()
         self.ending.set()
 
     @property

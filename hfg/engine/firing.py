@@ -554,6 +554,7 @@ def finish_call(worker: Worker, outcome: Any) -> None:
     worker.call_edge = None
     if type(edge) is SyncEdge:
         release((edge,))
+    derive_scopes(core)
     flush_automatic(worker)
     worker.right = False
     worker.stamp = None

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hfg.engine import wiring
-from hfg.engine.sending import block, consider, discard, release, unblock
+from hfg.engine.sending import block, consider, derive_scopes, discard, release, unblock
 from hfg.engine.worker import DISABLED, ENDED, Worker
 from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge
@@ -72,6 +72,7 @@ def tear_down(worker: Worker, then: Then) -> None:
 
 def disable(worker: Worker) -> None:
     """F10: discard what lies on its edges, and let producers neither send to it nor wait for it."""
+    worker.own_enabled = False
     if worker.blocked & DISABLED:
         return
     core = worker.core
@@ -79,6 +80,7 @@ def disable(worker: Worker) -> None:
     if core.trace is not None:
         core.trace(NodeEnabled(core.now(), worker.path, False))
     settle_disabled(worker)
+    derive_scopes(core)
 
 
 def settle_disabled(worker: Worker) -> None:
@@ -97,7 +99,8 @@ def settle_disabled(worker: Worker) -> None:
 def enable(worker: Worker, then: Callable[[], None]) -> None:
     """F10: the node starts afresh; A(v) is kept."""
     core = worker.core
-    if not worker.blocked & DISABLED:
+    worker.own_enabled = True
+    if not worker.blocked & DISABLED or not all(scope.enabled for scope in worker.around):
         then()
         return
 

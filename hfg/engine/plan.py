@@ -19,7 +19,7 @@ from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode
 from hfg.ports.edges import DelayEdge, Edge, EventEdge, SyncEdge
 
-__all__ = ["build", "prepare_slot", "watch"]
+__all__ = ["build", "prepare_slot", "watch", "watch_scope"]
 
 
 def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Group) -> None:
@@ -296,15 +296,23 @@ def _mark_scopes(core: Core) -> None:
             or any(name in owner.events for name in ("activated", "deactivated", "timeout"))
         )
         if interesting:
-            scope.watched = True
-            inside = {member.index for member in scope.members}
-            scope.inner_edges = [
-                edge for edge in core.edges if edge.source.index in inside and edge.target.index in inside
-            ]
-            for member in scope.members:
-                member.scopes += (scope,)
+            watch_scope(scope)
     for worker in core.workers:
         watch(worker)
+
+
+def watch_scope(scope: Scope) -> None:
+    """Somebody cares about A(subgraph): derive it from now on (G2)."""
+    if scope.watched:
+        return
+    scope.watched = True
+    scope.find_inner_edges()
+    scope.active = scope.derive()
+    for member in scope.members:
+        member.scopes += (scope,)
+        watch(member)
+        if member.core.started:
+            rewire(member)  # no short ways
 
 
 def watch(worker: Worker) -> None:

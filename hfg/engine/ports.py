@@ -45,6 +45,8 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     port._emit_wait = partial(host.trigger_wait, event)
     host.adopt_event(port)
+    if name in AUTOMATIC_EVENTS and worker.scope is not None:
+        plan.watch_scope(worker.scope)
     if name in AUTOMATIC_EVENTS and worker.core.started:
         plan.watch(worker)
         steps.choose(worker)
@@ -88,6 +90,7 @@ def release_ports(worker: Worker) -> None:
             port.__dict__.pop("trigger", None)
             port._emit = port._refuse
             port._emit_wait = port._refuse_wait
+            port._scheduler = port._thread = None
             port._complete()
     if not worker.silent_code:
         for name in worker.type.outputs:

@@ -291,6 +291,13 @@ class Run:
             f'run.{verb} takes what graph.{kind}("name", type) gave'
         )
 
+    def _adopt(self, event: Any) -> None:
+        """Somebody has subscribed to an automatic event; asked by the event."""
+        from hfg.engine.ports import bind_event
+
+        if event.node is not self.graph:
+            bind_event(self._worker(event.node), event.name)
+
     def _hold(self) -> None:
         self._held = True
         self._engine.hold()

@@ -38,6 +38,12 @@ class Scope:
         self.watched = False
         self.gates: list[Gate] = []
 
+    def find_inner_edges(self) -> None:
+        """Note the edges with both ends inside; left until somebody asks, since most subgraphs are just boxes."""
+        inside = {member.index for member in self.members}
+        edges = self.members[0].core.edges if self.members else []
+        self.inner_edges = [edge for edge in edges if edge.source.index in inside and edge.target.index in inside]
+
     def derive(self) -> bool:
         """Whether an inner node is active or a token with +1 lies untaken inside (G2)."""
         return any(worker.active for worker in self.members) or any(

@@ -160,7 +160,9 @@ def _activity_left(worker: Worker) -> None:
 
     The right of A3 stays until the firing or call is over.
     """
-    if worker.active:
+    if worker.scope is not None:
+        worker.active = worker.node._active = False  # whoever triggered takes it from everything inside (G2)
+    elif worker.active:
         worker.right = worker.stamp is not None  # in a firing or call
         set_active(worker, False, "sent")
     derive_scopes(worker.core)
@@ -237,7 +239,6 @@ def _drain(edge: Edge, token: Token[Any]) -> None:
             core.trace(TokenDrained(core.now(), edge.label, token))
         if token.activity:
             receive(target, (token.activity,))
-            derive_scopes(core)
             _flush_idle(target)
         return
     edge.drained += 1
@@ -253,6 +254,7 @@ def _drain(edge: Edge, token: Token[Any]) -> None:
 
 def _flush_idle(worker: Worker) -> None:
     """What arose outside a firing or call leaves at once; else it follows the one under way."""
+    derive_scopes(worker.core)
     if not worker.busy:
         flush_automatic(worker)
 
@@ -306,6 +308,7 @@ def send_end(worker: Worker) -> None:
     deferred, worker.deferred = worker.deferred, None
     if deferred:
         receive(worker, deferred)
+        derive_scopes(core)
     flush_automatic(worker)
     from hfg.engine.quiet import node_ended
 

@@ -474,7 +474,9 @@ def emitter(event: RunningEvent) -> Callable[..., None]:
             worker.full_edges += 1
             block(worker, FULL)
         calls.append(edge)
-        if not target.queued:  # if it is busy or blocked its step does nothing, and it is queued again when that is over
+        if (
+            not target.queued
+        ):  # if it is busy or blocked its step does nothing, and it is queued again when that is over
             target.queued = True
             target.push(target)
 

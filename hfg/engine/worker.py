@@ -283,9 +283,9 @@ class Worker:
             yield from event.edges
 
     def timeout_leads_somewhere(self) -> bool:
-        """Whether its event `timeout` has an edge (SEMANTICS, "quiet")."""
+        """Whether its event `timeout` has an edge or a subscriber (docs/semantics.md, "quiet")."""
         event = self.events.get("timeout")
-        return event is not None and bool(event.edges)
+        return event is not None and bool(event.edges or (event.port is not None and event.port._observers))
 
     def inputs_ready(self) -> bool:
         """Whether all its inputs hold a token that nobody has taken."""

@@ -1,0 +1,236 @@
+"""The beginning and the end of a run: nodes are set up in order and torn down in reverse order (rules A10, R5, X3).
+
+Stands on `lifecycle`, `plan` and `code`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from hfg.engine import lifecycle, plan, rx, wiring
+from hfg.engine import ports as engine_ports
+from hfg.engine.activity import gate_changed
+from hfg.engine.code import answer
+from hfg.engine.core import Core
+from hfg.engine.groups import ThreadGroup
+from hfg.engine.sending import consider, discard, trigger
+from hfg.engine.watchdog import Watch, watchdog
+from hfg.engine.worker import STARTING, Worker
+from hfg.errors import HfgError, NodeError, TeardownError
+from hfg.ports.edges import DelayEdge, EventEdge
+from hfg.token import Token
+from hfg.trace import RunEnded, RunStarted
+
+if TYPE_CHECKING:
+    from hfg.engine.engine import Engine
+
+__all__ = ["Lifetime"]
+
+
+class Lifetime:
+    """Begins and ends the run of one engine."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._was_set_up: list[Worker] = []
+        self._disposables: list[Callable[[], None]] = []
+        self._watch: Watch | None = None
+
+    async def start(self) -> None:
+        """Set up all nodes, trigger `start`, then let the sources go (A10)."""
+        engine = self._engine
+        core = engine.core
+        engine.started_at = engine.now()
+        self._watch = watchdog.watch(core, engine.settings.block_warning_s)
+        if not await self._set_up_all(core):
+            return
+        if engine.settings.until_s is not None:
+            engine.loop.call_at(engine.loop.time() + engine.settings.until_s, self._until)
+        if core.trace is not None:
+            core.trace(RunStarted(engine.now()))
+        core.started = True
+        assert core.boundary is not None
+        start = core.boundary.events.get("start")
+        if start is not None:
+            trigger(start, explicit=1)
+        self._open_sources(core)
+        for source, edge, operators in core.observables:
+            self._feed(source, edge, operators)
+        engine.kick()
+
+    async def _set_up_all(self, core: Core) -> bool:
+        """Set up every node in order of adding, those inside an iteration right behind it; whether all went well."""
+        engine = self._engine
+        for worker in core.workers:
+            if worker.type is not None and (
+                worker.is_async or any(spec.is_async for spec in worker.type.slots.values())
+            ):
+                worker.carrier = engine.code.carrier(worker)
+        for edge in core.edges:
+            if isinstance(edge, DelayEdge | EventEdge):
+                edge.queue.extend(Token(value, 0, engine.now(), 0) for value in edge.initial)
+        for worker in core.workers:
+            if worker.scope is None:
+                await self._set_up_one(worker)
+            if engine.ended_how is not None:
+                return False
+            if worker.iteration is not None:
+                if not await self._set_up_all(worker.iteration.core):
+                    return False
+                worker.iteration.core.started = True
+        for worker in core.workers:
+            engine_ports.bind_automatic(worker)
+            plan.watch(worker)
+            if worker.watched:
+                engine_ports.bind(worker)
+            wiring.rewire(worker)
+        for edge, operators in core.piped:
+            self._disposables.append(rx.pipe_edge(edge, operators, engine.scheduler))
+        return True
+
+    def _open_sources(self, core: Core) -> None:
+        """Sources may fire from now on, as far as their gates allow."""
+        for worker in core.workers:
+            if worker.gates_over and worker.is_source:
+                gate_changed(worker.gates_over)
+            worker.blocked &= ~STARTING
+            consider(worker)
+            if worker.iteration is not None:
+                self._open_sources(worker.iteration.core)
+
+    async def _set_up_one(self, worker: Worker) -> None:
+        engine = self._engine
+        waiter: asyncio.Future[HfgError | None] = engine.loop.create_future()
+        self._was_set_up.append(worker)
+        lifecycle.set_up(worker, partial(answer, waiter))
+        error = waiter.result() if waiter.done() else await waiter
+        if error is not None:
+            engine.finish("failed", error)
+
+    def _feed(self, source: Any, edge: Any, operators: tuple[Any, ...]) -> None:
+        """An outside observable holds the run open until it completes (R5)."""
+        engine = self._engine
+        engine.hold()
+        open_ = [True]
+
+        def over(error: BaseException | None) -> None:
+            if open_[0]:
+                open_[0] = False
+                if error is not None:
+                    problem = NodeError(edge.target.path, f'the observable that feeds "{edge.label}"', error)
+                    problem.__cause__ = error
+                    engine.finish("failed", problem)
+                engine.unhold()
+
+        self._disposables.append(
+            rx.feed_from_observable(source, edge, operators, engine.scheduler, engine.from_any_thread, over)
+        )
+
+    def _until(self) -> None:
+        engine = self._engine
+        engine.finish("until", None)
+
+    async def close(self) -> tuple[str, HfgError | None]:
+        """Tear everything down, in reverse order of setup, each within its time limit (X3).
+
+        Gives back how the run ended.
+        """
+        engine = self._engine
+        if engine.ended_how is None:
+            engine.finish("cancelled", None)
+        assert engine.ended_how is not None
+        core = engine.core
+        outcome, error = engine.ended_how
+        for dispose in self._disposables:
+            dispose()
+        await self._cancel_code()
+        problems: list[NodeError] = []
+        for worker in reversed(self._was_set_up):
+            problem = await self._tear_down_one(worker)
+            if problem is not None:
+                problems.append(problem)
+        for worker in engine.all_workers():
+            engine_ports.release_ports(worker)
+            for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
+                if timer is not None:
+                    timer.cancel()
+        for edge in core.edges:
+            if edge.untaken and error is None and outcome in ("stopped", "until", "cancelled"):
+                discard(edge, "stopped")
+        await self._end_threads()
+        carriers = [worker.carrier for worker in engine.all_workers() if worker.carrier is not None] + list(
+            engine.code.given_up
+        )
+        for carrier in carriers:
+            carrier.cancel()
+        if carriers:
+            await asyncio.wait([carrier.task for carrier in carriers], timeout=engine.teardown_limit_s)
+        if self._watch is not None:
+            watchdog.forget(self._watch)
+        core.errors.extend(problems)
+        if problems and error is None:
+            error, outcome = TeardownError(problems), "failed"
+        engine.ended_how = (outcome, error)
+        if core.trace is not None:
+            core.trace(RunEnded(engine.now(), outcome))
+        return outcome, error
+
+    async def _cancel_code(self) -> None:
+        """Cancel what still waits; threads get their time to come back."""
+        engine = self._engine
+        carriers = []
+        for worker in engine.all_workers():
+            if worker.in_flight and worker.carrier is not None:
+                worker.ticket += 1
+                worker.carrier.cancel()
+                carriers.append(worker)
+        for task in engine.code.aside:
+            task.cancel()
+        limit = engine.teardown_limit_s
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(limit):
+                while any(worker.in_flight for worker in carriers):
+                    engine.code.came_back.clear()
+                    await engine.code.came_back.wait()
+        for worker in carriers:
+            if worker.in_flight:
+                problem = NodeError(
+                    worker.path, f"firing {worker.firings}", f"it was cancelled and did not end within {limit:g} s"
+                )
+                engine.core.errors.append(problem)
+                worker.carrier = None
+
+    async def _tear_down_one(self, worker: Worker) -> NodeError | None:
+        engine = self._engine
+        if worker.node is None or worker.in_flight:
+            return None
+        if worker.generator is None and worker.node._hook("teardown") is None:
+            return None
+        waiter: asyncio.Future[NodeError | None] = engine.loop.create_future()
+        lifecycle.tear_down(worker, partial(answer, waiter))
+        if waiter.done():
+            return waiter.result()
+        limit = engine.teardown_limit_s
+        try:
+            return await asyncio.wait_for(waiter, limit)
+        except TimeoutError:
+            return NodeError(worker.path, "teardown()", f"it took longer than {limit:g} s and was given up")
+
+    async def _end_threads(self) -> None:
+        engine = self._engine
+        groups = [group for group in engine.groups.values() if isinstance(group, ThreadGroup)]
+        threads = [(group.name, thread) for group in groups if (thread := group.stop()) is not None]
+        until = time.monotonic() + engine.teardown_limit_s
+        for name, thread in threads:
+            while thread.is_alive() and time.monotonic() < until:
+                await asyncio.sleep(0)
+                thread.join(0.001)
+            if thread.is_alive():
+                engine.leftover_threads.append(f'thread of group "{name}"')
+        for group in groups:
+            engine.leftover_threads.extend(what for what, thread in group.abandoned if thread.is_alive())
