@@ -2,13 +2,17 @@
 
 Which module stands on which; imports go down only:
 
-    run       the face: run, run_async, running
-    outside   feeds, readers, signals          engine    pump, timers, coroutines, threads
-    plan  ports  iteration  rx  carrier  virtual  watchdog  report
-    steps     short ways for common shapes     quiet     growing, ending, stalling
-    firing    what a node does next            lifecycle, errors, activity, subgraphs, builtin_slots
-    sending   what leaves a node               wiring    which edges are live
-    core  worker  scopes  groups               the state of a run
+    run         the face: run, run_async, running
+    outside     feeds, readers, signals        engine      the loop, time, quiet, the trace
+    lifetime    beginning and ending           code        coroutines and threads
+    upstairs    ties the deciding modules together
+    iteration   plan  ports  rx                carrier  virtual  watchdog  report
+    steps       short ways for common shapes   quiet       growing, ending, stalling
+    errors      what a failure brings          activity    what a change of A(v) brings
+    firing      what a node does next          builtin_slots  subgraphs  lifecycle
+    wiring      which edges are live
+    sending     what leaves a node
+    core  worker  scopes  groups  settings     the state of a run
 """
 
 from hfg.engine.report import EdgeReport, NodeReport, Report

@@ -38,9 +38,7 @@ def _call_hook(worker: Worker, name: str) -> None:
 
     def done(_result: Any, error: BaseException | None) -> None:
         if error is not None:
-            from hfg.engine.errors import fail
-
-            fail(worker, f"{name}()", error, answer=False)
+            worker.core.upstairs.fail(worker, f"{name}()", error, answer=False)
 
     worker.core.host.execute_aside(worker, hook, done)
 

@@ -16,7 +16,7 @@ from hfg.errors import HfgError
 from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
 from hfg.trace import TraceEvent
 
-__all__ = ["PENDING", "Core", "Host", "Timer"]
+__all__ = ["PENDING", "Core", "Host", "Timer", "Upstairs"]
 
 
 class _Pending:
@@ -85,6 +85,37 @@ class Host(Protocol):
         """End the run; only the first call counts."""
 
 
+class Upstairs(Protocol):
+    """What modules further up do when those below come to it, so that imports go down only."""
+
+    def fail(self, worker: Worker, what: str, error: BaseException, *, answer: bool) -> None:
+        """X1: a firing (`answer`: it still owes its outputs) or something beside one has failed."""
+
+    def fail_call(self, worker: Worker, slot: str, error: BaseException) -> None:
+        """X1: a slot call has failed."""
+
+    def operator_failed(self, edge: EventEdge, error: BaseException) -> None:
+        """An operator on an edge raised."""
+
+    def node_ended(self, worker: Worker) -> None:
+        """A node has sent END (P9, R5)."""
+
+    def activity_changed(self, worker: Worker, active: bool) -> None:
+        """A(v) of a watched node has changed (A9, A11, A12, G2)."""
+
+    def scopes_changed(self, core: Core) -> None:
+        """What subgraphs derive their activity from has changed (G2)."""
+
+    def choose_step(self, worker: Worker) -> None:
+        """The wiring of a worker has changed: its shortest way may be another."""
+
+    def bind_ports(self, worker: Worker) -> None:
+        """A node is about to be set up: its ports lead into the run."""
+
+    def iteration(self, worker: Worker, flat: Any, groups: Any, loop: Any) -> Any:
+        """Make the inside of a subgraph that iterates (G4)."""
+
+
 class Core:
     """One run.
 
@@ -96,8 +127,9 @@ class Core:
       current: the worker whose code runs on the loop, for the watchdog.
     """
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: Host, upstairs: Upstairs) -> None:
         self.host = host
+        self.upstairs = upstairs
         self.now = host.now
         self.workers: list[Worker] = []
         self.edges: list[SyncEdge | DelayEdge | EventEdge] = []

@@ -22,6 +22,7 @@ from hfg.engine.core import Core
 from hfg.engine.groups import Fifo, Group, LoopGroup, ThreadGroup, make_policy
 from hfg.engine.lifetime import Lifetime
 from hfg.engine.settings import Settings
+from hfg.engine.upstairs import Deciders
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import TORN_DOWN, Worker
 from hfg.errors import EngineInternalError, HfgError, RunError
@@ -88,7 +89,7 @@ class Engine:
         self._epoch = 0.0 if self.virtual else time.time() - self.loop.time()
         self.context = contextvars.copy_context()
         self.context.run(current_clock.set, self.now)
-        self.core: Core = Core(self)
+        self.core: Core = Core(self, Deciders())
         self._consumers: list[Callable[[TraceEvent], None]] = []
         self.core.debug = settings.debug
         self.core.fast = settings.fast

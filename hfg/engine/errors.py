@@ -8,11 +8,12 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.engine import firing, lifecycle
-from hfg.engine.sending import automatic, block, put_outputs, report_error, unblock
+from hfg.engine.sending import automatic, block, flush_automatic, put_outputs, report_error, unblock
 from hfg.engine.worker import BACKOFF, TORN_DOWN, Worker
 from hfg.errors import EndOfStream, FiringTimeout, HfgError, NodeError, QueueLimit
+from hfg.ports.edges import EventEdge
 
-__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "time_out"]
+__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "operator_failed", "time_out"]
 
 
 def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
@@ -66,8 +67,6 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any 
     elif then is not None:
         then()
     elif not worker.busy:
-        from hfg.engine.sending import flush_automatic
-
         flush_automatic(worker)
     if policy == "disable":
         lifecycle.disable(worker)
@@ -102,3 +101,11 @@ def time_out(worker: Worker) -> None:
     problem = FiringTimeout(worker.path, what, f"it took longer than max_duration_s = {limit:g} s and was given up")
     worker.failed += 1
     apply_policy(worker, problem, answer=True)
+
+
+def operator_failed(edge: EventEdge, error: BaseException) -> None:
+    """An operator on the edge raised: the consumer's `on_error` decides (ARCHITECTURE §3)."""
+    target: Worker = edge.target
+    problem = NodeError(target.path, f'an operator on edge "{edge.label}"', error)
+    problem.__cause__ = error
+    apply_policy(target, problem, answer=False)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hfg.activity.rules import after_receipt
-from hfg.engine import builtin_slots, errors
+from hfg.engine import builtin_slots
 from hfg.engine.sending import (
     automatic,
     consider,
@@ -24,6 +24,7 @@ from hfg.engine.sending import (
     send_end,
     touch,
 )
+from hfg.engine.wiring import rewire
 from hfg.engine.worker import CALLS_BLOCKED, ENDED, UNREADY, Worker
 from hfg.errors import EndOfStream, UsageError
 from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
@@ -34,6 +35,7 @@ from hfg.trace import (
     FiringEnded,
     FiringStarted,
     ParameterSet,
+    TokenDrained,
     TokenDropped,
     TokenTaken,
 )
@@ -80,7 +82,7 @@ def _ask_ready(worker: Worker) -> None:
     def answered(ready: Any, error: BaseException | None) -> None:
         worker.busy = ""
         if error is not None:
-            errors.fail(worker, "ready()", error, answer=False)
+            worker.core.upstairs.fail(worker, "ready()", error, answer=False)
             idle_again(worker, asked=True)
         elif ready and worker.placed:
             fire(worker)
@@ -134,7 +136,7 @@ def fire(worker: Worker) -> None:
         if type(edge) is EventEdge:
             freed(edge)
             if not edge.live and not edge.queue:
-                _rewire(worker)
+                rewire(worker)
         elif type(edge) is DelayEdge and edge.held and len(edge.queue) <= edge.delay:
             release((edge,))
     if modifiers:
@@ -155,12 +157,6 @@ def fire(worker: Worker) -> None:
             worker.next_start = now + 1.0 / options.max_rate_hz
         worker.gate_next = now
         _run_process(worker, edges, tokens)
-
-
-def _rewire(worker: Worker) -> None:
-    from hfg.engine.wiring import rewire
-
-    rewire(worker)
 
 
 def _take(edge: Any) -> Token[Any]:
@@ -201,7 +197,7 @@ def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]], mo
     if end or (any(token.value is END for token in tokens) and _all_ended(worker)):
         return "end"
     if any(edge.ended for edge in edges):
-        _rewire(worker)
+        rewire(worker)
     if silent or (edges and not has_mandatory and not has_value):
         return "silent"
     if not worker.is_source:
@@ -241,7 +237,7 @@ def set_parameter(worker: Worker, name: str, value: Any) -> None:
     try:
         worker.node._set_parameter(name, value)
     except Exception as error:
-        errors.fail(worker, f"parameter {name}", error, answer=False)
+        worker.core.upstairs.fail(worker, f"parameter {name}", error, answer=False)
         return
     if worker.core.trace is not None:
         worker.core.trace(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))
@@ -278,7 +274,7 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
         elif worker.is_source and isinstance(error, (StopIteration, StopAsyncIteration, EndOfStream)):
             source_ended(worker)
         else:
-            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+            worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
 
     worker.core.host.execute(worker, call, arguments, done)
 
@@ -288,7 +284,7 @@ def complete_firing(worker: Worker, result: Any) -> None:
     try:
         written = merge(worker, result)
     except Exception as error:
-        errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+        worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
         return
     put_outputs(worker, written)
     if "processed" in worker.events:
@@ -435,8 +431,6 @@ def _end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> 
 
 def drain_left(edge: Any) -> None:
     """F12: what still lies on an input of an ended node is processed without a firing."""
-    from hfg.trace import TokenDrained
-
     if type(edge) is EventEdge and edge.target_kind == "parameter":
         return
     worker: Worker = edge.target
@@ -458,7 +452,7 @@ def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     worker.busy = "firing"
     if error is not None:
         worker.written = None
-        errors.fail(worker, "end()", error, answer=False)
+        worker.core.upstairs.fail(worker, "end()", error, answer=False)
     written = worker.written
     worker.written = None
     wrote = written is not None and any(entry is not None for entry in written)
@@ -528,7 +522,7 @@ def call(worker: Worker) -> None:
         if error is None:
             finish_call(worker, "done")
         else:
-            errors.fail_call(worker, name, error)
+            worker.core.upstairs.fail_call(worker, name, error)
 
     core.host.execute(worker, handler, (token,), done)
 
@@ -540,7 +534,7 @@ def await_call(worker: Worker, name: str, coroutine: Any) -> None:
         if error is None:
             finish_call(worker, "done")
         else:
-            errors.fail_call(worker, name, error)
+            worker.core.upstairs.fail_call(worker, name, error)
 
     worker.core.host.drive(worker, coroutine, done)
 

@@ -13,8 +13,7 @@ from typing import Any
 
 from hfg.engine import errors, firing, plan, quiet
 from hfg.engine.core import Core, Timer
-from hfg.engine.outside import take
-from hfg.engine.sending import put_outputs
+from hfg.engine.sending import put_outputs, take_from_reader
 from hfg.engine.worker import Worker
 from hfg.graph.flat import FlatGraph
 from hfg.token import NO_MESSAGE, Marker
@@ -74,7 +73,7 @@ class Iteration:
         self.worker = worker
         outer = worker.core
         host: Any = _InnerHost(outer.host, self)
-        self.core = Core(host)
+        self.core = Core(host, outer.upstairs)
         self.core.pumping = True  # whatever is queued inside kicks the pump by itself
         self.core.debug = outer.debug
         self.core.fast = False
@@ -172,7 +171,7 @@ class Iteration:
         for reader in core.readers:
             position = list(self.worker.type.outputs).index(reader.port_name)
             while reader.live_inputs and not reader.inputs.missing:
-                token = take(reader)
+                token = take_from_reader(reader)
                 came_out = True
                 if type(token.value) is not Marker:
                     self._results[position].append(token.value)

@@ -44,7 +44,7 @@ def set_up(worker: Worker, then: Then) -> None:
         return
     worker.node._reset_states()
     worker.generator = None
-    wiring.bind_ports(worker)
+    worker.core.upstairs.bind_ports(worker)
     _run_hook(worker, "setup", then)
 
 

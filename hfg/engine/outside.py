@@ -15,14 +15,14 @@ from typing import Any
 
 from hfg.engine.code import answer
 from hfg.engine.engine import Engine
-from hfg.engine.sending import enqueue, put_outputs, release
+from hfg.engine.plan import prepare_slot
+from hfg.engine.sending import enqueue, put_outputs, take_from_reader
 from hfg.engine.worker import ENDED, Worker
 from hfg.errors import NotRunning, UsageError
-from hfg.ports.edges import EventEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.types import accepts, describe
 
-__all__ = ["Feed", "collect", "read", "signal", "take", "until"]
+__all__ = ["Feed", "collect", "read", "signal", "until"]
 
 
 class Feed:
@@ -145,26 +145,6 @@ def _check_running(engine: Engine) -> None:
         raise NotRunning("the run is over: nothing can be brought into it any more")
 
 
-def take(worker: Worker) -> Token[Any]:
-    """Take the token that lies before a reader; its place is free at once."""
-    edge = worker.live_inputs[0]
-    token: Token[Any]
-    if isinstance(edge, EventEdge):
-        from hfg.engine.sending import freed
-
-        token = edge.queue.popleft()
-        if not edge.queue:
-            worker.inputs.missing += 1
-        freed(edge)
-    else:
-        token = edge.token
-        edge.token = None
-        worker.inputs.missing += 1
-        release((edge,))
-    worker.placed = False
-    return token
-
-
 async def read(engine: Engine, worker: Worker) -> AsyncIterator[Any]:
     """Give out the values of a graph output, with back-pressure, until END or the end of the run (P10)."""
     if not worker.live_inputs:
@@ -176,7 +156,7 @@ async def read(engine: Engine, worker: Worker) -> AsyncIterator[Any]:
                 if engine.core.over or worker in engine.read_out:
                     return
                 await until(engine, worker.inputs.when_complete)
-            token = take(worker)
+            token = take_from_reader(worker)
             engine.kick()
             if token.value is END:
                 engine.read_out.add(worker)
@@ -195,7 +175,7 @@ def collect(engine: Engine, worker: Worker, values: list[Any]) -> None:
     def step(_worker: Worker) -> None:
         worker.queued = worker.placed = False
         while worker.live_inputs and not worker.inputs.missing:
-            token = take(worker)
+            token = take_from_reader(worker)
             if type(token.value) is not Marker:
                 values.append(token.value)
         engine.kick()
@@ -218,8 +198,6 @@ async def signal(
 
     The signal takes its place behind all that wait already.
     """
-    from hfg.engine.plan import prepare_slot
-
     _check_running(engine)
     edge = worker.core.outside.get((worker.index, slot))
     if edge is None:

@@ -146,9 +146,7 @@ def _worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) -> Wor
         worker.ready_hook = node._hook("ready")
         worker.has_hooks = node._hook("on_activated") is not None or node._hook("on_deactivated") is not None
     if flat_node.iteration is not None:
-        from hfg.engine.iteration import Iteration
-
-        worker.iteration = Iteration(worker, flat_node.iteration, groups, groups["loop"])
+        worker.iteration = core.upstairs.iteration(worker, flat_node.iteration, groups, groups["loop"])
         worker.process = worker.iteration.begin
         worker.is_source = False
         worker.blocked &= ~STARTING

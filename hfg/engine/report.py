@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 
 from hfg.engine.core import Core
+from hfg.engine.worker import ENDED
 
 __all__ = ["EdgeReport", "NodeReport", "Report", "edge_reports", "node_reports"]
 
@@ -80,8 +81,6 @@ class Report(msgspec.Struct, frozen=True):
 
 def node_reports(core: Core) -> dict[str, NodeReport]:
     """Count what every running node has done so far."""
-    from hfg.engine.worker import ENDED
-
     return {
         worker.path: NodeReport(
             firings=worker.firings,

@@ -21,7 +21,8 @@ from reactivex.scheduler.periodicscheduler import PeriodicScheduler
 from reactivex.subject import Subject
 
 from hfg.engine.core import Host
-from hfg.engine.sending import enqueue, operator_failed
+from hfg.engine.errors import operator_failed
+from hfg.engine.sending import enqueue
 from hfg.ports.edges import EventEdge
 from hfg.token import Token
 

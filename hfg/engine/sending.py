@@ -6,11 +6,12 @@ activity. Stands on `worker`, `core`.
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from hfg.activity.rules import leaving
+from hfg.activity.rules import after_receipt, leaving
 from hfg.engine.worker import CALLS_BLOCKED, ENDED, FULL, RATE, RunningEvent, Worker
-from hfg.errors import EngineInternalError, NodeError, QueueOverflow
+from hfg.errors import EngineInternalError, QueueOverflow
 from hfg.ports.edges import Edge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import (
@@ -43,7 +44,6 @@ __all__ = [
     "flush_automatic",
     "freed",
     "give_back",
-    "operator_failed",
     "outputs_free",
     "put",
     "put_outputs",
@@ -53,6 +53,7 @@ __all__ = [
     "report_error",
     "send_end",
     "set_active",
+    "take_from_reader",
     "touch",
     "trigger",
     "unblock",
@@ -222,8 +223,6 @@ def arrived(target: Worker) -> None:
 def add_call(target: Worker, edge: Edge) -> None:
     """The newest token on the edge waits for a slot call (F9)."""
     if target.calls is None:
-        from collections import deque
-
         target.calls = deque()
     target.calls.append(edge)
     if not target.blocked & CALLS_BLOCKED:
@@ -310,9 +309,25 @@ def send_end(worker: Worker) -> None:
         receive(worker, deferred)
         derive_scopes(core)
     flush_automatic(worker)
-    from hfg.engine.quiet import node_ended
+    core.upstairs.node_ended(worker)
 
-    node_ended(worker)
+
+def take_from_reader(worker: Worker) -> Token[Any]:
+    """Take the token that lies before a reader; its place is free at once."""
+    edge = worker.live_inputs[0]
+    token: Token[Any]
+    if isinstance(edge, EventEdge):
+        token = edge.queue.popleft()
+        if not edge.queue:
+            worker.inputs.missing += 1
+        freed(edge)
+    else:
+        token = edge.token
+        edge.token = None
+        worker.inputs.missing += 1
+        release((edge,))
+    worker.placed = False
+    return token
 
 
 # --- events ---------------------------------------------------------------------------------------------------------
@@ -380,17 +395,7 @@ def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
     try:
         edge.pipeline(token)
     except Exception as error:
-        operator_failed(edge, error)
-
-
-def operator_failed(edge: EventEdge, error: BaseException) -> None:
-    """An operator on the edge raised: the consumer's `on_error` decides (ARCHITECTURE §3)."""
-    from hfg.engine.errors import apply_policy
-
-    target: Worker = edge.target
-    problem = NodeError(target.path, f'an operator on edge "{edge.label}"', error)
-    problem.__cause__ = error
-    apply_policy(target, problem, answer=False)
+        edge.target.core.upstairs.operator_failed(edge, error)
 
 
 def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
@@ -460,8 +465,6 @@ def freed(edge: EventEdge) -> None:
 
 def receive(worker: Worker, modifiers: Sequence[int]) -> None:
     """A6: only the net change counts."""
-    from hfg.activity.rules import after_receipt
-
     active = after_receipt(worker.active, modifiers)
     if active != worker.active:
         set_active(worker, active, "token")
@@ -480,9 +483,7 @@ def set_active(worker: Worker, active: bool, cause: Any) -> None:
         core.trace(ActivityChanged(core.now(), worker.path, active, cause))
     if not worker.watched:
         return
-    from hfg.engine.activity import changed
-
-    changed(worker, active)
+    core.upstairs.activity_changed(worker, active)
 
 
 def touch(core: Core, scopes: Sequence[Scope]) -> None:
@@ -495,9 +496,7 @@ def touch(core: Core, scopes: Sequence[Scope]) -> None:
 def derive_scopes(core: Core) -> None:
     """After a step that may have moved activity: derive A(subgraph) anew where it is watched (G2)."""
     if core.dirty_scopes:
-        from hfg.engine.activity import scopes_changed
-
-        scopes_changed(core)
+        core.upstairs.scopes_changed(core)
 
 
 def flush_automatic(worker: Worker) -> None:

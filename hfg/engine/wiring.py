@@ -9,10 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.engine.scopes import Scope
-from hfg.engine.worker import DISABLED, UNWIRED, RunningEvent, Worker
+from hfg.engine.sending import consider
+from hfg.engine.worker import DISABLED, UNWIRED, Worker
 from hfg.ports.edges import EventEdge
 
-__all__ = ["bind_ports", "is_live", "refresh", "refresh_via", "rewire"]
+__all__ = ["is_live", "refresh", "refresh_via", "rewire"]
 
 
 def is_live(edge: Any) -> bool:
@@ -50,9 +51,6 @@ def refresh_via(scope: Scope) -> None:
 
 def rewire(worker: Worker) -> None:
     """Derive what a worker waits for and sends on from the liveness of its edges; its step is chosen anew."""
-    from hfg.engine import steps
-    from hfg.engine.sending import consider
-
     worker.out_edges = tuple(tuple(edge for edge in edges if edge.live) for edges in worker.wired_out)
     live = []
     for edge in worker.in_edges:
@@ -82,16 +80,6 @@ def rewire(worker: Worker) -> None:
         worker.placed = False
     if missing:
         worker.placed = False
-    steps.choose(worker)
+    worker.core.upstairs.choose_step(worker)
     if worker.core.started:
         consider(worker)
-
-
-def bind_ports(worker: Worker) -> None:
-    """Let the node's ports lead into this run."""
-    from hfg.engine.ports import bind
-
-    bind(worker)
-
-
-_ = RunningEvent

@@ -1,0 +1,22 @@
+"""Ties the deciding modules together: what those below ask of those above. Stands on all, decides nothing."""
+
+from __future__ import annotations
+
+from hfg.engine import activity, errors, ports, quiet, steps
+from hfg.engine.iteration import Iteration
+
+__all__ = ["Deciders"]
+
+
+class Deciders:
+    """See `core.Upstairs`."""
+
+    fail = staticmethod(errors.fail)
+    fail_call = staticmethod(errors.fail_call)
+    operator_failed = staticmethod(errors.operator_failed)
+    node_ended = staticmethod(quiet.node_ended)
+    activity_changed = staticmethod(activity.changed)
+    scopes_changed = staticmethod(activity.scopes_changed)
+    choose_step = staticmethod(steps.choose)
+    bind_ports = staticmethod(ports.bind)
+    iteration = staticmethod(Iteration)
