@@ -6,7 +6,7 @@
     |        the end
     !        a signal without a value
     + ~      a signal without a value that carries +1 or -1
-    (3+4)    several in one tick; after + or ~ the next value carries +1 or -1
+    (3+4)    several in one tick; after + or ~ the next value carries +1 or -1, and +! is a signal that does
 
 Spaces are left out, so lines can be put below each other. `run` drives a node with such lines in virtual time and gives
 back such lines:
@@ -26,6 +26,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Final
 
 import hfg
@@ -116,7 +117,7 @@ def draw(steps: list[Step], values: Mapping[str, Any] | None = None) -> str:
     line = ""
     for tick in range(max(ticks, default=-1) + 1):
         found = ticks.get(tick, ["-"])
-        text = "".join(found)
+        text = "".join(one + "!" if one in "+~" and later[0] not in "+~" else one for one, later in pairwise([*found, "+"]))
         line += text if len(text) == 1 else f"({text})"
     return line
 

@@ -216,7 +216,7 @@ class _Making:
         candidates = self.outputs(before)
         if allowed.events and choose.chance(30):
             candidates = self.events(before) or candidates
-        if allowed.cycles and choose.chance(12):
+        if allowed.cycles and self._has_other_input(target) and choose.chance(30):
             candidates = self.outputs(self.nodes[index:])
             if allowed.events and choose.chance(30):
                 candidates = self.events(self.nodes[index:]) or candidates
@@ -227,6 +227,13 @@ class _Making:
             return
         if candidates:
             self._edge(choose.one_of(candidates), target)
+
+    def _has_other_input(self, target: End) -> bool:
+        """Whether something else than a ring feeds the node, so that the ring ends."""
+        return any(
+            edge.target[0] == target[0] and edge.target[1] == "input" and "initial" not in edge.options
+            for edge in self.edges
+        )
 
     def _make_slot_edges(self) -> None:
         choose, allowed = self.choose, self.allowed

@@ -41,13 +41,17 @@ class _DrawingChooser:
 
 
 @st.composite
-def graphs(draw: st.DrawFn, allowed: Allowed | None = None) -> GraphPlan:
+def _plans(draw: st.DrawFn, allowed: Allowed | None) -> GraphPlan:
+    return make_plan(_DrawingChooser(draw), allowed)
+
+
+def graphs(allowed: Allowed | None = None) -> st.SearchStrategy[GraphPlan]:
     """Give plans of graphs: call one to build its graph, afresh each time.
 
     Args:
       allowed: what may occur; `SYNCHRONOUS` is what rule F7 speaks of.
     """
-    return make_plan(_DrawingChooser(draw), allowed)
+    return _plans(allowed)
 
 
 def tokens(values: st.SearchStrategy[Any] | None = None, *, markers: bool = True) -> st.SearchStrategy[Token[Any]]:
