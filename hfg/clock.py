@@ -1,7 +1,7 @@
 """What time it is for a graph: seconds on the run's clock.
 
-`now()` is the clock of the run that the caller's code belongs to, real or virtual; outside a run it is the loop's, if that is in virtual time, else
-the real clock. Stands on nothing; the engine brings the clocks (rule R6).
+`now()` is the clock of the run that the caller's code belongs to, real or virtual; outside a run it is the loop's,
+if that is in virtual time, else the real clock. Stands on nothing; the engine brings the clocks (rule R6).
 """
 
 from __future__ import annotations

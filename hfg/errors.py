@@ -19,8 +19,8 @@
     ├── EndOfStream           raised *by* a source to say that it has ended (rule F2)
     └── EngineInternalError   a fault of hfg, never of the user
 
-A class exists when somebody would catch it apart from its neighbours. Each message names the path in the graph, what was expected, what was found, and
-what to do. Stands on nothing.
+A class exists when somebody would catch it apart from its neighbours. Each message names the path in the graph, what
+was expected, what was found, and what to do. Stands on nothing.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class QueueOverflow(HfgError):
     """A trigger found a full queue with policy `error`; nothing of it was sent."""
 
 
-class EndOfStream(HfgError):  # noqa: N818 - a signal, not a fault
+class EndOfStream(HfgError):
     """Raise it in a source to say that nothing more will come."""
 
 

@@ -1,8 +1,9 @@
 """The events of a run: everything observable, as typed values (rule R7).
 
-One stream for recorders, taps, statistics, monitors and the studio. Every event has `time`, in seconds on the run's clock. Nodes are named by their path
-("fetch/go_to"; the graph's own boundary is ""), ports by "path.port", edges by "source -> target" as the plan names them after subgraphs are dissolved.
-Stands on `token`; knows nobody who emits or listens.
+One stream for recorders, taps, statistics, monitors and the studio. Every event has `time`, in seconds on the run's
+clock. Nodes are named by their path ("fetch/go_to"; the graph's own boundary is ""), ports by "path.port", edges by
+"source -> target" as the plan names them after subgraphs are dissolved. Stands on `token`; knows nobody who emits or
+listens.
 """
 
 from __future__ import annotations
@@ -114,7 +115,10 @@ class TokenProcessed(TraceEvent, frozen=True):
 
 
 class TokenDropped(TraceEvent, frozen=True):
-    """A token was discarded and counted: "overflow" (P5), "disabled" (F10), "ended" (F4), "removed" (R4), "stopped" (left when the run ended)."""
+    """A token was discarded and counted: "overflow" (P5), "disabled" (F10), "ended" (F4), "removed" (R4).
+
+    "stopped" (left when the run ended).
+    """
 
     edge: str
     token: Token[Any]
