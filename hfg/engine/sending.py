@@ -24,6 +24,7 @@ from hfg.trace import (
     TokenDropped,
     TokenProcessed,
     TokenSent,
+    TokenTaken,
 )
 
 if TYPE_CHECKING:
@@ -316,17 +317,21 @@ def take_from_reader(worker: Worker) -> Token[Any]:
     """Take the token that lies before a reader; its place is free at once."""
     edge = worker.live_inputs[0]
     token: Token[Any]
-    if isinstance(edge, EventEdge):
-        token = edge.queue.popleft()
-        if not edge.queue:
-            worker.inputs.missing += 1
-        freed(edge)
-    else:
-        token = edge.token
+    if isinstance(edge, SyncEdge):
+        token = edge.token  # type: ignore[assignment]  # the caller has seen that one lies there
         edge.token = None
+    else:
+        token = edge.queue.popleft()
+    if not edge.untaken:
         worker.inputs.missing += 1
-        release((edge,))
     worker.placed = False
+    core = worker.core
+    if core.trace is not None:
+        core.trace(TokenTaken(core.now(), edge.label, token))
+    if isinstance(edge, EventEdge):
+        freed(edge)
+    elif isinstance(edge, SyncEdge) or (edge.held and len(edge.queue) <= edge.delay):
+        release((edge,))
     return token
 
 
