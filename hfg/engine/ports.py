@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from hfg.engine import firing, plan, steps
+from hfg.engine import firing, plan, relays, steps
 from hfg.engine.sending import trigger
 from hfg.engine.worker import RunningEvent, Worker
 from hfg.ports.automatic import AUTOMATIC_EVENTS
@@ -33,10 +33,17 @@ def bind(worker: Worker) -> None:
 def bind_event(worker: Worker, name: str) -> RunningEvent:
     """Make the running event of a declared or automatic event, and let the port trigger it."""
     event = worker.events.get(name)
+    relayed = worker.scope is not None and name not in AUTOMATIC_EVENTS
     if event is None:
         event = worker.events[name] = RunningEvent(worker, name, None)
+        if relayed:
+            for inner in relays.events_behind(worker.node.ports.events[name]):
+                inner.subscribe(worker.node.ports.events[name]._notify)
     port = event.port = worker.node.ports.events[name]
     host: Any = worker.core.host
+    if relayed:
+        host.adopt_event(port)
+        return event
     if worker.group.threaded:
         port._emit = partial(_from_thread, worker, event)
     else:
@@ -62,7 +69,9 @@ def bind_automatic(worker: Worker) -> None:
     if worker.node is None:
         return
     made = [
-        port for port in worker.node.__dict__.values() if isinstance(port, EventPort) and port.name in AUTOMATIC_EVENTS
+        port
+        for port in worker.node.__dict__.values()
+        if isinstance(port, EventPort) and (port.name in AUTOMATIC_EVENTS or worker.scope is not None)
     ]
     for port in made:
         if port.name in worker.events or port._observers:

@@ -14,7 +14,7 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Literal
 
-from hfg.engine import outside
+from hfg.engine import outside, relays
 from hfg.engine.code import answer
 from hfg.engine.engine import Engine
 from hfg.engine.report import Report, edge_reports, node_reports
@@ -57,6 +57,9 @@ class Run:
           activity: the modifier; into a slot it acts as over an active edge.
           stamp: seconds on the run's clock; now, if not given.
         """
+        if relays.is_relay(port):
+            await self._trigger_inside(port, value, activity, stamp)
+            return
         if port.kind == "slot":
             worker = self._worker(port.node)
             await outside.signal(self._engine, worker, port.name, value, activity, stamp)
@@ -70,6 +73,17 @@ class Run:
 
         event = bind_event(self._worker(port.node), port.name)
         await self._engine.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
+
+    async def _trigger_inside(self, port: Any, value: Any, activity: int | None, stamp: float | None) -> None:
+        """The slot of a subgraph stands for those inside that it leads to (G1)."""
+        behind = relays.slots_behind(port) if port.kind == "slot" else []
+        if not behind or any(slot.kind != "slot" for slot, _ in behind):
+            raise UsageError(
+                f'"{port.path}" is the {port.kind} of a subgraph and leads to no slot inside: name the port of a node'
+            )
+        for slot, active in behind:
+            explicit = activity if active else 0
+            await outside.signal(self._engine, self._worker(slot.node), slot.name, value, explicit, stamp)
 
     def feed(self, port: Any, *, end: bool = True) -> outside.Feed:
         """Open a feed into a graph input; use it with `async with`.
@@ -98,18 +112,19 @@ class Run:
         )
 
     async def tap(self, port: Any, *, size: int = 100) -> AsyncIterator[Token[Any]]:
-        """Look at an output, event or input: tokens as they are sent.
+        """Look at a port or an edge: tokens as they are sent.
 
         The oldest of more than `size` that were not looked at are skipped.
         """
         engine = self._engine
-        edges = [edge for edge in engine.core.edges if self._touches(edge, port)]
-        labels = {edge.label for edge in edges}
+        found = relays.labels_of(engine.flat, port)
+        if not found:
+            raise UsageError(f"{port!r} has no edge in this run, so there is nothing to look at")
+        labels = set(found if getattr(port, "kind", "") == "slot" else found[:1])  # fan-out carries the same
         kept = outside._Tapped(size)
-        first = edges[0].label if edges and port.kind != "input" else None
 
         def look(event: TraceEvent) -> None:
-            if isinstance(event, TokenSent) and event.edge in labels and (first is None or event.edge == first):
+            if isinstance(event, TokenSent) and event.edge in labels:
                 kept.tokens.append(event.token)
                 kept.wake.set()
 
@@ -129,11 +144,6 @@ class Run:
                         wait.cancel()
         finally:
             remove()
-
-    def _touches(self, edge: Any, port: Any) -> bool:
-        source, target = edge.label.split(" -> ", 1)
-        path = port.path
-        return path in (target.split(" #")[0],) if port.kind in ("input", "slot") else bool(source == path)
 
     def trace(self, consumer: Callable[[TraceEvent], None]) -> Callable[[], None]:
         """Let a consumer see every event of the run from now on (R7); gives back what removes it."""
@@ -191,6 +201,8 @@ class Run:
         from hfg.engine import steps
 
         worker = self._worker(node)
+        if worker.scope is not None:
+            raise UsageError(f'"{worker.path}" is a subgraph, in which each node waits for itself: name a node inside')
         neighbours = [edge.source for edge in worker.in_edges] + [edge.target for edge in worker.all_out_edges()]
         for one in (worker, *neighbours):
             one.observed = True

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
+
 import pytest
 import reactivex
 from reactivex import Subject, operators
@@ -152,6 +155,35 @@ def test_automatic_events_are_observables_too(fast: bool) -> None:
     sink.processed.subscribe(lambda token: seen.append(token.value))
     run(graph, fast)
     assert seen == [None, None]
+
+
+@pytest.mark.rule("A9", "P9")
+def test_an_automatic_event_may_be_subscribed_to_while_the_graph_runs(fast: bool) -> None:
+    async def main() -> list[float]:
+        graph = hfg.Graph()
+        source, sink = graph.add(slow_numbers(count=3)), graph.add(Keep())
+        graph.connect(source.out, sink.value)
+        seen: list[float] = []
+        async with hfg.running(graph, fast=fast) as run:
+            await asyncio.sleep(1.5)
+            sink.processed.subscribe(lambda token: seen.append(token.stamp))
+            await run.wait_finished()
+        return seen
+
+    assert drive(main) == [2, 3]
+
+
+@pytest.mark.rule("P9")
+def test_after_a_run_an_event_is_free_of_it() -> None:
+    graph = hfg.Graph()
+    source = graph.add(Burst(count=3))
+    seen: list[int] = []
+    for _ in range(2):
+        subscribing = threading.Thread(target=lambda: source.rang.subscribe(lambda token: seen.append(token.value)))
+        subscribing.start()
+        subscribing.join()
+        run(graph)
+    assert seen == [1, 2, 3, 1, 2, 3]
 
 
 @pytest.mark.rule("P9")

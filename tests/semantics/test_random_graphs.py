@@ -1,0 +1,153 @@
+"""The engine against the oracle on random graphs: everything it does must be permitted, and everything that follows must happen.
+
+A failure prints the smallest graph found, as a program. `test_soak.py` does the same with many more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+
+import hfg
+from hfg.testing import Divergence, ReferenceReport, graphs, recorder, reference_run, replay, schedules
+from hfg.testing.invariants import broken, of_graph
+from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
+from hfg.testing.plans import GraphPlan
+from hfg.testing.shrinking import shrink
+
+MOST_MOVES = 1500
+EVERYTHING = Allowed()
+THREADS = Allowed(threads=True, lossy=False, gates=False)
+
+
+def reference(plan: GraphPlan, seed: int) -> ReferenceReport | None:
+    """Run the oracle; None if the graph goes round and round."""
+    try:
+        return reference_run(plan.build(), seed=seed, max_moves=MOST_MOVES)
+    except RuntimeError:
+        return None
+
+
+def difference(plan: GraphPlan, seed: int) -> str | None:
+    """Run the engine under one schedule; say what the oracle or an invariant has against it."""
+    trace, graph = recorder(), plan.build()
+    try:
+        hfg.run(graph, clock="virtual", policy="random", seed=seed, trace=trace)
+    except hfg.errors.RunError:
+        pass
+    except hfg.errors.EngineInternalError as error:
+        return f"{type(error).__name__}: {error}"
+    try:
+        replay(plan, trace)
+    except Divergence as divergence:
+        return str(divergence)
+    found = broken(trace, of_graph(graph))
+    return "\n".join(found) if found else None
+
+
+def check(plan: GraphPlan, seed: int, compare: Callable[[GraphPlan, int], str | None] = difference) -> None:
+    why = compare(plan, seed)
+    if why is None:
+        return
+
+    def still(smaller: GraphPlan) -> bool:
+        return reference(smaller, seed) is not None and compare(smaller, seed) is not None
+
+    small = shrink(plan, still)
+    pytest.fail(f"schedule {seed} of\n{small}\n\n{compare(small, seed)}", pytrace=False)
+
+
+@pytest.mark.rule("F1", "F3", "F4", "F5", "F8", "F9", "A3", "A5", "A6", "G1", "R5", "R7")
+@pytest.mark.parametrize("block", range(20))
+def test_the_engine_does_what_the_oracle_permits(block: int) -> None:
+    for seed in range(25 * block, 25 * block + 25):
+        plan = random_plan(seed, EVERYTHING)
+        if reference(plan, seed) is not None:
+            check(plan, seed)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@given(graphs(), schedules())
+def test_hypothesis_finds_nothing_either(plan: GraphPlan, seed: int) -> None:
+    assume(reference(plan, seed) is not None)
+    assert difference(plan, seed) is None
+
+
+@pytest.mark.rule("R1")
+@pytest.mark.parametrize("seed", range(40))
+def test_threads_change_nothing_of_it(seed: int) -> None:
+    plan = random_plan(seed, THREADS)
+    if reference(plan, seed) is not None:
+        check(plan, seed)
+
+
+def modes(plan: GraphPlan, release: str, group: str | None) -> GraphPlan:
+    """The same graph with another mode and, for every other node, another group."""
+    nodes = []
+    for index, node in enumerate(plan.nodes):
+        options = {**node.options, "release": release}
+        if group is not None and index % 2 and node.type not in ("ascript", "slow_double", "Waiting"):
+            options["group"] = group
+        nodes.append(replace(node, options=options))
+    return replace(plan, nodes=tuple(nodes), groups=() if group is None else (group,))
+
+
+@pytest.mark.rule("F7")
+@pytest.mark.parametrize("seed", range(60))
+def test_sequences_depend_neither_on_schedule_nor_modes_nor_groups(seed: int) -> None:
+    """On synchronous edges alone; of runs that do not end by themselves one sequence is a prefix of the other."""
+    plan = random_plan(seed, replace(SYNCHRONOUS, rates=False))
+    wanted = reference(plan, seed)
+    if wanted is None:
+        return
+    sequences = {edge: [(token.value, token.activity) for token in sent] for edge, sent in wanted.tokens.items()}
+    for release, group, policy in [("sequential", None, "random"), ("pipelined", None, "fifo"), ("auto", "side", "random")]:
+        seen = recorder()
+        graph = modes(plan, release, group).build()
+        try:
+            hfg.run(graph, clock="virtual", policy=policy, seed=seed, trace=seen)
+        except hfg.errors.RunError:
+            assert wanted.outcome != "done"
+        for edge, sequence in sequences.items():
+            found = [(token.value, token.activity) for token in seen.tokens(edge)] if edge in seen.edges() else []
+            shorter = min(len(found), len(sequence))
+            assert found[:shorter] == sequence[:shorter], f"{edge} with {release}, {group}, {policy}\n{plan}"
+
+
+@pytest.mark.rule("F7")
+@pytest.mark.parametrize("seed", range(60))
+def test_a_run_that_nobody_watches_does_the_same(seed: int) -> None:
+    """Short ways that the engine takes when there is no trace lead to the same counts."""
+    plan = random_plan(seed, replace(SYNCHRONOUS, rates=False))
+    if reference(plan, seed) is None:
+        return
+    counts = []
+    for fast in (True, False):
+        try:
+            report = hfg.run(plan.build(), clock="virtual", fast=fast)
+        except hfg.errors.RunError as error:
+            report = error.report  # type: ignore[attr-defined]
+        counts.append(({edge: found.sent for edge, found in report.edges.items()}, report.outcome))
+    assert counts[0] == counts[1]
+
+
+@pytest.mark.rule("G1")
+@pytest.mark.parametrize("seed", range(40))
+def test_grouping_and_dissolving_change_nothing(seed: int) -> None:
+    plan = random_plan(seed, replace(SYNCHRONOUS, rates=False))
+    if not plan.boxes or reference(plan, seed) is None:
+        return
+    boxed, flat = recorder(), recorder()
+    for one, seen in ((plan, boxed), (plan.flat(), flat)):
+        try:
+            hfg.run(one.build(), clock="virtual", seed=seed, trace=seen)
+        except hfg.errors.RunError:
+            return
+    paths = plan.paths()
+    for edge in plan.edges:
+        inside = f"{paths[edge.source[0]]}.{edge.source[2]} -> {paths[edge.target[0]]}.{edge.target[2]}"
+        outside = f"{edge.source[0]}.{edge.source[2]} -> {edge.target[0]}.{edge.target[2]}"
+        assert boxed.values(inside) == flat.values(outside), f"{outside}\n{plan}"
