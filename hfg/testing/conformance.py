@@ -114,9 +114,12 @@ def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = 
       >>> replay(graph, trace)
     """
     replaying = Replay(build() if callable(build) else build, until_s=until_s)
-    for event in events:
-        replaying.see(event)
-    replaying.check_over()
+    try:
+        for event in events:
+            replaying.see(event)
+        replaying.check_over()
+    finally:
+        replaying.machine.close()
 
 
 class Replay:

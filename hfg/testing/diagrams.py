@@ -117,7 +117,9 @@ def draw(steps: list[Step], values: Mapping[str, Any] | None = None) -> str:
     line = ""
     for tick in range(max(ticks, default=-1) + 1):
         found = ticks.get(tick, ["-"])
-        text = "".join(one + "!" if one in "+~" and later[0] not in "+~" else one for one, later in pairwise([*found, "+"]))
+        text = "".join(
+            one + "!" if one in "+~" and later[0] not in "+~" else one for one, later in pairwise([*found, "+"])
+        )
         line += text if len(text) == 1 else f"({text})"
     return line
 

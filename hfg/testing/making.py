@@ -100,6 +100,7 @@ _INNER = [
     "Sieve",
     "Tally",
 ]
+_WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay"}
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear"}
 _DELICATE_SLOTS = ["activate", "deactivate", "reset", "disable", "enable"]
@@ -165,7 +166,7 @@ class _Making:
             options["active_for_s"] = choose.one_of([0.02, 0.005])
         if allowed.disabling and choose.chance(4):
             options["enabled"] = False
-        if allowed.threads and choose.chance(50):
+        if allowed.threads and kind not in _WAITING and choose.chance(50):
             options["group"] = choose.one_of(["left", "right"])
         return options
 

@@ -241,7 +241,7 @@ class _Writing:
         self.drawing = _Drawing(plan)
 
     def text(self) -> str:
-        lines = ["import hfg", "from typing import Any, Final", "from hfg.testing.nodes import *", ""]
+        lines = ["import hfg", "from typing import Any", "from hfg.testing.nodes import *", ""]
         for box in self.plan.boxes:
             lines += self._class(box)
         lines.append("graph = hfg.Graph()")

@@ -1,4 +1,4 @@
-"""The engine against the oracle on random graphs: everything it does must be permitted, and everything that follows must happen.
+"""The engine against the oracle on random graphs: all it does must be permitted, all that follows must happen.
 
 A failure prints the smallest graph found, as a program. `test_soak.py` does the same with many more.
 """
@@ -104,7 +104,11 @@ def test_sequences_depend_neither_on_schedule_nor_modes_nor_groups(seed: int) ->
     if wanted is None:
         return
     sequences = {edge: [(token.value, token.activity) for token in sent] for edge, sent in wanted.tokens.items()}
-    for release, group, policy in [("sequential", None, "random"), ("pipelined", None, "fifo"), ("auto", "side", "random")]:
+    for release, group, policy in [
+        ("sequential", None, "random"),
+        ("pipelined", None, "fifo"),
+        ("auto", "side", "random"),
+    ]:
         seen = recorder()
         graph = modes(plan, release, group).build()
         try:

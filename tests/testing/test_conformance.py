@@ -1,14 +1,14 @@
-"""A replay accepts what the rules permit and says clearly where a run leaves them; the fakes here break one rule each."""
+"""A replay accepts what the rules permit and says where a run leaves them; the fakes here break one rule each."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import pytest
-from hfg.testing.nodes import Relay, Script, Tally, double, script, sink, some
 
 import hfg
 from hfg.testing import Divergence, Recorder, recorder, replay
+from hfg.testing.nodes import Relay, Script, Tally, double, script, sink, some
 from hfg.token import Token
 from hfg.trace import (
     ActivityChanged,
@@ -24,7 +24,12 @@ from hfg.trace import (
 
 def build() -> hfg.Graph:
     graph = hfg.Graph()
-    source, middle, relay, tally = graph.add(Script(count=3)), graph.add(double()), graph.add(Relay()), graph.add(Tally())
+    source, middle, relay, tally = (
+        graph.add(Script(count=3)),
+        graph.add(double()),
+        graph.add(Relay()),
+        graph.add(Tally()),
+    )
     graph.connect(source.out, middle.value)
     graph.connect(middle.out, relay.say)
     graph.connect(relay.said, tally.value, active=True)
@@ -125,7 +130,7 @@ def test_a_divergence_names_rule_event_and_what_was_permitted(trace: Recorder) -
         replay(build, trace)
     text = str(caught.value)
     assert "the run moved when the rules forbid it (rules F1" in text
-    assert 'FiringStarted double 1 process' in text
+    assert "FiringStarted double 1 process" in text
     assert 'permitted now: fire "script"' in text
     assert caught.value.found == FiringStarted(0.0, "double", 1, "process")
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from hfg.testing.nodes import Counter, Failing, Greeter, Passing, Relay, Sieve, Waiting, double
 from hypothesis import given
 from hypothesis import strategies as st
 
 import hfg
 from hfg.testing.diagrams import Step, check, draw, parse, run
+from hfg.testing.nodes import Counter, Failing, Greeter, Passing, Relay, Sieve, Waiting, double
 from hfg.token import END, NO_MESSAGE
 
 
@@ -73,7 +73,9 @@ def test_tokens_that_are_passed_on_keep_their_modifiers() -> None:
 
 
 def test_waiting_nodes_answer_later() -> None:
-    check(Waiting(pause_s=0.02), value="2----4|", expected={"before": "2----4", "after": "--2----4", "out": "--2----(4|)"})
+    check(
+        Waiting(pause_s=0.02), value="2----4|", expected={"before": "2----4", "after": "--2----4", "out": "--2----(4|)"}
+    )
 
 
 def test_options_are_the_graph_s() -> None:

@@ -5,10 +5,22 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from hfg.testing.nodes import Counter, Greeter, Merge, Passing, Scaled, Script, Stateful, Waiting, ascript, double, script
 
 import hfg
 from hfg.testing import fire
+from hfg.testing.nodes import (
+    Counter,
+    Greeter,
+    Merge,
+    Passing,
+    Scaled,
+    Script,
+    Stateful,
+    Waiting,
+    ascript,
+    double,
+    script,
+)
 
 
 class Diary(hfg.Node):

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
 import reactivex.operators as ops
+
+import hfg
+from hfg.testing import ReferenceMachine, ReferenceReport, recorder, reference_run
 from hfg.testing.nodes import (
     AsyncRelay,
     Counter,
@@ -32,9 +36,6 @@ from hfg.testing.nodes import (
     slow_double,
     some,
 )
-
-import hfg
-from hfg.testing import ReferenceMachine, ReferenceReport, recorder, reference_run
 from hfg.token import END, NO_MESSAGE
 from hfg.trace import ActivityChanged, CallStarted, FiringEnded, FiringStarted, TokenDropped, TokenProcessed, TokenSent
 
@@ -54,7 +55,7 @@ def signs(report: ReferenceReport, edge: str) -> list[tuple[Any, int]]:
 
 def chain(*nodes: hfg.Node) -> hfg.Graph:
     graph = hfg.Graph()
-    for earlier, later in zip(nodes, nodes[1:], strict=False):
+    for earlier, later in pairwise(nodes):
         if earlier.place is None:
             graph.add(earlier)
         graph.add(later)
@@ -139,7 +140,12 @@ def test_a_full_queue_follows_its_policy(overflow: Any, kept: list[int], lost: l
 @pytest.mark.rule("P5")
 def test_the_policy_error_is_raised_in_the_trigger_before_anything_is_sent() -> None:
     graph = hfg.Graph()
-    source, pulse, target, other = graph.add(script(values=(2,))), graph.add(Pulse(), on_error="skip"), graph.add(sink()), graph.add(Tally())
+    source, pulse, target, other = (
+        graph.add(script(values=(2,))),
+        graph.add(Pulse(), on_error="skip"),
+        graph.add(sink()),
+        graph.add(Tally()),
+    )
     source >> pulse
     graph.connect(pulse.pulse, other.note)
     graph.connect(pulse.pulse, target.value, overflow="error", capacity=1)
@@ -185,7 +191,9 @@ def test_a_parameter_is_set_by_a_token_before_the_function_runs_and_sent_behind_
         graph.connect(scaled.ports.parameters["factor"], graph.add(sink(), name="factors").value)
         return graph
 
-    found = every_schedule(build, lambda r: (r.values("scaled.out -> values.value"), r.values("scaled.factor -> factors.value")))
+    found = every_schedule(
+        build, lambda r: (r.values("scaled.out -> values.value"), r.values("scaled.factor -> factors.value"))
+    )
     assert found == ([5, 5, NO_MESSAGE, END], [5, 5, NO_MESSAGE, END])
 
 
@@ -357,7 +365,9 @@ def test_the_rate_is_measured_between_starts_and_silence_is_free() -> None:
     graph.connect(graph.add(some(), name="some").out, middle.value)
     graph.connect(source.out, graph["some"].value)
     report = reference_run(graph)
-    starts = [e.time for e in report.events if isinstance(e, FiringStarted) and e.node == "double" and e.kind == "process"]
+    starts = [
+        e.time for e in report.events if isinstance(e, FiringStarted) and e.node == "double" and e.kind == "process"
+    ]
     assert starts == [0.0, 0.1, 0.2]
 
 
@@ -464,7 +474,7 @@ def test_discarded_activity_goes_back_to_its_sender() -> None:
     graph.connect(relay.processed, target.disable)
     graph.connect(relay.said, target.disable)
     order = ["call", "go on", "fire"]
-    report = reference_run(graph, choose=lambda moves: min(moves, key=lambda m: (order + [m.kind]).index(m.kind)))
+    report = reference_run(graph, choose=lambda moves: min(moves, key=lambda m: [*order, m.kind].index(m.kind)))
     assert report.activity == [("relay", True), ("relay", False), ("relay", True)]
     causes = [event.cause for event in report.events if isinstance(event, ActivityChanged)]
     assert causes == ["token", "sent", "returned"]
@@ -486,7 +496,11 @@ def test_processed_follows_the_outputs_and_carries_activity_only_if_they_did_not
 @pytest.mark.parametrize(("idle", "kinds"), [(None, ["silent"] * 4), (5.0, ["process", "silent", "process", "silent"])])
 def test_a_gate_makes_firings_silent_while_its_state_is_inactive(idle: float | None, kinds: list[str]) -> None:
     graph = hfg.Graph()
-    source, node, state = graph.add(script(values=(1, 2, 3, 4)), max_rate_hz=10.0), graph.add(double()), graph.add(Relay())
+    source, node, state = (
+        graph.add(script(values=(1, 2, 3, 4)), max_rate_hz=10.0),
+        graph.add(double()),
+        graph.add(Relay()),
+    )
     source >> node
     graph.gate(node, by=state, idle_rate_hz=idle)
     events = reference_run(graph).events
@@ -596,7 +610,10 @@ def test_skip_answers_silence_and_signals_failed() -> None:
 @pytest.mark.rule("X1")
 def test_stop_fails_the_run() -> None:
     report = reference_run(chain(script(values=(3,)), Failing(), sink()))
-    assert (report.outcome, str(report.error)) == ("failed", 'node "failing" failed in firing 1: ValueError: cannot do 3')
+    assert (report.outcome, str(report.error)) == (
+        "failed",
+        'node "failing" failed in firing 1: ValueError: cannot do 3',
+    )
 
 
 @pytest.mark.rule("X1")
@@ -611,12 +628,17 @@ def test_restart_waits_longer_each_time() -> None:
 @pytest.mark.rule("X2")
 def test_a_firing_that_takes_too_long_is_given_up() -> None:
     graph = hfg.Graph()
-    source, slow = graph.add(script(values=(1,))), graph.add(slow_double(pause_s=5.0), max_duration_s=1.0, on_error="skip")
+    source, slow = (
+        graph.add(script(values=(1,))),
+        graph.add(slow_double(pause_s=5.0), max_duration_s=1.0, on_error="skip"),
+    )
     source >> slow
     graph.connect(slow.out, graph.add(sink()).value)
     report = reference_run(graph)
     assert report.values("slow_double.out -> sink.value") == [NO_MESSAGE, END]
-    assert [e.outcome for e in report.events if isinstance(e, FiringEnded) and e.node == "slow_double"][0] == "abandoned"
+    assert [e.outcome for e in report.events if isinstance(e, FiringEnded) and e.node == "slow_double"][
+        0
+    ] == "abandoned"
 
 
 @pytest.mark.rule("R5")
@@ -645,7 +667,9 @@ def test_time_goes_on_only_when_nothing_else_can() -> None:
     graph.connect(waiting.out, graph.add(sink()).value)
     for seed in SEEDS:
         report = reference_run(graph, seed=seed)
-        assert [event.time for event in report.events if isinstance(event, FiringEnded) and event.node == "waiting"] == [1.0, 2.0, 2.0]
+        assert [
+            event.time for event in report.events if isinstance(event, FiringEnded) and event.node == "waiting"
+        ] == [1.0, 2.0, 2.0]
 
 
 @pytest.mark.rule("R6")

@@ -7,14 +7,14 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 import pytest
-from hfg.testing.invariants import ALL, broken, of_graph
-from hfg.testing.making import Allowed, random_plan
-from hfg.testing.nodes import Counter, Pulse, Relay, Script, Tally, add, double, script, sink
 from hypothesis import HealthCheck, find, given, settings
 from hypothesis.errors import NoSuchExample
 
 import hfg
 from hfg.testing import Recorder, ScheduleFailure, explore, graphs, recorder, reference_run, schedules, tokens
+from hfg.testing.invariants import ALL, broken, of_graph
+from hfg.testing.making import Allowed, random_plan
+from hfg.testing.nodes import Counter, Pulse, Relay, Script, Tally, add, double, script, sink
 from hfg.testing.plans import GraphPlan
 from hfg.testing.pytest_plugin import run_graph, virtual_time  # noqa: F401 - also where hfg is not installed
 from hfg.token import NO_MESSAGE, Token
@@ -51,7 +51,11 @@ def test_a_recorder_answers_questions_about_a_run() -> None:
     assert seen.taken("relay.said -> tally.note") == [1, 2]
     assert seen.calls("relay") == ["activate", "say", "say"]
     assert seen.firings("script") == 3
-    assert [(node, active) for _, node, active in seen.activity()] == [("relay", True), ("relay", False), ("tally", True)]
+    assert [(node, active) for _, node, active in seen.activity()] == [
+        ("relay", True),
+        ("relay", False),
+        ("tally", True),
+    ]
     assert seen.activity("tally") == [(0.0, "tally", True)]
     assert seen.active_at_end() == ["tally"]
     assert seen.edges()[0] == "start -> relay.activate"
@@ -180,10 +184,12 @@ def test_a_plan_builds_the_same_graph_each_time(plan: GraphPlan, seed: int) -> N
 @given(graphs())
 def test_a_plan_prints_as_the_program_that_builds_it(plan: GraphPlan) -> None:
     program: dict[str, Any] = {}
-    exec(compile(repr(plan), "plan", "exec"), program)  # noqa: S102 - this is the claim
+    exec(compile(repr(plan), "plan", "exec"), program)
     written, built = program["graph"], plan.build()
     assert list(written.nodes) == list(built.nodes)
-    assert [(edge.label, edge.options) for edge in written.edges] == [(edge.label, edge.options) for edge in built.edges]
+    assert [(edge.label, edge.options) for edge in written.edges] == [
+        (edge.label, edge.options) for edge in built.edges
+    ]
 
 
 @given(tokens())
@@ -233,11 +239,17 @@ def test_grouping_nodes_changes_nothing_that_others_can_see(seed: int) -> None:
 
 
 def test_hypothesis_shrinks_to_a_small_graph() -> None:
-    small = find(graphs(), lambda plan: any(node.type == "Counter" for node in plan.nodes), settings=settings(deadline=None))
+    small = find(
+        graphs(), lambda plan: any(node.type == "Counter" for node in plan.nodes), settings=settings(deadline=None)
+    )
     assert len(small.nodes) == 2
     assert not small.edges
     with pytest.raises(NoSuchExample):
-        find(graphs(Allowed(events=False)), lambda plan: any("Relay" in n.type for n in plan.nodes), settings=settings(max_examples=20))
+        find(
+            graphs(Allowed(events=False)),
+            lambda plan: any("Relay" in n.type for n in plan.nodes),
+            settings=settings(max_examples=20),
+        )
 
 
 # --- the pytest plugin

@@ -104,7 +104,7 @@ class ReferenceMachine(Calling):
             return []
         found = self.working_moves() or self.quiet_moves()
         if found and found[0].kind != "finish" and self.ends_beside_sources():
-            found = [*found, Move("finish", outcome="done")]
+            found = [*found, self.closing_move()]
         return found
 
     def working_moves(self) -> list[Move]:
@@ -156,11 +156,15 @@ class ReferenceMachine(Calling):
             return [Move("grow", edge=line.edge.label)]
         if any(station.flight is not None for station in self.stations) or self.held_open:
             return []
+        return [self.closing_move()]
+
+    def closing_move(self) -> Move:
+        """What is next when only the end is left: operators give out what they hold (P9), events end (F13), then R5."""
         if any(line.operators is not None and not line.completed for line in self.lines):
-            return [Move("complete")]
+            return Move("complete")
         if self.events_to_end():
-            return [Move("end events")]
-        return [Move("finish", outcome="stalled" if self.stalled() else "done")]
+            return Move("end events")
+        return Move("finish", outcome="stalled" if self.stalled() else "done")
 
     def next_timer(self, without: Set[int] = frozenset()) -> float | None:
         """The next moment at which something could start: rate, gate, back-off, time-out, operator, waiting code."""

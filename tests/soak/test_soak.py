@@ -1,0 +1,42 @@
+"""Many random graphs, by `make soak`: engine against oracle, each under its own schedule.
+
+HFG_SOAK_GRAPHS says how many (20,000), HFG_SOAK_SEED where to begin; a failure prints its seed and the smallest
+graph found.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from hfg.testing.making import Allowed, random_plan
+
+GRAPHS = int(os.environ.get("HFG_SOAK_GRAPHS", "20000"))
+SEED = int(os.environ.get("HFG_SOAK_SEED", "1000000"))
+BLOCKS = 40
+
+
+def _random_graphs() -> ModuleType:
+    path = Path(__file__).parents[1] / "semantics" / "test_random_graphs.py"
+    spec = importlib.util.spec_from_file_location("soak_random_graphs", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("block", range(BLOCKS))
+def test_the_engine_does_what_the_oracle_permits(block: int) -> None:
+    suite = _random_graphs()
+    first = SEED + block * (GRAPHS // BLOCKS)
+    print(f"seeds {first} to {first + GRAPHS // BLOCKS - 1}")
+    for seed in range(first, first + GRAPHS // BLOCKS):
+        plan = random_plan(seed, Allowed(threads=seed % 10 == 0, max_nodes=5 + seed % 6))
+        if suite.reference(plan, seed) is not None:
+            suite.check(plan, seed)
