@@ -38,7 +38,7 @@ from hfg.trace import (
     TraceEvent,
 )
 
-__all__ = ["Divergence", "Replay", "replay"]
+__all__ = ["Divergence", "Replay", "describe", "key", "replay", "token_key", "value_key"]
 
 _RULES: Final[dict[type[TraceEvent], str]] = {
     FiringStarted: "F1, F4, F5, F8, F9, F11, A11",
@@ -295,7 +295,8 @@ class Replay:
             if self.expected:
                 raise Divergence("time went on before all of the last decision was done", event, self)
             moves = self.machine.moves()
-            wait = next((move for move in moves if move.kind in ("wait", "finish", "complete")), None)
+            steps = [move for move in moves if move.kind in ("wait", "finish", "complete")]
+            wait = min(steps, key=lambda move: (move.kind == "finish", move.time), default=None)
             if wait is None:
                 raise Divergence("time went on although the rules permit moves now", event, self)
             if wait.kind == "finish":

@@ -377,7 +377,9 @@ def test_an_ended_node_drains_and_its_slots_go_on() -> None:
     counter = graph.add(Counter())
     merge = graph.add(Merge())
     graph.connect(graph.add(script(values=())).out, merge.value)
-    graph.connect(graph.add(script(values=(1, 2, 3)), max_rate_hz=10.0).out, merge.left)
+    source = graph.add(script(values=(1, 2, 3)), max_rate_hz=10.0)
+    graph.connect(source.out, merge.left)
+    graph.connect(source.out, graph.add(sink()).value)
     graph.connect(graph.add(script(values=(1,)), max_rate_hz=10.0).out, counter.set)
     graph.connect(graph.add(script(values=())).out, counter.value)
     report = reference_run(graph)
@@ -636,9 +638,8 @@ def test_a_firing_that_takes_too_long_is_given_up() -> None:
     graph.connect(slow.out, graph.add(sink()).value)
     report = reference_run(graph)
     assert report.values("slow_double.out -> sink.value") == [NO_MESSAGE, END]
-    assert [e.outcome for e in report.events if isinstance(e, FiringEnded) and e.node == "slow_double"][
-        0
-    ] == "abandoned"
+    ended = next(e for e in report.events if isinstance(e, FiringEnded) and e.node == "slow_double")
+    assert ended.outcome == "abandoned"
 
 
 @pytest.mark.rule("R5")

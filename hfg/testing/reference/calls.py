@@ -189,13 +189,14 @@ class Calling(Firing):
             self.settle()
 
     def _set_enabled(self, owner: int, enabled: bool) -> bool:
+        before = self.is_enabled(owner)
         if owner >= 0:
             changed = self.stations[owner].enabled != enabled
             self.stations[owner].enabled = enabled
         else:
             changed = self.box_enabled[-2 - owner] != enabled
             self.box_enabled[-2 - owner] = enabled
-        if changed:
+        if self.is_enabled(owner) != before:  # inside a disabled subgraph nobody can tell yet
             self.observe(NodeEnabled(self.now, self.path_of(owner), enabled))
         return changed
 

@@ -16,6 +16,7 @@ from hfg.errors import QueueLimit, Stalled
 from hfg.testing.reference.calls import Calling
 from hfg.testing.reference.state import Line, Station
 from hfg.testing.reference.structure import ROOT
+from hfg.testing.reference.waiting import MOMENT_S
 from hfg.token import END, Token
 from hfg.trace import ActivityChanged, QueueGrown, RunEnded, RunStarted, TokenDropped, TraceEvent
 
@@ -102,9 +103,15 @@ class ReferenceMachine(Calling):
         """Give every permitted next move; none after the end, or if only the world outside can go on."""
         if self.outcome is not None:
             return []
-        found = self.working_moves() or self.quiet_moves()
-        if found and found[0].kind != "finish" and self.ends_beside_sources():
-            found = [*found, self.closing_move()]
+        working = self.working_moves()
+        moot = self.moot_sources()
+        if any(move.node not in {self.stations[index].path for index in moot} for move in working):
+            return working
+        # Those who work for ended nodes only may go on, but neither time nor the end waits for them (R5).
+        found = working + self.quiet_moves(moot)
+        due = self.next_timer()
+        if moot and due is not None and (self.until_s is None or due <= self.until_s):
+            found += [Move("wait", time=due)] if Move("wait", time=due) not in found else []
         return found
 
     def working_moves(self) -> list[Move]:
@@ -124,13 +131,16 @@ class ReferenceMachine(Calling):
                     limit is not None
                     and flight.what == "firing"
                     and flight.task is not None
-                    and self.now >= flight.began + limit
+                    and self.is_over(flight.began + limit)
                 ):
                     found.append(Move("time out", station.path))
                 continue
             move = self.next_of(index)
             if move is not None:
                 found.append(move)
+            line = self.next_call(index)
+            if move is not None and move.kind == "fire" and line is not None and index in self.moot_sources():
+                found.append(Move("call", station.path, line.edge.label))  # its firing may as well rest
         return found
 
     def next_of(self, index: int) -> Move | None:
@@ -144,19 +154,18 @@ class ReferenceMachine(Calling):
             return Move("fire", station.path)
         return None
 
-    def quiet_moves(self) -> list[Move]:
-        """What follows when nothing runs and nothing can start."""
-        due = self.next_timer()
+    def quiet_moves(self, moot: Set[int]) -> list[Move]:
+        """What follows when nothing runs and nothing can start, `moot` sources apart."""
+        due = self.next_timer(moot)
         if due is not None:
-            if self.until_s is not None and due > self.until_s:
+            if self.until_s is not None and due > self.until_s + MOMENT_S:
                 return [Move("finish", outcome="until", time=self.until_s)]
             return [Move("wait", time=due)]
         line = self.queue_to_grow()
         if line is not None:
             return [Move("grow", edge=line.edge.label)]
-        if any(station.flight is not None for station in self.stations) or self.held_open:
-            return []
-        return [self.closing_move()]
+        busy = any(station.flight is not None for index, station in enumerate(self.stations) if index not in moot)
+        return [] if busy or self.held_open else [self.closing_move()]
 
     def closing_move(self) -> Move:
         """What is next when only the end is left: operators give out what they hold (P9), events end (F13), then R5."""
@@ -184,7 +193,7 @@ class ReferenceMachine(Calling):
             if station.resting_until is not None:
                 times.append(station.resting_until)
             if flight is None and station.place is None and self.may_fire(index, ignore="timers"):
-                times += [station.hold_until] if station.hold_until > self.now else []
+                times += [station.hold_until] if not self.is_over(station.hold_until) else []
                 times += [
                     station.last_function + 1 / rate for rate in self.gates_of(index) if rate and self.is_resting(index)
                 ]
@@ -258,29 +267,13 @@ class ReferenceMachine(Calling):
         targets = {line.edge.target.owner for line in lines}
         return bool(lines) and all(target >= 0 and self.stations[target].ended for target in targets)
 
-    def ends_beside_sources(self) -> bool:
-        """R5: each source has ended, is disabled, or works for ended nodes only, and everything else is quiet."""
-        if self.held_open:
-            return False
-        moot = {
+    def moot_sources(self) -> set[int]:
+        """Sources that have not ended but have edges only into ended nodes."""
+        return {
             index
             for index, station in enumerate(self.stations)
-            if station.type.is_source and not station.ended and self.is_moot(index)
+            if station.type.is_source and self.is_enabled(index) and not station.ended and self.is_moot(index)
         }
-        others = [
-            index
-            for index, station in enumerate(self.stations)
-            if station.type.is_source and self.is_enabled(index) and not station.ended and index not in moot
-        ]
-        if not moot or others:
-            return False
-        paths = {self.stations[index].path for index in moot}
-        return (
-            not any(move.node not in paths for move in self.working_moves())
-            and self.next_timer(without=moot) is None
-            and not any(station.flight is not None and index not in moot for index, station in enumerate(self.stations))
-            and self.queue_to_grow() is None
-        )
 
     # --- what happens
 
@@ -324,14 +317,14 @@ class ReferenceMachine(Calling):
             if line.operators is not None:
                 line.operators.advance(self.now)
         for station in self.stations:
-            if station.resting_until is not None and self.now >= station.resting_until:
+            if station.resting_until is not None and self.is_over(station.resting_until):
                 self.restart(station)
             limit = station.leaf.options.active_for_s
-            if limit is not None and station.active_since is not None and self.now >= station.active_since + limit:
+            if limit is not None and station.active_since is not None and self.is_over(station.active_since + limit):
                 self.time_activity_out(station)
         for box in self.structure.boxes:
             since, limit = self.box_since[box.index], box.options.active_for_s
-            if since is not None and limit is not None and self.now >= since + limit:
+            if since is not None and limit is not None and self.is_over(since + limit):
                 self.box_since[box.index] = None
                 self.trigger(-2 - box.index, "timeout")
         self.settle()

@@ -14,6 +14,7 @@ from reactivex.disposable import Disposable, SingleAssignmentDisposable
 from reactivex.scheduler.scheduler import Scheduler
 from reactivex.subject import Subject
 
+from hfg.testing.reference.waiting import MOMENT_S
 from hfg.token import Token
 
 __all__ = ["Operators"]
@@ -58,7 +59,7 @@ class _Clock(Scheduler):
 
     def advance(self, seconds: float) -> None:
         """Do everything that is due until then, in order of time."""
-        while (due := self.due()) is not None and due <= seconds:
+        while (due := self.due()) is not None and due <= seconds + MOMENT_S:
             entry = min(self._waiting, key=lambda one: one[:2])
             self._waiting.remove(entry)
             self.seconds = max(self.seconds, entry[0])

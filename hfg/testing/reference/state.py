@@ -13,11 +13,11 @@ from typing import Any, Literal
 
 from hfg.errors import EndOfStream
 from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, dissolve
-from hfg.testing.reference.waiting import hand_turned_loop
+from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import TraceEvent
 
-__all__ = ["Flight", "Line", "Lying", "State", "Station"]
+__all__ = ["Flight", "Line", "Lying", "State", "Station", "newest"]
 
 
 @dataclass
@@ -302,12 +302,16 @@ class State:
     def within_idle_rate(self, index: int) -> bool:
         """Whether every gate allows a firing that runs the function now."""
         station = self.stations[index]
-        return all(rate is not None and self.now >= station.last_function + 1 / rate for rate in self.gates_of(index))
+        return all(rate is not None and self.is_over(station.last_function + 1 / rate) for rate in self.gates_of(index))
 
     def is_held_by_time(self, index: int) -> bool:
         """F11's hold, within which no firing at all starts, or the back-off of a restart."""
         station = self.stations[index]
-        return self.now < station.hold_until or station.resting_until is not None
+        return not self.is_over(station.hold_until) or station.resting_until is not None
+
+    def is_over(self, moment: float) -> bool:
+        """Whether a moment has come."""
+        return self.now + MOMENT_S >= moment
 
     # --- what is next for one node (F9)
 

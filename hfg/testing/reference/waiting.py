@@ -15,7 +15,10 @@ from contextlib import contextmanager
 from contextvars import Context, ContextVar, copy_context
 from typing import Any, Final
 
-__all__ = ["HandTurnedLoop", "hand_turned_loop"]
+__all__ = ["MOMENT_S", "HandTurnedLoop", "hand_turned_loop"]
+
+MOMENT_S: Final = 1e-9
+"""Sums of floats that differ by less are the same moment."""
 
 _OWNER: Final[ContextVar[object]] = ContextVar("hfg.testing.owner", default=None)
 
@@ -113,7 +116,7 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
 
     def ring(self) -> None:
         """Make the timers whose moment has come into steps of their owners, in order of time."""
-        due = [entry for entry in self._timers if entry[1].when() <= self._now()]
+        due = [entry for entry in self._timers if entry[1].when() <= self._now() + MOMENT_S]
         self._timers = [entry for entry in self._timers if entry not in due]
         self._ready.extend((owner, timer) for owner, timer in sorted(due, key=lambda entry: entry[1].when()))
 
