@@ -9,6 +9,7 @@ for wakes the coroutine directly, as a task would, without a pass of the loop mo
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import contextvars
 import sys
 from collections.abc import Callable
@@ -113,6 +114,22 @@ class Carrier:
         else:
             self.task.cancel()
 
+    def drop(self) -> None:
+        """Run the coroutine no further, whatever it does, and let the task end: the run is over (X3)."""
+        coroutine, self._coroutine = self._coroutine, None
+        future, self._waits_for = self._waits_for, None
+        self._done = self._must_cancel = None
+        if future is not None:
+            future.remove_done_callback(self._wake)
+        if coroutine is not None:
+            previous = _swap(self._loop, self.task)
+            try:
+                with contextlib.suppress(Exception):  # it ignores even this
+                    self._context.run(coroutine.close)
+            finally:
+                _swap(self._loop, previous)
+        self.task.cancel()
+
     def _cancelled(self, message: Any) -> None:
         """As `asyncio.Task.cancel`: cancel what it waits for, else throw at the next step."""
         future = self._waits_for
@@ -145,6 +162,8 @@ class Carrier:
     def _step(self, error: BaseException | None = None) -> None:
         coroutine = self._coroutine
         self._waits_for = None
+        if coroutine is None:
+            return  # dropped
         if self._must_cancel is not None:
             error, self._must_cancel = self._must_cancel, None
         result: Any = None

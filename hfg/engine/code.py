@@ -153,6 +153,8 @@ class CodeRunner:
             group.returned()
             worker.in_flight = False
             worker.core.in_flight -= 1
+            if self.core.over:
+                self.came_back.set()
             if not self.core.over or closing:
                 done(job.result, job.error)
             if worker.core.inside is not None:

@@ -120,7 +120,8 @@ class Engine:
         self._loop_group = self.groups["loop"]
         self._main_task: asyncio.Task[Any] | None = None
         self.started_at = 0.0
-        self.leftover_threads: list[str] = []
+        self.hurried = asyncio.Event()
+        self._leave_by = float("inf")
         self.ended_at: float | None = None
         self._instant = -1.0
         self._instant_steps = 0
@@ -335,9 +336,14 @@ class Engine:
 
     @property
     def teardown_limit_s(self) -> float:
-        """X3: how long one node may take; short when somebody wants to leave."""
-        limit = self.settings.teardown_limit_s
-        return min(limit, 1.0) if self.ended_how is not None and self.ended_how[0] == "cancelled" else limit
+        """X3: how long one node may take; when somebody wants to leave, what is left for all of them."""
+        return max(0.0, min(self.settings.teardown_limit_s, self._leave_by - time.monotonic()))
+
+    def hurry(self) -> None:
+        """Somebody wants to leave: tear down what can be torn down in a second."""
+        if not self.hurried.is_set():
+            self._leave_by = time.monotonic() + 1.0
+            self.hurried.set()
 
     def finish(self, outcome: str, error: HfgError | None) -> None:
         """See `Host`."""

@@ -6,7 +6,6 @@ Stands on `lifecycle`, `plan` and `code`.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import time
 from collections.abc import Callable
 from functools import partial
@@ -143,35 +142,26 @@ class Lifetime:
         engine = self._engine
         if engine.ended_how is None:
             engine.finish("cancelled", None)
+            engine.hurry()
         assert engine.ended_how is not None
         core = engine.core
         outcome, error = engine.ended_how
-        for dispose in self._disposables:
-            dispose()
-        await self._cancel_code()
         problems: list[NodeError] = []
-        for worker in reversed(self._was_set_up):
-            problem = await self._tear_down_one(worker)
-            if problem is not None:
-                problems.append(problem)
-        for worker in engine.all_workers():
-            engine_ports.release_ports(worker)
-            for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
-                if timer is not None:
-                    timer.cancel()
-        for edge in core.edges:
-            if edge.untaken and error is None and outcome in ("stopped", "until", "cancelled"):
-                discard(edge, "stopped")
-        await self._end_threads()
-        carriers = [worker.carrier for worker in engine.all_workers() if worker.carrier is not None] + list(
-            engine.code.given_up
-        )
-        for carrier in carriers:
-            carrier.cancel()
-        if carriers:
-            await asyncio.wait([carrier.task for carrier in carriers], timeout=engine.teardown_limit_s)
-        if self._watch is not None:
-            watchdog.forget(self._watch)
+        try:
+            for dispose in self._disposables:
+                dispose()
+            problems += await self._cancel_code()
+            for worker in reversed(self._was_set_up):
+                problem = await self._tear_down_one(worker)
+                if problem is not None:
+                    problems.append(problem)
+            for edge in core.edges:
+                if edge.untaken and error is None and outcome in ("stopped", "until", "cancelled"):
+                    discard(edge, "stopped")
+            await self._end_threads()
+            await self._end_carriers()
+        finally:
+            self._let_go()
         core.errors.extend(problems)
         if problems and error is None:
             error, outcome = TeardownError(problems), "failed"
@@ -180,30 +170,71 @@ class Lifetime:
             core.trace(RunEnded(engine.now(), outcome))
         return outcome, error
 
-    async def _cancel_code(self) -> None:
-        """Cancel what still waits; threads get their time to come back."""
+    def _let_go(self) -> None:
+        """Whatever happened: nothing of the run goes on, and the graph is free."""
         engine = self._engine
-        carriers = []
         for worker in engine.all_workers():
-            if worker.in_flight and worker.carrier is not None:
-                worker.ticket += 1
+            engine_ports.release_ports(worker)
+            for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
+                if timer is not None:
+                    timer.cancel()
+        for carrier in self._carriers():
+            carrier.drop()
+        for group in engine.groups.values():
+            if isinstance(group, ThreadGroup):
+                group.stop()
+        if self._watch is not None:
+            watchdog.forget(self._watch)
+
+    def _carriers(self) -> list[Any]:
+        engine = self._engine
+        return [worker.carrier for worker in engine.all_workers() if worker.carrier is not None] + list(
+            engine.code.given_up
+        )
+
+    async def _end_carriers(self) -> None:
+        carriers = self._carriers()
+        for carrier in carriers:
+            carrier.cancel()
+        for carrier in carriers:
+            await self._within_limit(carrier.task)
+
+    async def _within_limit(self, waiter: asyncio.Future[Any]) -> bool:
+        """Wait as long as a node may take for its teardown, which changes when somebody wants to leave (X3)."""
+        engine = self._engine
+        if not waiter.done():
+            hurried = asyncio.ensure_future(engine.hurried.wait())
+            await asyncio.wait({waiter, hurried}, timeout=engine.teardown_limit_s, return_when=asyncio.FIRST_COMPLETED)
+            if hurried.done() and not waiter.done():
+                await asyncio.wait({waiter}, timeout=engine.teardown_limit_s)
+            hurried.cancel()
+        return waiter.done()
+
+    async def _cancel_code(self) -> list[NodeError]:
+        """Cancel what still waits; threads get their time to come back. Gives back who did not."""
+        engine = self._engine
+        code = engine.code
+        busy = [worker for worker in engine.all_workers() if worker.in_flight and worker.iteration is None]
+        for worker in busy:
+            worker.ticket += 1
+            if worker.carrier is not None:
                 worker.carrier.cancel()
-                carriers.append(worker)
-        for task in engine.code.aside:
+        for task in code.aside:
             task.cancel()
-        limit = engine.teardown_limit_s
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(limit):
-                while any(worker.in_flight for worker in carriers):
-                    engine.code.came_back.clear()
-                    await engine.code.came_back.wait()
-        for worker in carriers:
-            if worker.in_flight:
-                problem = NodeError(
-                    worker.path, f"firing {worker.firings}", f"it was cancelled and did not end within {limit:g} s"
-                )
-                engine.core.errors.append(problem)
+        begun = time.monotonic()
+        while any(worker.in_flight for worker in busy):
+            code.came_back.clear()
+            back = asyncio.ensure_future(code.came_back.wait())
+            if not await self._within_limit(back):
+                back.cancel()
+                break
+        left = [worker for worker in busy if worker.in_flight]
+        for worker in left:
+            if worker.carrier is not None:
+                code.given_up.add(worker.carrier)
                 worker.carrier = None
+        seconds = time.monotonic() - begun
+        return [NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds)) for worker in left]
 
     async def _tear_down_one(self, worker: Worker) -> NodeError | None:
         engine = self._engine
@@ -213,24 +244,29 @@ class Lifetime:
             return None
         waiter: asyncio.Future[NodeError | None] = engine.loop.create_future()
         lifecycle.tear_down(worker, partial(answer, waiter))
-        if waiter.done():
-            return waiter.result()
         limit = engine.teardown_limit_s
-        try:
-            return await asyncio.wait_for(waiter, limit)
-        except TimeoutError:
-            return NodeError(worker.path, "teardown()", f"it took longer than {limit:g} s and was given up")
+        if await self._within_limit(waiter):
+            return waiter.result()
+        limit = min(limit, engine.teardown_limit_s or 1.0)
+        return NodeError(worker.path, "teardown()", f"it took longer than {limit:g} s and was given up")
 
     async def _end_threads(self) -> None:
-        engine = self._engine
-        groups = [group for group in engine.groups.values() if isinstance(group, ThreadGroup)]
-        threads = [(group.name, thread) for group in groups if (thread := group.stop()) is not None]
-        until = time.monotonic() + engine.teardown_limit_s
-        for name, thread in threads:
-            while thread.is_alive() and time.monotonic() < until:
+        """Let idle threads end; those that work have had their time and are left to themselves, as daemons."""
+        stuck = {worker.group for worker in self._engine.all_workers() if worker.in_flight}
+        for group in self._engine.groups.values():
+            thread = group.stop() if isinstance(group, ThreadGroup) else None
+            while thread is not None and thread.is_alive() and group not in stuck:
                 await asyncio.sleep(0)
                 thread.join(0.001)
-            if thread.is_alive():
-                engine.leftover_threads.append(f'thread of group "{name}"')
-        for group in groups:
-            engine.leftover_threads.extend(what for what, thread in group.abandoned if thread.is_alive())
+
+
+def _doing(worker: Worker) -> str:
+    if worker.call_edge is not None:
+        return f"slot {worker.call_edge.port_name}, call {worker.call_number}"
+    return f"firing {worker.firings}"
+
+
+def _did_not_end(worker: Worker, seconds: float) -> str:
+    if worker.group.threaded:
+        return f"its thread did not come back within {seconds:.1f} s of the end and was left behind"
+    return f"it was cancelled and did not end within {seconds:.1f} s"
