@@ -34,8 +34,8 @@ def run(worker: Worker, name: str, token: Token[Any], then: Callable[[], None]) 
     elif name == "enable":
         lifecycle.enable(worker, then)
     elif name == "disable":
-        then()
         lifecycle.disable(worker)
+        then()
     elif name == "reset":
         lifecycle.reset(worker, then)
     elif name == "stop":

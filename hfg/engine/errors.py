@@ -9,7 +9,7 @@ from typing import Any
 
 from hfg.engine import firing, lifecycle
 from hfg.engine.sending import automatic, block, flush_automatic, put_outputs, report_error, unblock
-from hfg.engine.worker import BACKOFF, TORN_DOWN, Worker
+from hfg.engine.worker import BACKOFF, TORN_DOWN, UNREADY, Worker
 from hfg.errors import EndOfStream, FiringTimeout, HfgError, NodeError, QueueLimit
 from hfg.ports.edges import EventEdge
 
@@ -38,10 +38,16 @@ def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> No
 
 
 def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
-    """A slot call has failed: with every policy but `stop` it is counted, for it owes no outputs."""
+    """A slot call has failed: it owes no outputs, so with every policy but `stop` it is only counted."""
     worker.calls_failed += 1
     problem = as_node_error(worker, f"slot {slot}, call {worker.call_number}", error)
-    apply_policy(worker, problem, answer=False, then=lambda: firing.finish_call(worker, "failed"))
+    policy = worker.options.on_error
+    report_error(worker, problem.what, error, policy)
+    if policy == "stop":
+        worker.core.host.finish("failed", problem)
+        return
+    worker.core.errors.append(problem)
+    firing.finish_call(worker, "failed")
 
 
 def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any = None) -> None:
@@ -86,7 +92,7 @@ def _restart(worker: Worker) -> None:
         if error is not None:
             core.host.finish("failed", error)
         elif not worker.blocked & TORN_DOWN:
-            unblock(worker, BACKOFF)
+            unblock(worker, BACKOFF | UNREADY)
 
     lifecycle.tear_down(worker, lambda _error: torn_down())
 

@@ -13,6 +13,7 @@ from hfg.activity.rules import after_receipt
 from hfg.engine import builtin_slots
 from hfg.engine.sending import (
     automatic,
+    block,
     consider,
     derive_scopes,
     flush_automatic,
@@ -81,7 +82,9 @@ def _ask_ready(worker: Worker) -> None:
 
     def answered(ready: Any, error: BaseException | None) -> None:
         worker.busy = ""
-        if error is not None:
+        if error is not None:  # no answer is no: else it would be asked, and fail, without end
+            worker.placed = False
+            worker.blocked |= UNREADY
             worker.core.upstairs.fail(worker, "ready()", error, answer=False)
             idle_again(worker, asked=True)
         elif ready and worker.placed:
@@ -149,6 +152,7 @@ def fire(worker: Worker) -> None:
         _end(worker, edges, tokens)
     elif kind == "silent":
         worker.silent += 1
+        _place_next(worker)
         put_outputs(worker, None)
         finish_firing(worker, "silent")
     else:
@@ -156,7 +160,14 @@ def fire(worker: Worker) -> None:
         if options.max_rate_hz:
             worker.next_start = now + 1.0 / options.max_rate_hz
         worker.gate_next = now
+        _place_next(worker)
         _run_process(worker, edges, tokens)
+
+
+def _place_next(worker: Worker) -> None:
+    """What the next firing asks for may hold already: then it has its place before the calls that come now (F9, D1)."""
+    if worker.calls is not None and not worker.inputs.missing:
+        consider(worker)
 
 
 def _take(edge: Any) -> Token[Any]:
@@ -372,9 +383,10 @@ def write(worker: Worker, position: int, value: Any, activity: int | None, stamp
 
 
 def finish_firing(worker: Worker, outcome: Any) -> None:
-    """The firing is over: release what it took (F5), then the automatic events, then the next piece of work."""
+    """The automatic events follow (A9), then the firing is over and releases what it took (F5)."""
     core = worker.core
     _cancel_limit(worker)
+    flush_automatic(worker)
     if core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, outcome))
     taken = worker.taken
@@ -386,7 +398,6 @@ def finish_firing(worker: Worker, outcome: Any) -> None:
             release([edge for edge in taken if not edge.sequential])
     elif taken:
         release(taken)
-    flush_automatic(worker)
     worker.right = False
     worker.stamp = None
     idle_again(worker)
@@ -416,7 +427,7 @@ def _end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> 
             if core.trace is not None:
                 core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
     worker.end_firings += 1
-    worker.blocked |= ENDED
+    block(worker, ENDED)
     worker.deferred = []
     _cancel_limit(worker)
     for edge in worker.in_edges:
@@ -458,11 +469,13 @@ def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     wrote = written is not None and any(entry is not None for entry in written)
     if wrote:
         put_outputs(worker, written)
+    flush_automatic(worker)
     if core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended"))
     taken = worker.taken
     worker.taken = ()
     release(taken)
+    worker.end_stamp = worker.stamp
     if worker.outputs.missing:
         worker.pending_end = True
     else:
@@ -540,16 +553,16 @@ def await_call(worker: Worker, name: str, coroutine: Any) -> None:
 
 
 def finish_call(worker: Worker, outcome: Any) -> None:
-    """The call is over: an O->S token is processed (F6), the automatic events follow."""
+    """The automatic events follow (A9), then the call is over: an O->S token is processed (F6)."""
     core = worker.core
+    derive_scopes(core)
+    flush_automatic(worker)
     if core.trace is not None:
         core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
     edge = worker.call_edge
     worker.call_edge = None
     if type(edge) is SyncEdge:
         release((edge,))
-    derive_scopes(core)
-    flush_automatic(worker)
     worker.right = False
     worker.stamp = None
     idle_again(worker)

@@ -58,6 +58,7 @@ __all__ = [
     "touch",
     "trigger",
     "unblock",
+    "unplace",
 ]
 
 
@@ -105,7 +106,16 @@ def _must_wait(worker: Worker) -> bool:
 def block(worker: Worker, reason: int) -> None:
     """Let no firing start; its place in the agenda is lost (D1)."""
     worker.blocked |= reason
+    unplace(worker)
+
+
+def unplace(worker: Worker) -> None:
+    """What F1 asks for holds no more: no place, and no timer that would give one."""
     worker.placed = False
+    if worker.rate_timer is not None:
+        worker.rate_timer.cancel()
+        worker.rate_timer = None
+        worker.blocked &= ~RATE
 
 
 def unblock(worker: Worker, reason: int) -> None:
@@ -300,7 +310,7 @@ def send_end(worker: Worker) -> None:
     core = worker.core
     worker.pending_end = False
     end = (END, None, None)
-    worker.stamp = core.now() if worker.stamp is None else worker.stamp
+    worker.stamp = worker.end_stamp
     put_outputs(worker, [end] * len(worker.out_edges))
     worker.stamp = None
     if core.trace is not None:
@@ -538,7 +548,7 @@ def discard(edge: Any, reason: Any) -> None:
             _remove_call(target, edge)
     elif edge in target.live_inputs:
         target.inputs.missing += 1
-        target.placed = False
+        unplace(target)
     if type(edge) is EventEdge:
         freed(edge)
 

@@ -106,6 +106,7 @@ class Worker:
         "core",
         "deferred",
         "end_firings",
+        "end_stamp",
         "events",
         "events_due",
         "failed",
@@ -240,6 +241,7 @@ class Worker:
         self.held = False  # its inputs are released when its outputs are processed (F5 sequential)
         self.written: list[Any] | None = None
         self.events_due: list[tuple[str, Any]] | None = None
+        self.end_stamp: float | None = None  # of the firing that ended it, and so of END (T5)
         self.pending_end = False  # END leaves as soon as the outputs are free (F4)
         self.deferred: list[int] | None = None  # modifiers drained before END was sent (F12)
         self.generator: Any = None
