@@ -106,6 +106,9 @@ class Upstairs(Protocol):
     def scopes_changed(self, core: Core) -> None:
         """What subgraphs derive their activity from has changed (G2)."""
 
+    def rewire(self, worker: Worker) -> None:
+        """What a worker waits for has changed."""
+
     def choose_step(self, worker: Worker) -> None:
         """The wiring of a worker has changed: its shortest way may be another."""
 

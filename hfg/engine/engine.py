@@ -25,7 +25,7 @@ from hfg.engine.settings import Settings
 from hfg.engine.upstairs import Deciders
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import TORN_DOWN, Worker
-from hfg.errors import EngineInternalError, HfgError, RunError
+from hfg.errors import EngineInternalError, HfgError, NodeError, RunError
 from hfg.graph.flat import FlatGraph
 from hfg.trace import TraceEvent
 
@@ -118,7 +118,6 @@ class Engine:
         self.close = self.lifetime.close
         self.groups = self._make_groups()
         self._loop_group = self.groups["loop"]
-        self._main_task: asyncio.Task[Any] | None = None
         self.started_at = 0.0
         self.hurried = asyncio.Event()
         self._leave_by = float("inf")
@@ -184,9 +183,15 @@ class Engine:
             self.loop.call_soon(self._pump, context=self.context)
 
     def go_on(self) -> None:
-        """At the end of a callback of the loop: pump at once, which saves a pass of the loop."""
+        """At the end of a callback of the loop: pump at once, which saves a pass of the loop.
+
+        In virtual time not before everything else that is due at this instant has had its turn.
+        """
         if not self._scheduled and not self.core.pumping:
-            self._pump()
+            if self.virtual and self.loop._ready:  # type: ignore[attr-defined]
+                self.kick()
+            else:
+                self._pump()
 
     def _pump(self) -> None:
         """Drain the loop group within a slice; a hop is a few function calls."""
@@ -201,6 +206,8 @@ class Engine:
             self._drain(policy, policy.popleft if isinstance(policy, Fifo) else policy.pop, self._ready_groups)
         except Exception as error:
             self.internal_fault(error)
+        except (asyncio.CancelledError, GeneratorExit) as error:
+            self._misused(core.current, error)
         finally:
             core.pumping = core.plain = False
             core.current = None
@@ -220,6 +227,12 @@ class Engine:
         )
         if problem is not error:
             problem.__cause__ = error
+        self.finish("failed", problem)
+
+    def _misused(self, worker: Worker | None, error: BaseException) -> None:
+        """A node's code raised what is no error but Python's way to end a task or generator: without us a hang."""
+        problem = NodeError(worker.path if worker is not None else "", "its code", error)
+        problem.__cause__ = error
         self.finish("failed", problem)
 
     def guard(self, call: Callable[[], None]) -> None:
@@ -345,6 +358,11 @@ class Engine:
             self._leave_by = time.monotonic() + 1.0
             self.hurried.set()
 
+    def leave_now(self) -> None:
+        """Somebody is tired of waiting: wait for nothing any more."""
+        self._leave_by = 0.0
+        self.hurried.set()
+
     def finish(self, outcome: str, error: HfgError | None) -> None:
         """See `Host`."""
         if self.ended_how is not None:
@@ -355,6 +373,7 @@ class Engine:
         for worker in self.all_workers():
             worker.core.over = True
             worker.blocked |= TORN_DOWN
+            worker.placed = False  # what is queued already does nothing
             if worker.room_waiters is not None:
                 for waiter in worker.room_waiters:
                     waiter()
@@ -370,10 +389,6 @@ class Engine:
     def error(self) -> HfgError | None:
         """What the run failed with, if it did."""
         return None if self.ended_how is None else self.ended_how[1]
-
-    def watch_task(self, task: asyncio.Task[Any] | None) -> None:
-        """Whose cancellation means that somebody wants to leave, even while a node blocks the loop."""
-        self._main_task = task
 
     # --- the trace --------------------------------------------------------------------------------------------------
 

@@ -197,8 +197,8 @@ def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]], mo
     end = silent = has_value = has_mandatory = False
     for edge, token in zip(edges, tokens, strict=True):
         value = token.value
+        edge.ended = value is END
         if value is END:
-            edge.ended = True
             end = end or edge.mandatory
         elif value is NO_MESSAGE:
             silent = silent or edge.mandatory

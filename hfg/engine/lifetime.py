@@ -134,11 +134,27 @@ class Lifetime:
         engine = self._engine
         engine.finish("until", None)
 
-    async def close(self) -> tuple[str, HfgError | None]:
+    async def close(self) -> None:
         """Tear everything down, in reverse order of setup, each within its time limit (X3).
 
-        Gives back how the run ended.
+        Whoever waits for it may be cancelled: it is then in a hurry, but comes to its end before the cancellation goes
+        on.
         """
+        closing = asyncio.create_task(self._close(), name="hfg ending")
+        cancelled: asyncio.CancelledError | None = None
+        while not closing.done():
+            try:
+                await asyncio.shield(closing)
+            except asyncio.CancelledError as error:
+                cancelled = error
+                self._engine.hurry()
+            except Exception:
+                break  # it comes out below
+        if cancelled is not None:
+            raise cancelled
+        closing.result()
+
+    async def _close(self) -> None:
         engine = self._engine
         if engine.ended_how is None:
             engine.finish("cancelled", None)
@@ -168,7 +184,6 @@ class Lifetime:
         engine.ended_how = (outcome, error)
         if core.trace is not None:
             core.trace(RunEnded(engine.now(), outcome))
-        return outcome, error
 
     def _let_go(self) -> None:
         """Whatever happened: nothing of the run goes on, and the graph is free."""

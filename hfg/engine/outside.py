@@ -22,7 +22,7 @@ from hfg.errors import NotRunning, UsageError
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.types import accepts, describe
 
-__all__ = ["Feed", "collect", "read", "signal", "until"]
+__all__ = ["Feed", "collect", "need_modifier", "read", "signal", "until"]
 
 
 class Feed:
@@ -69,6 +69,7 @@ class Feed:
             raise NotRunning(
                 f'the feed of "{self._worker.port_name}" is closed: use it inside "async with run.feed(...)"'
             )
+        need_modifier(activity)
         if value is not None and not isinstance(value, Token | Marker) and not accepts(value, self._hint):
             raise TypeError(
                 f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got '
@@ -124,6 +125,12 @@ class Feed:
             await until(self._engine, self._worker.outputs.when_complete)
             if not self._worker.outputs.missing or self._engine.core.over:
                 return
+
+
+def need_modifier(activity: int | None) -> None:
+    """Refuse what is no activity modifier."""
+    if activity not in (None, -1, 0, 1):
+        raise UsageError(f"activity must be -1, 0 or +1, or None for what rule A3 says, got {activity!r}")
 
 
 async def until(engine: Engine, when: Callable[[Callable[[], None]], None]) -> None:

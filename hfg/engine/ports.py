@@ -5,6 +5,7 @@ Bound at each setup. Stands on `sending` and `firing`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -13,6 +14,8 @@ from hfg.engine.sending import trigger
 from hfg.engine.worker import RunningEvent, Worker
 from hfg.ports.automatic import AUTOMATIC_EVENTS
 from hfg.ports.events import EventPort
+from hfg.token import Token
+from hfg.types import accepts, describe
 
 __all__ = ["bind", "bind_automatic", "bind_event", "release_ports"]
 
@@ -39,6 +42,8 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         if relayed:
             for inner in relays.events_behind(worker.node.ports.events[name]):
                 inner.subscribe(worker.node.ports.events[name]._notify)
+    if worker.node is None:  # the graph's own `start`
+        return event
     port = event.port = worker.node.ports.events[name]
     host: Any = worker.core.host
     if relayed:
@@ -46,11 +51,15 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         return event
     if worker.group.threaded:
         port._emit = partial(_from_thread, worker, event)
+    elif worker.core.debug:
+        port._emit = partial(trigger, event)
     else:
         emit = steps.emitter(event)
         port.trigger = emit  # in place of the method, which would only call it
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     port._emit_wait = partial(host.trigger_wait, event)
+    if worker.core.debug:
+        port._emit, port._emit_wait = _checked(port, port._emit), _checked(port, port._emit_wait)
     host.adopt_event(port)
     if name in AUTOMATIC_EVENTS and worker.scope is not None:
         plan.watch_scope(worker.scope)
@@ -59,6 +68,20 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         steps.choose(worker)
         bind(worker)  # what it triggers may have consequences now
     return event
+
+
+def _checked(port: EventPort[Any], emit: Callable[..., Any]) -> Callable[[Any, int | None, float | None], Any]:
+    """In debug mode a signal's value must be of its event's type; none at all always is (T2)."""
+
+    def checked(value: Any, activity: int | None, stamp: float | None) -> Any:
+        plain = value.value if type(value) is Token else value
+        if plain is not None and not accepts(plain, port.type):
+            raise TypeError(
+                f'event "{port.path}" is declared {describe(port.type)}, got {describe(type(plain))}: {plain!r:.80}'
+            )
+        return emit(value, activity, stamp)
+
+    return checked
 
 
 def bind_automatic(worker: Worker) -> None:

@@ -73,7 +73,8 @@ def labels_of(flat: FlatGraph, what: Any) -> list[str]:
         edge.label
         for edge in flat.edges
         if any(
-            what is segment or what in (segment.source, segment.target, *_outer(segment.source), *_outer(segment.target))
+            what is segment
+            or what in (segment.source, segment.target, *_outer(segment.source), *_outer(segment.target))
             for segment in edge.segments
         )
     ]

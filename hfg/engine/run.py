@@ -17,6 +17,7 @@ from typing import Any, Literal
 from hfg.engine import outside, relays
 from hfg.engine.code import answer
 from hfg.engine.engine import Engine
+from hfg.engine.interrupt import CtrlC
 from hfg.engine.report import Report, edge_reports, node_reports
 from hfg.engine.settings import Settings
 from hfg.engine.virtual import VirtualTimeLoop
@@ -26,8 +27,10 @@ from hfg.graph import Graph
 from hfg.graph.checks import check_flat, runs_for_ever
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.nodetype import Node
+from hfg.ports import EventPort, ParameterPort, SlotPort
 from hfg.token import Token
 from hfg.trace import ParameterSet, TokenSent, TraceEvent
+from hfg.types import accepts, describe
 
 __all__ = ["Run", "run", "run_async", "running"]
 
@@ -56,7 +59,18 @@ class Run:
           value: of the port's type; a token passed on keeps its modifier and stamp.
           activity: the modifier; into a slot it acts as over an active edge.
           stamp: seconds on the run's clock; now, if not given.
+
+        Raises:
+          TypeError: the value is not of the port's type.
         """
+        if not isinstance(port, EventPort | SlotPort):
+            raise UsageError(
+                f"run.trigger is for slots and events of nodes, got {port!r}; give tokens to a graph input with run.feed"
+            )
+        outside.need_modifier(activity)
+        plain = value.value if isinstance(value, Token) else value
+        if not accepts(plain, port.type) and (plain is not None or port.kind == "slot"):
+            raise TypeError(f'{port.kind} "{port.path}" expects {describe(port.type)}, got {plain!r:.80}')
         if relays.is_relay(port):
             await self._trigger_inside(port, value, activity, stamp)
             return
@@ -64,11 +78,6 @@ class Run:
             worker = self._worker(port.node)
             await outside.signal(self._engine, worker, port.name, value, activity, stamp)
             return
-        if port.kind != "event":
-            raise UsageError(
-                f'"{port.path}" is an {port.kind}: run.trigger is for slots and events; give tokens to a '
-                f"graph input with run.feed"
-            )
         from hfg.engine.ports import bind_event
 
         event = bind_event(self._worker(port.node), port.name)
@@ -155,6 +164,10 @@ class Run:
         Raises:
           ValueError: the value is out of the parameter's limits; nothing is changed.
         """
+        if not isinstance(parameter, ParameterPort):
+            raise UsageError(
+                f'run.set takes the port of a parameter, as in node.ports.parameters["name"], got {parameter!r}'
+            )
         parameter.node._set_parameter(parameter.name, value)
         core = self._engine.core
         if core.trace is not None:
@@ -168,6 +181,8 @@ class Run:
         Raises:
           NotRunning: the run ended without one.
         """
+        if not isinstance(event, EventPort):
+            raise UsageError(f"run.wait_for waits for an event of a node, got {event!r}; look at others with run.tap")
         waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
         from hfg.engine.ports import bind_event
 
@@ -281,10 +296,10 @@ class Run:
 
     def _worker(self, node: Any) -> Worker:
         place = getattr(node, "place", None)
-        if node is self.graph or place is None or (place.path == "" and node is not None):
+        if node is self.graph:
             worker = self._engine.core.boundary
         else:
-            worker = self._engine.core.by_path.get(place.path)
+            worker = None if place is None else self._engine.core.by_path.get(place.path)
             if worker is not None and worker.node is not node:
                 worker = None
         if worker is None:
@@ -342,10 +357,16 @@ def _names(ports: Any) -> str:
     return ", ".join(f'"{name}"' for name in ports) or "none"
 
 
+def _need_clock(clock: str) -> None:
+    if clock not in ("real", "virtual"):
+        raise UsageError(f'clock must be "real" or "virtual", got {clock!r}')
+
+
 def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
     """Check the graph and make its running form; nothing has happened yet."""
     if not isinstance(graph, Graph):
         raise UsageError(f"a Graph can run, not {type(graph).__name__}: write hfg.run(graph)")
+    _need_clock(clock)
     if graph._run is not None:
         raise UsageError(f'graph "{graph.name}" runs already: a graph has one run at a time; build a second graph')
     loop = asyncio.get_running_loop()
@@ -378,13 +399,14 @@ def _refuse_endless(flat: FlatGraph) -> None:
             )
 
 
-async def _run_to_end(graph: Graph, clock: Clock, settings: Settings) -> Report:
+async def _run_to_end(graph: Graph, clock: Clock, settings: Settings, ctrl_c: CtrlC | None = None) -> Report:
     run = _prepare(graph, clock, settings)
     engine = run._engine
+    if ctrl_c is not None:
+        ctrl_c.task, ctrl_c.leave_now = asyncio.current_task(), engine.leave_now
     try:
         for worker in engine.core.readers:
             outside.collect(engine, worker, run._outputs.setdefault(worker.port_name, []))
-        engine.watch_task(asyncio.current_task())
         if settings.allow_idle:
             engine.hold()
         await engine.start()
@@ -481,9 +503,17 @@ def run(
         allow_idle=allow_idle,
         block_warning_s=block_warning_s,
     )
+    _need_clock(clock)
     factory = VirtualTimeLoop if clock == "virtual" else None
-    with asyncio.Runner(loop_factory=factory) as runner:
-        return runner.run(_run_to_end(graph, clock, settings))
+    ctrl_c = CtrlC()
+    runner = asyncio.Runner(loop_factory=factory)
+    try:
+        with ctrl_c.handled(runner.get_loop()), runner:
+            return runner.run(_run_to_end(graph, clock, settings, ctrl_c))
+    except (asyncio.CancelledError, KeyboardInterrupt):
+        if not ctrl_c.count:
+            raise
+    raise KeyboardInterrupt(f'graph "{graph.name}" was interrupted; what came back is torn down')
 
 
 @asynccontextmanager
@@ -529,6 +559,8 @@ async def running(
             yield run
     except asyncio.CancelledError:
         if not cancelled_by_us:
+            engine.finish("cancelled", None)
+            engine.hurry()
             raise
         body.uncancel()
     finally:
@@ -537,7 +569,7 @@ async def running(
         if engine.outcome == "running":
             engine.finish("stopped", None)
         try:
-            await asyncio.shield(_quietly(run._close()))
+            await _quietly(run._close())
         finally:
             graph._run = None
     run._raise_failure()

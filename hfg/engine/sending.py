@@ -158,7 +158,7 @@ def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float |
             carried = carried or (modifier == 1 and explicit is None)
             (for_slots if edge.target_kind == "slot" else for_inputs).append((edge, value, modifier, own_stamp))
     if for_slots or for_inputs:
-        worker.placed = False
+        unplace(worker)
     for edge, value, modifier, own_stamp in for_slots:
         put(edge, value, modifier, own_stamp)
     for edge, value, modifier, own_stamp in for_inputs:
@@ -207,7 +207,7 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
         edge.source.outputs.missing += 1
         if type(value) is Marker:
             target.special = True
-        arrived(target)
+        arrived(edge)
     else:
         edge.queue.append(token)
         if len(edge.queue) > edge.delay:
@@ -216,13 +216,17 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
         if type(value) is Marker:
             target.special = True
         if len(edge.queue) == 1:
-            arrived(target)
+            arrived(edge)
     if modifier > 0 and target.scopes:
         touch(core, target.scopes)
 
 
-def arrived(target: Worker) -> None:
-    """One more of its inputs holds a token."""
+def arrived(edge: Edge) -> None:
+    """One more input of its target holds a token."""
+    target: Worker = edge.target
+    if edge.ended:  # an optional one that was absent since its END takes part again (F4)
+        target.core.upstairs.rewire(target)
+        return
     barrier = target.inputs
     barrier.missing -= 1
     if not barrier.missing:
@@ -445,7 +449,7 @@ def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
         if type(value) is Marker:
             target.special = True
         if len(edge.queue) == 1:
-            arrived(target)
+            arrived(edge)
     else:
         add_call(target, edge)
     if modifier > 0 and target.scopes:

@@ -64,7 +64,7 @@ def choose(worker: Worker) -> None:
     if worker.slot_edges or "processed" in worker.events:
         return
     outs = [edge for edges in worker.out_edges for edge in edges]
-    if any(type(edge) is not SyncEdge or edge.target_kind != "input" for edge in outs):
+    if any(type(edge) is not SyncEdge or edge.target_kind != "input" or edge.ended for edge in outs):
         return
     if any(edge.target.is_boundary_output and edge.target.process is None for edge in outs):
         return  # a reader waits at its barrier

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hfg.engine import activity, errors, ports, quiet, steps
+from hfg.engine import activity, errors, ports, quiet, steps, wiring
 from hfg.engine.iteration import Iteration
 
 __all__ = ["Deciders"]
@@ -17,6 +17,7 @@ class Deciders:
     node_ended = staticmethod(quiet.node_ended)
     activity_changed = staticmethod(activity.changed)
     scopes_changed = staticmethod(activity.scopes_changed)
+    rewire = staticmethod(wiring.rewire)
     choose_step = staticmethod(steps.choose)
     bind_ports = staticmethod(ports.bind)
     iteration = staticmethod(Iteration)

@@ -54,7 +54,7 @@ def rewire(worker: Worker) -> None:
     worker.out_edges = tuple(tuple(edge for edge in edges if edge.live) for edges in worker.wired_out)
     live = []
     for edge in worker.in_edges:
-        if edge.ended:
+        if edge.ended and not edge.untaken:
             continue
         if type(edge) is EventEdge:
             if edge.target_kind == "parameter":
