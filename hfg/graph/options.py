@@ -176,7 +176,8 @@ def edge_options(
     Raises:
       ConnectionError: a value is out of its range, or the options contradict each other.
     """
-    through, initial = tuple(through), tuple(initial)
+    through = _listed(where, "through", through, "[ops.debounce(0.2)]")
+    initial = _listed(where, "initial", initial, "[0]")
     if (
         not through
         and not initial
@@ -218,6 +219,15 @@ def edge_options(
         through=through,
         initial=initial,
     )
+
+
+def _listed(where: Callable[[], str], name: str, given: object, example: str) -> tuple[Any, ...]:
+    """Several things, in order; one alone is the likely slip."""
+    if type(given) is tuple:
+        return given
+    if not isinstance(given, Iterable) or isinstance(given, str):
+        raise errors.ConnectionError(f"{where()}: {name} takes a list, as in {name}={example}, got {given!r}")
+    return tuple(given)
 
 
 def group_spec(name: str, threads: int, policy: str, seed: int | None) -> GroupSpec:
