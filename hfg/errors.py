@@ -53,6 +53,9 @@ __all__ = [
 ]
 
 
+_SHOWN = 20  # findings of a check that a message lists
+
+
 class HfgError(Exception):
     """Whatever hfg raises on purpose."""
 
@@ -80,7 +83,10 @@ class CheckFailed(GraphError):
         self.problems = tuple(problems)
         errors = [problem for problem in self.problems if problem.severity == "error"]
         count = "1 error" if len(errors) == 1 else f"{len(errors)} errors"
-        super().__init__(f"the graph has {count}:\n" + "\n".join(f"  {problem}" for problem in errors))
+        lines = [f"  {problem}" for problem in errors[:_SHOWN]]
+        if len(errors) > _SHOWN:
+            lines.append(f"  ... and {len(errors) - _SHOWN} more: graph.check() lists them all")
+        super().__init__("\n".join([f"the graph has {count}:", *lines]))
 
 
 class UsageError(HfgError):

@@ -301,6 +301,16 @@ def test_check_gives_problems_and_a_run_refuses_errors() -> None:
     assert [problem for problem in error.value.problems if problem.severity == "error"]
 
 
+def test_refusal_of_a_graph_with_very_many_errors_stays_readable() -> None:
+    graph = hfg.Graph()
+    for _ in range(100):
+        graph.add(numbers(), group="vision")
+    with pytest.raises(hfg.errors.CheckFailed, match=r"(?s)^the graph has 100 errors:.*\.\.\. and 80 more") as error:
+        hfg.run(graph)
+    assert len(str(error.value).splitlines()) == 22
+    assert len([problem for problem in error.value.problems if problem.severity == "error"]) == 100
+
+
 # --- fixed with it ---
 
 RESERVED = [
