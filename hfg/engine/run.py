@@ -403,7 +403,7 @@ async def _run_to_end(graph: Graph, clock: Clock, settings: Settings, ctrl_c: Ct
     run = _prepare(graph, clock, settings)
     engine = run._engine
     if ctrl_c is not None:
-        ctrl_c.task, ctrl_c.leave_now = asyncio.current_task(), engine.leave_now
+        ctrl_c.task, ctrl_c.engine = asyncio.current_task(), engine
     try:
         for worker in engine.core.readers:
             outside.collect(engine, worker, run._outputs.setdefault(worker.port_name, []))
@@ -513,7 +513,7 @@ def run(
     except (asyncio.CancelledError, KeyboardInterrupt):
         if not ctrl_c.count:
             raise
-    raise KeyboardInterrupt(f'graph "{graph.name}" was interrupted; what came back is torn down')
+    raise KeyboardInterrupt(ctrl_c.sentence(graph.name))
 
 
 @asynccontextmanager
