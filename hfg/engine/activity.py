@@ -11,7 +11,17 @@ from typing import Any
 
 from hfg.engine.core import Core
 from hfg.engine.scopes import Scope
-from hfg.engine.sending import automatic, block, consider, flush_automatic, set_active, touch, trigger, unblock
+from hfg.engine.sending import (
+    automatic,
+    block,
+    consider,
+    flush_automatic,
+    must_wait,
+    set_active,
+    touch,
+    trigger,
+    unblock,
+)
 from hfg.engine.worker import RATE, RESTING, Worker
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "scopes_changed", "strip"]
@@ -85,9 +95,11 @@ def _rest(worker: Worker) -> None:
     if any(gate.idle_rate_hz is None and not gate.state.active for gate in worker.gates_over):
         block(worker, RESTING)
         return
-    worker.placed = False  # throttled, it may have to wait now (D7)
     unblock(worker, RESTING)
-    consider(worker)
+    if worker.placed and must_wait(worker):  # throttled from now on (D7)
+        worker.placed = False
+    else:
+        consider(worker)
 
 
 # --- subgraphs ------------------------------------------------------------------------------------------------------

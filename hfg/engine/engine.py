@@ -174,6 +174,16 @@ class Engine:
         else:
             self.loop.call_soon_threadsafe(call, context=self.context)
 
+    def bring_in(self, call: Callable[[], None]) -> None:
+        """From a thread that is none of ours: do this on the loop, in order, unless the run is over by then."""
+
+        def arrive() -> None:
+            if not self.core.over:
+                self.guard(call)
+                self.go_on()
+
+        self.loop.call_soon_threadsafe(arrive, context=self.context)
+
     # --- the pump ---------------------------------------------------------------------------------------------------
 
     def kick(self) -> None:

@@ -86,7 +86,7 @@ def disable(worker: Worker) -> None:
 def settle_disabled(worker: Worker) -> None:
     """The node, or a subgraph around it, was disabled: empty its edges and rewire its neighbours."""
     incoming = [edge for edge in worker.edges_in() if not (edge.port_name == "enable" and edge.target_kind == "slot")]
-    outgoing = [edge for edges in worker.out_edges for edge in edges]
+    outgoing = [edge for edges in worker.wired_out for edge in edges]
     untaken = [edge for edge in outgoing if edge.untaken]
     for edge in (*incoming, *outgoing):
         discard(edge, "disabled")

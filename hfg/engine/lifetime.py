@@ -17,7 +17,7 @@ from hfg.engine.activity import gate_changed
 from hfg.engine.code import answer
 from hfg.engine.core import Core
 from hfg.engine.groups import ThreadGroup
-from hfg.engine.sending import consider, discard, trigger
+from hfg.engine.sending import consider, discard, note_full, trigger
 from hfg.engine.watchdog import Watch, watchdog
 from hfg.engine.worker import STARTING, Worker
 from hfg.errors import HfgError, NodeError, TeardownError
@@ -73,6 +73,8 @@ class Lifetime:
         for edge in core.edges:
             if isinstance(edge, DelayEdge | EventEdge):
                 edge.queue.extend(Token(value, 0, engine.now(), 0) for value in edge.initial)
+                if isinstance(edge, EventEdge):
+                    note_full(edge)
         for worker in core.workers:
             if worker.scope is None:
                 await self._set_up_one(worker)

@@ -52,7 +52,8 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     if worker.group.threaded:
         port._emit = partial(_from_thread, worker, event)
     elif worker.core.debug:
-        port._emit = partial(trigger, event)
+        emit = steps.emitter(event, plainly=True)
+        port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     else:
         emit = steps.emitter(event)
         port.trigger = emit  # in place of the method, which would only call it

@@ -130,7 +130,7 @@ def node_ended(worker: Worker) -> None:
 
 
 def _feeds_only_ended(source: Worker) -> bool:
-    edges = [edge for edge in source.all_out_edges() if edge.live]
+    edges = list(source.all_out_edges())
     return bool(edges) and all(edge.target.blocked & ENDED for edge in edges)
 
 

@@ -1,4 +1,6 @@
-"""Ports of subgraphs, seen from outside a run: boxes are dissolved, so their ports stand for those behind them (rule G1).
+"""Ports of subgraphs, seen from outside a run: boxes are dissolved, so their ports stand for those behind them.
+
+(rule G1).
 
 Looks at the graph as it was drawn. Stands on `graph`.
 """

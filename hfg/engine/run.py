@@ -65,7 +65,8 @@ class Run:
         """
         if not isinstance(port, EventPort | SlotPort):
             raise UsageError(
-                f"run.trigger is for slots and events of nodes, got {port!r}; give tokens to a graph input with run.feed"
+                f"run.trigger is for slots and events of nodes, got {port!r}; give tokens to a graph input "
+                f"with run.feed"
             )
         outside.need_modifier(activity)
         plain = value.value if isinstance(value, Token) else value

@@ -45,6 +45,8 @@ __all__ = [
     "flush_automatic",
     "freed",
     "give_back",
+    "must_wait",
+    "note_full",
     "outputs_free",
     "put",
     "put_outputs",
@@ -76,14 +78,14 @@ def consider(worker: Worker) -> None:
     """Something that F1 asks for has changed: give the next firing its place if all of it holds now (F9, D1)."""
     if worker.inputs.missing or worker.outputs.missing or worker.blocked or worker.placed:
         return
-    if worker.paced and _must_wait(worker):
+    if worker.paced and must_wait(worker):
         return
     worker.placed = True
     worker.ahead = len(worker.calls) if worker.calls else 0
     queue(worker)
 
 
-def _must_wait(worker: Worker) -> bool:
+def must_wait(worker: Worker) -> bool:
     """F11 and D7: nothing starts before the rate allows it; the timer is set only when something would."""
     when = worker.next_start
     if worker.is_source:
@@ -440,11 +442,7 @@ def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
             target.inputs.missing += 1
             target.placed = False
     edge.queue.append(token)
-    if edge.overflow == "wait" and not edge.full and len(edge.queue) >= edge.capacity and edge.live:
-        edge.full = True
-        source: Worker = edge.source
-        source.full_edges += 1
-        block(source, FULL)
+    note_full(edge)
     if into_input:
         if type(value) is Marker:
             target.special = True
@@ -463,6 +461,15 @@ def _remove_call(target: Worker, edge: Edge) -> None:
     del target.calls[position]
     if position < target.ahead:
         target.ahead -= 1
+
+
+def note_full(edge: EventEdge) -> None:
+    """F8: a live `wait` edge that holds its capacity or more keeps its source from starting anything new."""
+    if edge.overflow == "wait" and not edge.full and len(edge.queue) >= edge.capacity and edge.live:
+        edge.full = True
+        source: Worker = edge.source
+        source.full_edges += 1
+        block(source, FULL)
 
 
 def freed(edge: EventEdge) -> None:

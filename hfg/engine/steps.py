@@ -10,6 +10,7 @@ somebody's interest in the trace changes. Stands on `firing`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from types import CoroutineType
 from typing import Any
 
@@ -417,20 +418,23 @@ def _call_taken(worker: Worker, edge: EventEdge) -> None:
     worker.ticket += 1
 
 
-def emitter(event: RunningEvent) -> Callable[..., None]:
+def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None]:
     """What a port's `trigger` does: the short way for one plain edge into a slot that nobody watches.
 
     Else `sending.trigger`.
     """
     worker = event.worker
     core = worker.core
-    general = trigger
+    host: Any = core.host
     edges = event.edges
 
     def emit_general(value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:
-        general(event, value, activity, stamp)
+        if host.on_loop():
+            trigger(event, value, activity, stamp)
+        else:  # from a thread that the user has started, as drivers do
+            host.bring_in(partial(trigger, event, value, activity, core.now() if stamp is None else stamp))
 
-    if not core.fast or len(edges) != 1:
+    if plainly or not core.fast or len(edges) != 1:
         return emit_general
     edge = edges[0]
     target: Worker = edge.target
@@ -448,11 +452,12 @@ def emitter(event: RunningEvent) -> Callable[..., None]:
         if (
             activity is not None
             or not core.plain
+            or core.current is not worker  # perhaps a thread, while the loop is at work
             or port._observers is not None
             or not edge.live
             or type(value) is Token
         ):
-            general(event, value, activity, stamp)
+            emit_general(value, activity=activity, stamp=stamp)
             return
         if stamp is None:
             stamp = worker.stamp

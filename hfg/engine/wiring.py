@@ -22,7 +22,8 @@ def is_live(edge: Any) -> bool:
         return False
     if edge.target.blocked & DISABLED and not (edge.target_kind == "slot" and edge.port_name == "enable"):
         return False
-    return all(scope.enabled for scope in edge.via)
+    around = (*edge.source.around, *edge.target.around)  # whether those are enabled is known by their nodes
+    return all(scope.enabled for scope in edge.via if scope not in around)
 
 
 def refresh(worker: Worker) -> None:
