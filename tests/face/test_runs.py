@@ -497,3 +497,48 @@ def test_events_are_refused_where_they_would_be_awaited(fetch: Fetch, drive: Any
                 await fetch.lookup.unknown
 
     drive(main())
+
+
+@pytest.mark.parametrize("debug", [False, True])
+def test_thread_of_a_driver_may_trigger_events(drive: Any, debug: bool) -> None:
+    """They are handed to the loop at once and in order, also while nothing else happens there."""
+
+    class Driver(hfg.Node):
+        seen = hfg.Event(int)
+
+        def setup(self) -> None:
+            self.thread = threading.Thread(target=self.work, daemon=True)
+
+        @hfg.slot
+        def begin(self) -> None:
+            self.thread.start()
+
+        def teardown(self) -> None:
+            self.thread.join(5)
+
+        def work(self) -> None:
+            for number in range(5):
+                self.seen.trigger(number)
+
+    class Ear(hfg.Node):
+        heard = hfg.State(factory=list)
+
+        @hfg.slot
+        def hear(self, number: int) -> None:
+            assert threading.current_thread() is threading.main_thread()
+            self.heard.append(number)
+
+    async def main() -> None:
+        graph = hfg.Graph()
+        driver, ear = graph.add(Driver()), graph.add(Ear())
+        graph.connect(driver.seen, ear.hear)
+        async with hfg.running(graph, debug=debug) as run:
+            last = asyncio.create_task(run.wait_for(driver.seen))
+            await asyncio.sleep(0)
+            await run.trigger(driver.begin)
+            await last
+            while len(ear.heard) < 5:
+                await asyncio.to_thread(threading.Event().wait, 0.001)
+            assert ear.heard == [0, 1, 2, 3, 4]
+
+    drive(main())
