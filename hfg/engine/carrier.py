@@ -43,9 +43,14 @@ class _Bed(asyncio.Future[None]):
     def cancel(self, msg: Any = None) -> bool:
         """Hand the cancellation on; without a coroutine under way the task itself ends."""
         carrier = self.carrier
-        if carrier is not None and carrier.waiting:
-            carrier._cancelled(msg)
-            return True
+        if carrier is not None:
+            if carrier.waiting:
+                carrier._cancelled(msg)
+                return True
+            if asyncio.current_task(carrier._loop) is carrier.task:  # a coroutine cancels itself in its first step
+                carrier._cancelled(msg)
+                carrier._loop.call_soon(carrier._forget_cancellation)
+                return True
         return super().cancel(msg)
 
 
@@ -135,6 +140,13 @@ class Carrier:
         future = self._waits_for
         if future is None or not future.cancel(msg=message):
             self._must_cancel = asyncio.CancelledError() if message is None else asyncio.CancelledError(message)
+
+    def _forget_cancellation(self) -> None:
+        """It was meant for a coroutine that has ended without ever waiting."""
+        if not self.waiting:
+            self._must_cancel = None
+            while self.task.cancelling():
+                self.task.uncancel()
 
     def _wait(self, waits_for: Any) -> None:
         """Go on when what the coroutine yielded is done; the protocol between coroutines, futures and tasks."""

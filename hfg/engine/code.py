@@ -122,8 +122,9 @@ class CodeRunner:
             if worker.in_flight and (worker.carrier is carrier or carrier is None):
                 worker.in_flight = False
                 worker.core.in_flight -= 1
-            elif self.given_up:
+            elif carrier in self.given_up:
                 self.given_up.discard(carrier)
+                carrier.drop()  # its task has nothing to do any more
             if outer.over:
                 self.came_back.set()
                 if not closing:
