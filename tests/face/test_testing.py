@@ -36,6 +36,10 @@ def numbers(*, count: int = 3) -> Iterator[int]:
     yield from range(count)
 
 
+@hfg.node
+def drive(goal: Pose) -> None: ...
+
+
 class First(hfg.Node):
     """Leans on the order in which two sources fire, which nobody promised."""
 
@@ -59,7 +63,7 @@ def build_graph() -> hfg.Graph:
     graph = hfg.Graph()
     lookup = graph.add(MapLookup())
     graph.connect(graph.add(numbers()).out, lookup.key)
-    graph.connect(lookup.pose, graph.output("poses", Pose))
+    graph.connect(lookup.pose, graph.add(drive()).goal)
     return graph
 
 
@@ -92,7 +96,7 @@ def test_reference_run_agrees_with_the_engine() -> None:
     reference, report = reference_run(build_graph()), hfg.run(build_graph(), clock="virtual")
     assert reference.outcome == report.outcome
     assert reference.values("numbers.out -> map_lookup.key") == [0, 1, 2, hfg.END]
-    assert len(reference.values("map_lookup.pose -> poses")) == report.edges["map_lookup.pose -> poses"].sent
+    assert len(reference.values("map_lookup.pose -> drive.goal")) == report.edges["map_lookup.pose -> drive.goal"].sent
 
 
 @settings(max_examples=10, deadline=None)
