@@ -260,7 +260,11 @@ class Lifetime:
         if worker.generator is None and worker.node._hook("teardown") is None:
             return None
         waiter: asyncio.Future[NodeError | None] = engine.loop.create_future()
-        lifecycle.tear_down(worker, partial(answer, waiter))
+        try:
+            lifecycle.tear_down(worker, partial(answer, waiter))
+        except KeyboardInterrupt:  # meant for this hook, which blocks; the others have their turn
+            engine.hurry()
+            return NodeError(worker.path, "teardown()", "it was interrupted")
         limit = engine.teardown_limit_s
         if await self._within_limit(waiter):
             return waiter.result()

@@ -510,8 +510,10 @@ def run(
     runner = asyncio.Runner(loop_factory=factory)
     try:
         with ctrl_c.handled(runner.get_loop()), runner:
-            return runner.run(_run_to_end(graph, clock, settings, ctrl_c))
-    except (asyncio.CancelledError, KeyboardInterrupt):
+            report = runner.run(_run_to_end(graph, clock, settings, ctrl_c))
+        if not ctrl_c.count:
+            return report
+    except (asyncio.CancelledError, KeyboardInterrupt, RunError):
         if not ctrl_c.count:
             raise
     raise KeyboardInterrupt(ctrl_c.sentence(graph.name))
