@@ -88,6 +88,9 @@ class Host(Protocol):
 class Upstairs(Protocol):
     """What modules further up do when those below come to it, so that imports go down only."""
 
+    def idle_again(self, worker: Worker) -> None:
+        """What kept a worker busy is over."""
+
     def fail(self, worker: Worker, what: str, error: BaseException, *, answer: bool) -> None:
         """X1: a firing (`answer`: it still owes its outputs) or something beside one has failed."""
 

@@ -36,7 +36,7 @@ _SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real cl
 _SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
 _VIRTUAL_SLICE_STEPS = 2048  # in virtual time a slice must not depend on how fast the machine is
 
-_MOST_AT_ONE_INSTANT = 20_000_000  # firings, before a run with `until_s` is taken to stand still
+_MOST_AT_ONE_INSTANT = 3_000_000  # firings, before a run with `until_s` is taken to stand still
 
 _code_of: contextvars.ContextVar[Worker | None] = contextvars.ContextVar("hfg.code_of", default=None)
 
@@ -302,16 +302,21 @@ class Engine:
         if core.timers:
             return
         if core.in_flight and not (
-            (core.futile and quiet.only_futile_in_flight(core))
-            or (core.waiting_room and quiet.only_waiting_for_room(core))
+            (core.futile and self._only_futile_works()) or (core.waiting_room and quiet.only_waiting_for_room(core))
         ):
             return
         self.quiet()
 
+    def _only_futile_works(self) -> bool:
+        """R5: only sources that feed ended nodes are under way, and nobody stands behind them in their group."""
+        if any(isinstance(group, ThreadGroup) and len(group.policy) for group in self.groups.values()):
+            return False
+        return quiet.only_futile_in_flight(self.core, threads_too=not self.virtual)
+
     def quiet(self) -> None:
         """Nothing runs, nothing can start, no timer is pending (F8, P9, F13, R5)."""
         core = self.core
-        if quiet.grow(core):
+        if quiet.grow(core) or core.timers:
             return
         self._answer_quiet()
         if self.holds or any(reader.inputs_ready() for reader in self.readers):
@@ -319,7 +324,7 @@ class Engine:
         if quiet.complete_operators(core):
             self.kick()
             return
-        if core.timers:
+        if core.timers > 0:
             return
         if quiet.end_events(core):
             self.kick()

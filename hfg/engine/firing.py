@@ -12,6 +12,7 @@ from typing import Any
 from hfg.activity.rules import after_receipt
 from hfg.engine import builtin_slots
 from hfg.engine.sending import (
+    SAME_MOMENT_S,
     automatic,
     block,
     consider,
@@ -82,7 +83,11 @@ def _ask_ready(worker: Worker) -> None:
 
     def answered(ready: Any, error: BaseException | None) -> None:
         worker.busy = ""
-        if error is not None:  # no answer is no: else it would be asked, and fail, without end
+        if isinstance(error, EndOfStream) and worker.is_source and worker.placed:
+            worker.busy = "firing"
+            worker.firings += 1
+            source_ended(worker)
+        elif error is not None:  # no answer is no: else it would be asked, and fail, without end
             worker.placed = False
             worker.blocked |= UNREADY
             worker.core.upstairs.fail(worker, "ready()", error, answer=False)
@@ -102,6 +107,10 @@ def _ask_ready(worker: Worker) -> None:
 def idle_again(worker: Worker, *, asked: bool = False) -> None:
     """A firing, call or question is over: see what is next."""
     worker.busy = ""
+    while worker.on_idle and not worker.busy:
+        worker.on_idle.pop(0)()
+    if worker.busy:
+        return
     if not asked:
         worker.blocked &= ~UNREADY
     if worker.placed:
@@ -222,7 +231,7 @@ def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]], mo
 
 def _idle_turn(worker: Worker, idle_rate_hz: float | None) -> bool:
     """A11: a throttled node runs its function as often as the idle rate allows."""
-    return idle_rate_hz is not None and worker.core.now() >= worker.gate_next + 1.0 / idle_rate_hz
+    return idle_rate_hz is not None and worker.core.now() + SAME_MOMENT_S >= worker.gate_next + 1.0 / idle_rate_hz
 
 
 def _all_ended(worker: Worker) -> bool:
@@ -414,6 +423,7 @@ def _cancel_limit(worker: Worker) -> None:
 
 def source_ended(worker: Worker) -> None:
     """F2: the generator returned or the code raised EndOfStream; what the firing wrote before stays unsent."""
+    worker.generator = None  # nothing is left to close
     worker.written = None
     _end(worker, (), ())
 
@@ -476,6 +486,7 @@ def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     worker.taken = ()
     release(taken)
     worker.end_stamp = worker.stamp
+    worker.right = False  # the firing is over; END is not part of it (A3)
     if worker.outputs.missing:
         worker.pending_end = True
     else:

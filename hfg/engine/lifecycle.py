@@ -88,9 +88,9 @@ def settle_disabled(worker: Worker) -> None:
     incoming = [edge for edge in worker.edges_in() if not (edge.port_name == "enable" and edge.target_kind == "slot")]
     outgoing = [edge for edges in worker.wired_out for edge in edges]
     untaken = [edge for edge in outgoing if edge.untaken]
+    wiring.refresh(worker)  # first: activity that is given back may trigger, but not over edges that are dead now
     for edge in (*incoming, *outgoing):
         discard(edge, "disabled")
-    wiring.refresh(worker)
     # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
     worker.taken = ()
     release([edge for edge in (*incoming, *untaken) if type(edge) is not EventEdge and edge.held])
@@ -107,6 +107,9 @@ def enable(worker: Worker, then: Callable[[], None]) -> None:
     def up(error: NodeError | None) -> None:
         if error is not None:
             core.host.finish("failed", error)
+            return
+        if not worker.own_enabled or not all(scope.enabled for scope in worker.around):
+            then()  # disabled again meanwhile
             return
         worker.blocked &= ~(DISABLED | ENDED)
         worker.pending_end = False

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.engine.core import Core
-from hfg.engine.sending import block, enqueue, freed, put_outputs
+from hfg.engine.sending import block, enqueue, freed, must_wait, put_outputs
 from hfg.engine.worker import CALLS_BLOCKED, DISABLED, ENDED, FULL, FUTILE, RESTING, UNREADY, UNWIRED, Worker
 from hfg.errors import QueueLimit, Stalled
 from hfg.ports.edges import EventEdge
@@ -32,6 +32,8 @@ def grow(core: Core) -> bool:
     """F8: if only full queues hold nodes back, the smallest of them gets one more place."""
     if any(reader.inputs_ready() for reader in core.readers):
         return False  # somebody outside holds a node back: growing would not help, only fill memory
+    if any([_rate_holds(worker) for worker in core.workers]):  # noqa: C419 - each sets its timer
+        return False
     held = [worker for worker in core.workers if _held_by_queue_alone(worker)]
     full = [edge for worker in held for edge in worker.event_edges() if edge.full]
     if not full:
@@ -65,6 +67,13 @@ def _held_by_queue_alone(worker: Worker) -> bool:
     if worker.calls and worker.blocked & CALLS_BLOCKED == FULL:
         return True
     return worker.blocked == FULL and not worker.inputs.missing and not worker.outputs.missing
+
+
+def _rate_holds(worker: Worker) -> bool:
+    """Its rate holds it beside a full queue: that is to be over first, for a timer is pending (SEMANTICS "quiet")."""
+    if not worker.paced or worker.blocked != FULL or worker.inputs.missing or worker.outputs.missing:
+        return False
+    return must_wait(worker)
 
 
 def complete_operators(core: Core) -> bool:
@@ -134,10 +143,10 @@ def _feeds_only_ended(source: Worker) -> bool:
     return bool(edges) and all(edge.target.blocked & ENDED for edge in edges)
 
 
-def only_futile_in_flight(core: Core) -> bool:
-    """R5: a source that feeds only ended nodes does not keep the run alive, even while it waits."""
+def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
+    """R5: a source that feeds only ended nodes does not keep the run alive, even while it waits or works in a thread."""
     busy = [worker for worker in core.workers if worker.in_flight]
-    return bool(busy) and all(worker.blocked & FUTILE for worker in busy)
+    return bool(busy) and all(worker.blocked & FUTILE and (threads_too or not worker.group.threaded) for worker in busy)
 
 
 def only_waiting_for_room(core: Core) -> bool:

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from hfg.engine.core import Core
     from hfg.engine.scopes import Scope
 
+SAME_MOMENT_S = 1e-9  # times that differ by less are one: sums of floats do
+
 __all__ = [
     "add_call",
     "arrived",
@@ -93,7 +95,7 @@ def must_wait(worker: Worker) -> bool:
             if gate.idle_rate_hz is not None and not gate.state.active:
                 when = max(when, worker.gate_next + 1.0 / gate.idle_rate_hz)
     core = worker.core
-    if when <= core.now():
+    if when <= core.now() + SAME_MOMENT_S:
         return False
     worker.blocked |= RATE
 
@@ -108,7 +110,10 @@ def must_wait(worker: Worker) -> bool:
 def block(worker: Worker, reason: int) -> None:
     """Let no firing start; its place in the agenda is lost (D1)."""
     worker.blocked |= reason
-    unplace(worker)
+    if reason == FULL:
+        worker.placed = False  # a rate goes on holding it, and is to be over before a queue grows (F8)
+    else:
+        unplace(worker)
 
 
 def unplace(worker: Worker) -> None:
@@ -159,12 +164,12 @@ def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float |
             modifier = leaving(may_carry, edge.active, explicit, value is NO_MESSAGE)
             carried = carried or (modifier == 1 and explicit is None)
             (for_slots if edge.target_kind == "slot" else for_inputs).append((edge, value, modifier, own_stamp))
-    if for_slots or for_inputs:
-        unplace(worker)
     for edge, value, modifier, own_stamp in for_slots:
         put(edge, value, modifier, own_stamp)
     for edge, value, modifier, own_stamp in for_inputs:
         put(edge, value, modifier, own_stamp)
+    if worker.outputs.missing:
+        unplace(worker)
     if carried:
         _activity_left(worker)
 
@@ -438,9 +443,9 @@ def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
         _drop(edge, edge.queue.popleft(), "overflow")
         if not into_input:
             _remove_call(target, edge)
-        elif not edge.queue:
-            target.inputs.missing += 1
-            target.placed = False
+        elif not edge.queue:  # for the input nothing has changed: it still holds a token
+            edge.queue.append(token)
+            return
     edge.queue.append(token)
     note_full(edge)
     if into_input:

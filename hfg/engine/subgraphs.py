@@ -14,10 +14,11 @@ from hfg.engine.activity import deactivate_inside, scopes_changed
 from hfg.engine.scopes import Scope
 from hfg.engine.sending import block, consider
 from hfg.engine.worker import DISABLED, Worker
-from hfg.errors import NodeError
 from hfg.trace import NodeEnabled
 
 __all__ = ["disable_scope", "enable_scope", "run_slot"]
+
+Action = Callable[[Worker, Callable[[], None]], None]
 
 
 def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
@@ -33,23 +34,48 @@ def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
     elif name == "enable":
         enable_scope(scope, then)
     else:
-        _each(scope.members, lifecycle.reset, then)
+        _each(scope.members, lambda worker, done: _alone(worker, lifecycle.reset, done), then)
 
 
-def _each(
-    workers: Sequence[Worker], action: Callable[[Worker, Callable[[], None]], None], then: Callable[[], None]
-) -> None:
-    """One after the other, in order of adding."""
+def _each(workers: Sequence[Worker], action: Action, then: Callable[[], None]) -> None:
+    """One after the other, in order of adding; without recursion, for there may be thousands."""
     rest = iter(workers)
+    inside = done_inside = False
 
     def step() -> None:
-        worker = next(rest, None)
-        if worker is None:
-            then()
-        else:
+        nonlocal inside, done_inside
+        if inside:
+            done_inside = True
+            return
+        inside = True
+        for worker in rest:
+            done_inside = False
             action(worker, step)
+            if not done_inside:
+                inside = False
+                return
+        then()
 
     step()
+
+
+def _alone(worker: Worker, action: Action, then: Callable[[], None]) -> None:
+    """Do it when the node's firing or call under way is over, and let none begin meanwhile (F9, F10)."""
+
+    def begin() -> None:
+        worker.busy = "setup"
+        action(worker, over)
+
+    def over() -> None:
+        worker.core.upstairs.idle_again(worker)
+        then()
+
+    if not worker.busy:
+        begin()
+    elif worker.on_idle is None:
+        worker.on_idle = [begin]
+    else:
+        worker.on_idle.append(begin)
 
 
 def disable_scope(scope: Scope) -> None:
@@ -80,7 +106,7 @@ def enable_scope(scope: Scope, then: Callable[[], None]) -> None:
 
     def one(worker: Worker, done: Callable[[], None]) -> None:
         if worker.own_enabled and all(around.enabled for around in worker.around):
-            lifecycle.enable(worker, done)
+            _alone(worker, lifecycle.enable, done)
         else:
             done()
 
@@ -90,6 +116,3 @@ def enable_scope(scope: Scope, then: Callable[[], None]) -> None:
         then()
 
     _each(scope.members, one, finished)
-
-
-_ = NodeError

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.engine.scopes import Scope
-from hfg.engine.sending import consider
+from hfg.engine.sending import block, consider, note_full, unplace
 from hfg.engine.worker import DISABLED, UNWIRED, Worker
 from hfg.ports.edges import EventEdge
 
@@ -35,6 +35,8 @@ def refresh(worker: Worker) -> None:
     for edge in worker.all_out_edges():
         edge.live = is_live(edge)
         touched[edge.target.index] = edge.target
+    for edge in worker.event_edges():
+        note_full(edge)
     for neighbour in touched.values():
         rewire(neighbour)
 
@@ -77,10 +79,9 @@ def rewire(worker: Worker) -> None:
     if wired or worker.is_boundary_output:
         worker.blocked &= ~UNWIRED
     else:
-        worker.blocked |= UNWIRED
-        worker.placed = False
+        block(worker, UNWIRED)
     if missing:
-        worker.placed = False
+        unplace(worker)
     worker.core.upstairs.choose_step(worker)
     if worker.core.started:
         consider(worker)

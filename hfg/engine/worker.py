@@ -135,6 +135,7 @@ class Worker:
         "next_start",
         "node",
         "observed",
+        "on_idle",
         "options",
         "out_edges",
         "out_names",
@@ -251,6 +252,7 @@ class Worker:
         self.job: Any = None  # what its thread is doing for it
         self.waiting_room = 0  # its code awaits trigger_wait
         self.room_waiters: list[Callable[[], None]] | None = None
+        self.on_idle: list[Callable[[], None]] | None = None  # what waits until it is not busy
         self.ticket = 0  # which firing or call a late result belongs to (X2)
         self.full_edges = 0
         self.next_start = 0.0

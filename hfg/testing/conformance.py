@@ -113,9 +113,11 @@ def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = 
       >>> report = hfg.run(graph, clock="virtual", trace=trace.append)
       >>> replay(graph, trace)
     """
+    seen = list(events)
     replaying = Replay(build() if callable(build) else build, until_s=until_s)
+    replaying.sees_inside = any(replaying.is_inside(event) for event in seen)
     try:
-        for event in events:
+        for event in seen:
             replaying.see(event)
         replaying.check_over()
     finally:
@@ -123,7 +125,14 @@ def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = 
 
 
 class Replay:
-    """A reference machine beside a run; `see` its events one by one as they come."""
+    """A reference machine beside a run; `see` its events one by one as they come.
+
+    Attributes:
+      sees_inside: whether the run tells what happens inside iterating subgraphs (G4); else only their results are
+        compared.
+    """
+
+    sees_inside = False
 
     def __init__(self, graph: Any, *, until_s: float | None = None, held_open: bool = False) -> None:
         self.machine = ReferenceMachine(graph, until_s=until_s, held_open=held_open)
@@ -188,11 +197,22 @@ class Replay:
 
     def _is_idle(self, event: TraceEvent) -> bool:
         """Whether nobody could tell: events without edges, and what is not compared."""
+        if not self.sees_inside and self.is_inside(event):
+            return True
         if isinstance(event, EventTriggered):
             return event.event not in self._connected
         if isinstance(event, TokenProcessed):  # a delay ends the wave: nobody waits, so nobody need be told when
             return event.edge in self._delays
         return isinstance(event, StructureChanged)
+
+    def is_inside(self, event: TraceEvent) -> bool:
+        """Whether an event happened inside an iterating subgraph."""
+        machine = self.machine
+        line = machine.labels.get(getattr(event, "edge", ""))
+        if line is not None:
+            return line.edge.within is not None
+        node = machine.paths.get(getattr(event, "node", None) or getattr(event, "event", "").rpartition(".")[0], -1)
+        return node >= 0 and machine.stations[node].leaf.within is not None
 
     def _match(self, event: TraceEvent) -> bool:
         wanted = key(event)
@@ -258,6 +278,10 @@ class Replay:
                 return move
             if move.kind == "call" and isinstance(event, TokenTaken) and move.edge == event.edge:
                 return move
+            if move.kind == "read" and isinstance(event, TokenTaken) and move.edge == event.edge:
+                return move
+            if move.kind == "feed" and isinstance(event, TokenSent) and self._comes_from(event, move.edge):
+                return move
             if move.kind == "grow" and isinstance(event, QueueGrown) and move.edge == event.edge:
                 return move
             if move.kind == "complete" or (
@@ -268,7 +292,19 @@ class Replay:
                 return move
             if move.kind == "finish" and isinstance(event, TokenDropped) and event.reason == "stopped":
                 return move
-        return None
+        return None if self.sees_inside else next((move for move in moves if self._moves_inside(move)), None)
+
+    def _moves_inside(self, move: Move) -> bool:
+        """Whether a move belongs to an iterating subgraph, of which nothing more is told than its results."""
+        line = self.machine.labels.get(move.edge)
+        node = self.machine.paths.get(move.node, -1) if move.node else -1
+        return (line is not None and line.edge.within is not None) or (
+            node >= 0 and self.machine.stations[node].leaf.within is not None
+        )
+
+    def _comes_from(self, event: TokenSent, name: str) -> bool:
+        source = self.machine.labels[event.edge].edge.source
+        return source.kind == "output" and source.name == name
 
     def _teller(self, event: TraceEvent) -> str | None:
         if isinstance(event, EventTriggered):
@@ -284,10 +320,18 @@ class Replay:
     def _finish_steps(self) -> None:
         """Let waiting code go on as far as it can, for in the run it has by now."""
         while True:
-            steps = [move for move in self.machine.moves() if move.kind == "go on"]
+            steps = [
+                move
+                for move in self.machine.moves()
+                if move.kind == "go on" or (move.kind == "feed" and not self._reaches(move.edge))
+            ]
             if not steps:
                 return
             self._apply(steps[0])
+
+    def _reaches(self, name: str) -> bool:
+        """Whether somebody would see what is fed."""
+        return any(self.machine.is_live(line) for line in self.machine.lines_from(-1, "output", name))
 
     def _let_time_go(self, event: TraceEvent) -> None:
         while event.time > self.machine.now + _SAME_TIME:

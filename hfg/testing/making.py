@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar
 from hfg.testing import nodes as types
 from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
 
-__all__ = ["Allowed", "Chooser", "SeededChooser", "make_plan", "random_plan"]
+__all__ = ["FEEDS", "Allowed", "Chooser", "SeededChooser", "make_plan", "random_plan"]
 
 T = TypeVar("T")
 End = tuple[str, str, str]
@@ -70,6 +70,7 @@ class Allowed:
     disabling: bool = True
     readiness: bool = True
     threads: bool = False
+    feeds: bool = False
     failing_calls: bool = True
 
 
@@ -100,6 +101,9 @@ _INNER = [
     "Sieve",
     "Tally",
 ]
+FEEDS = ("red", "blue")
+"""The inputs of graphs that are fed from outside."""
+
 _WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay"}
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear"}
@@ -215,6 +219,9 @@ class _Making:
         choose, allowed = self.choose, self.allowed
         before = self.nodes[:index]
         candidates = self.outputs(before)
+        if allowed.feeds and choose.chance(40):
+            self._edge(("", "output", choose.one_of(FEEDS)), target)
+            return
         if allowed.events and choose.chance(30):
             candidates = self.events(before) or candidates
         if allowed.cycles and self._has_other_input(target) and choose.chance(30):
@@ -351,7 +358,8 @@ def make_plan(choose: Chooser, allowed: Allowed | None = None) -> GraphPlan:
     boxes = making.make_boxes() if allowed.boxes else []
     gates = making.make_gates() if allowed.gates else []
     groups = ("left", "right") if allowed.threads else ()
-    return GraphPlan(tuple(making.nodes), tuple(making.edges), tuple(boxes), tuple(gates), groups)
+    feeds = tuple(name for name in FEEDS if any(edge.source == ("", "output", name) for edge in making.edges))
+    return GraphPlan(tuple(making.nodes), tuple(making.edges), tuple(boxes), tuple(gates), groups, feeds)
 
 
 def random_plan(seed: int, allowed: Allowed | None = None) -> GraphPlan:

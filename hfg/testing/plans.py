@@ -63,6 +63,7 @@ class GraphPlan:
     boxes: tuple[BoxPlan, ...] = ()
     gates: tuple[GatePlan, ...] = ()
     groups: tuple[str, ...] = ()
+    feeds: tuple[str, ...] = ()  # inputs of the graph, of whole numbers
 
     def build(self) -> Graph:
         """Make the graph."""
@@ -109,6 +110,9 @@ class GraphPlan:
     def __repr__(self) -> str:
         return _Writing(self).text()
 
+    def _repr_pretty_(self, printer: Any, _cycle: bool) -> None:
+        printer.text(f"\n{self!r}\n")  # Hypothesis would print the fields
+
 
 @dataclass(frozen=True)
 class _Segment:
@@ -133,7 +137,7 @@ class _Drawing:
 
     def _draw(self, index: int, edge: EdgePlan) -> None:
         begin, end = self._boxes(edge.source), self._boxes(edge.target)
-        if edge.source[0] == "":  # `start` may be named anywhere; draw it where the target is
+        if edge.source[:2] == ("", "event"):  # `start` may be named anywhere; draw it where the target is
             begin = end
         if edge.target[0] == "":
             end = begin
@@ -180,6 +184,8 @@ class _Drawing:
 
 def _port(end: tuple[str, str, str]) -> str:
     node, kind, name = end
+    if node == "" and kind == "output":
+        return f"graph.inputs[{name!r}]"
     return f"graph.{name}" if node == "" else f"{node}.ports.{kind}s[{name!r}]"
 
 
@@ -195,6 +201,8 @@ class _Building:
         self.graph = Graph()
         for group in plan.groups:
             self.graph.group(group, threads=1)
+        for feed in plan.feeds:
+            self.graph.input(feed, int)
         self._fill("", self.graph, None)
         for gate in plan.gates:
             self.graph.gate(self.made[gate.target], by=self.made[gate.by], idle_rate_hz=gate.idle_rate_hz)
@@ -213,6 +221,8 @@ class _Building:
             )
 
     def _end(self, text: str, graph: Graph, owner: Any) -> Any:
+        if text.startswith("graph.inputs["):
+            return graph.inputs[text[13:].strip("']")]
         if text.startswith("graph."):
             return getattr(graph, text[6:])
         if text.startswith("self."):
@@ -246,6 +256,7 @@ class _Writing:
             lines += self._class(box)
         lines.append("graph = hfg.Graph()")
         lines += [f"graph.group({group!r}, threads=1)" for group in self.plan.groups]
+        lines += [f"graph.input({feed!r}, int)" for feed in self.plan.feeds]
         lines += self._body("")
         for gate in self.plan.gates:
             rate = "" if gate.idle_rate_hz is None else f", idle_rate_hz={gate.idle_rate_hz!r}"

@@ -8,7 +8,7 @@ from typing import Any
 from hfg.errors import Aborted, NodeError
 from hfg.testing.reference.firing import Firing
 from hfg.testing.reference.state import Flight, Line, Station
-from hfg.testing.reference.structure import ROOT
+from hfg.testing.reference.structure import ROOT, boundary_of, is_box
 from hfg.trace import CallEnded, CallStarted, ErrorRaised, NodeEnabled, TokenProcessed, TokenTaken
 
 __all__ = ["Calling"]
@@ -36,6 +36,7 @@ class Calling(Firing):
         station = self.stations[owner]
         flight = Flight(station, "call", number, "call", lying.token.stamp, slot=name, line=line)
         station.flight = flight
+        self.note_places()  # a queue may have room again
         self.receive_activity(owner, [lying.token.activity])
         self.launch_call(flight, self.handler_of(station, name, lying.token))
         self.settle()
@@ -52,7 +53,9 @@ class Calling(Firing):
         """The path of a node, of a subgraph, or "" for the graph."""
         if owner >= 0:
             return self.stations[owner].path
-        return "" if owner == ROOT else self.structure.boxes[-2 - owner].path
+        if is_box(owner):
+            return self.structure.boxes[-2 - owner].path
+        return "" if owner == ROOT else self.stations[boundary_of(0) - owner].path
 
     def handler_of(self, station: Station, name: str, token: Any) -> Callable[[], Any]:
         """What runs: an automatic slot of A9, the node's own handler, or the setting of a parameter (P8)."""
@@ -184,7 +187,7 @@ class Calling(Firing):
             for station, was in zip(members, before, strict=True):
                 if was and not self.is_enabled(station.leaf.index):
                     self._silence(station)
-            if owner < ROOT:
+            if is_box(owner):
                 self._empty(lambda line: line.edge.target.owner == owner and line.edge.target.name != "enable")
             self.settle()
 

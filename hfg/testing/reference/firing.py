@@ -8,7 +8,7 @@ from typing import Any, Literal
 from hfg.errors import EndOfStream, FiringTimeout, NodeError, UsageError
 from hfg.testing.reference.running_code import RunningCode
 from hfg.testing.reference.state import Flight, Line, Lying, Station, newest
-from hfg.testing.reference.structure import ROOT
+from hfg.testing.reference.structure import boundary_of
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import (
     ErrorRaised,
@@ -131,6 +131,9 @@ class Firing(RunningCode):
                 arguments.append(spec.default)
             else:
                 arguments.append(token if spec.token else token.value)
+        if station.leaf.inside is not None:
+            self.begin_iteration(flight, arguments)
+            return
         self.begin_in_group(flight, station.type.process_kind in ("async", "async generator"))
         self.launch(
             flight, self.what_to_run(station, arguments), lambda result, error: self.end_process(flight, result, error)
@@ -188,6 +191,40 @@ class Firing(RunningCode):
             if name in flight.writes:
                 raise UsageError(f'"{station.path}.{name}" is written twice in one firing')
             flight.writes[name] = (value, None, None)
+
+    # --- G4
+
+    def begin_iteration(self, flight: Flight, arguments: list[Any]) -> None:
+        """Zip the collections; other inputs repeat. Unequal lengths are an error."""
+        station = flight.station
+        over = station.leaf.options.iterate_over
+        given = dict(zip(station.type.inputs, arguments, strict=True))
+        columns = {name: list(given[name]) for name in over}
+        lengths = {len(column) for column in columns.values()}
+        if len(lengths) > 1:
+            self.fail_firing(flight, ValueError(f"the collections have unequal lengths: {sorted(lengths)}"))
+            return
+        count = lengths.pop() if lengths else 0
+        flight.results = {name: [] for name in station.type.outputs}
+        flight.elements = [
+            {name: columns[name][number] if name in columns else value for name, value in given.items()}
+            for number in range(count)
+        ]
+        self.go_on_iterating(flight)
+
+    def go_on_iterating(self, flight: Flight) -> None:
+        """Give the next element inside; after the last the lists are the outputs."""
+        station = flight.station
+        assert flight.elements is not None
+        if not flight.elements:
+            flight.elements = None
+            flight.writes = {name: (values, None, None) for name, values in flight.results.items()}
+            self.end_firing(flight, "done")
+            return
+        element, boundary = flight.elements.pop(0), boundary_of(station.leaf.index)
+        for name, value in element.items():
+            lines = self.lines_from(boundary, "output", name)
+            self.send(boundary, [(line, NO_MESSAGE if value is None else value, None, flight.stamp) for line in lines])
 
     # --- the end of a node
 
@@ -276,7 +313,7 @@ class Firing(RunningCode):
         if options.release != "auto":
             return bool(options.release == "pipelined")
         source = line.edge.source.owner
-        return source != ROOT and self.stations[source].leaf.options.group != options.group
+        return source >= 0 and self.stations[source].leaf.options.group != options.group
 
     # --- X1
 

@@ -15,10 +15,19 @@ from typing import Any, Literal
 from hfg.errors import QueueLimit, Stalled
 from hfg.testing.reference.calls import Calling
 from hfg.testing.reference.state import Line, Station
-from hfg.testing.reference.structure import ROOT
+from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
-from hfg.token import END, Token
-from hfg.trace import ActivityChanged, QueueGrown, RunEnded, RunStarted, TokenDropped, TraceEvent
+from hfg.token import END, NO_MESSAGE, Token
+from hfg.trace import (
+    ActivityChanged,
+    QueueGrown,
+    RunEnded,
+    RunStarted,
+    TokenDropped,
+    TokenProcessed,
+    TokenTaken,
+    TraceEvent,
+)
 
 __all__ = ["Move", "ReferenceMachine"]
 
@@ -34,7 +43,9 @@ class Move:
       outcome: of "finish".
     """
 
-    kind: Literal["fire", "call", "go on", "time out", "wait", "grow", "complete", "end events", "finish"]
+    kind: Literal[
+        "fire", "call", "go on", "time out", "feed", "read", "wait", "grow", "complete", "end events", "finish"
+    ]
     node: str = ""
     edge: str = ""
     time: float = 0.0
@@ -46,8 +57,8 @@ class Move:
                 return f"wait until {self.time:g} s"
             case "finish":
                 return f"finish: {self.outcome}"
-            case "grow":
-                return f"grow {self.edge}"
+            case "grow" | "feed" | "read":
+                return f"{self.kind} {self.edge}"
             case "call":
                 return f'call a slot of "{self.node}" over {self.edge}'
             case "complete" | "end events":
@@ -71,6 +82,9 @@ class ReferenceMachine(Calling):
         self.paths = {station.path: station.leaf.index for station in self.stations}
         self.paths |= {box.path: -2 - box.index for box in self.structure.boxes}
         self.paths[""] = ROOT
+        self.feeding: dict[str, list[Any]] = {}  # what is to be fed into each input of the graph
+        self.unread: set[str] = set()  # outputs of the graph that nobody reads at the moment
+        self.collected: dict[str, list[Any]] = {}
         self.labels = {line.edge.label: line for line in self.lines}
 
     def start(self) -> list[TraceEvent]:
@@ -114,9 +128,10 @@ class ReferenceMachine(Calling):
             found += [Move("wait", time=due)] if Move("wait", time=due) not in found else []
         return found
 
-    def working_moves(self) -> list[Move]:
+    def working_moves(self, without: int | None = None) -> list[Move]:
         """Firings, calls, and what goes on in those under way."""
-        found = []
+        found = [Move("feed", edge=name) for name, values in self.feeding.items() if values and self.can_feed(name)]
+        found += [Move("read", edge=line.edge.label) for line in self.lines if line.queue and self.is_read(line)]
         for owner in [ROOT, *(-2 - box.index for box in self.structure.boxes)]:
             line = self.next_call(owner)
             if line is not None and not self.full_lines(owner):
@@ -124,7 +139,7 @@ class ReferenceMachine(Calling):
         for index, station in enumerate(self.stations):
             flight = station.flight
             if flight is not None:
-                if self.can_go_on(flight):
+                if index != without and self.can_go_on(flight):
                     found.append(Move("go on", station.path))
                 limit = station.leaf.options.max_duration_s
                 if (
@@ -142,6 +157,31 @@ class ReferenceMachine(Calling):
             if move is not None and move.kind == "fire" and line is not None and index in self.moot_sources():
                 found.append(Move("call", station.path, line.edge.label))  # its firing may as well rest
         return found
+
+    def can_feed(self, name: str) -> bool:
+        """Whether the graph's input is free (P10)."""
+        return not any(self.is_occupied(line) for line in self.lines_from(ROOT, "output", name))
+
+    def is_read(self, line: Line) -> bool:
+        """Whether somebody outside takes what lies there: of iterating subgraphs always, of the graph as is said."""
+        target = line.edge.target
+        return self.is_outside(target.owner) and target.kind == "input" and target.name not in self.unread
+
+    def is_quiet_inside(self, index: int) -> bool:
+        """Whether nothing moves inside an iterating subgraph (G4)."""
+        inside = {number for number, station in enumerate(self.stations) if station.leaf.within == index}
+        paths = {self.stations[number].path for number in inside}
+        paths |= {box.path for box in self.structure.boxes if inside & set(box.members)}
+        for move in self.working_moves(without=index):
+            line = self.labels.get(move.edge)
+            if move.node in paths or (line is not None and line.edge.within == index):
+                return False
+        return not any(
+            self.stations[number].flight is not None
+            or self.may_fire(number, ignore="timers")
+            or self.may_fire(number, ignore="queues")
+            for number in inside
+        )
 
     def next_of(self, index: int) -> Move | None:
         """F9: of a node's calls and its firing, the one with the oldest place."""
@@ -192,7 +232,7 @@ class ReferenceMachine(Calling):
                 times.append(flight.began + options.max_duration_s)
             if station.resting_until is not None:
                 times.append(station.resting_until)
-            if flight is None and station.place is None and self.may_fire(index, ignore="timers"):
+            if flight is None and station.place is None and self.may_fire(index, ignore="timers and queues"):
                 times += [station.hold_until] if not self.is_over(station.hold_until) else []
                 times += [
                     station.last_function + 1 / rate for rate in self.gates_of(index) if rate and self.is_resting(index)
@@ -233,6 +273,7 @@ class ReferenceMachine(Calling):
             line
             for line in self.lines
             if line.edge.is_event
+            and line.edge.within is None
             and line.edge.target.kind == "input"
             and self.is_live(line)
             and not line.queue
@@ -296,6 +337,10 @@ class ReferenceMachine(Calling):
                 assert flight is not None
                 self.time_out(flight)
                 self.settle()
+            case "feed":
+                self.feed_once(move.edge)
+            case "read":
+                self.read_once(self.labels[move.edge])
             case "wait":
                 self.wait_until(move.time)
             case "grow":
@@ -387,6 +432,44 @@ class ReferenceMachine(Calling):
             self.finish(outcome)
 
     # --- what the world outside may do
+
+    def feed_once(self, name: str) -> None:
+        """Put what is next for an input of the graph."""
+        value, activity = self.feeding[name].pop(0)
+        lines = self.lines_from(ROOT, "output", name)
+        self.send(ROOT, [(line, NO_MESSAGE if value is None else value, activity, self.now) for line in lines])
+
+    def read_once(self, line: Line) -> None:
+        """Take what lies at an output of the graph, or of the inside of an iterating subgraph."""
+        token = line.queue.pop(0).token
+        target = line.edge.target
+        self.observe(TokenTaken(self.now, line.edge.label, token))
+        if not line.edge.is_event:
+            self.observe(TokenProcessed(self.now, line.edge.label))
+        if not token.is_marker and target.owner == ROOT:
+            self.collected.setdefault(target.name, []).append(token.value)
+        elif not token.is_marker:
+            flight = self.stations[boundary_of(0) - target.owner].flight
+            if flight is not None:
+                flight.results[target.name].append(token.value)
+        self.settle()
+
+    def feed(self, name: str, value: Any, activity: int | None = None) -> None:
+        """Bring a token in as soon as the graph's input is free (P10); END closes it."""
+        self.feeding.setdefault(name, []).append((value, activity))
+
+    def call_from_outside(self, path: str, slot: str, value: Any = None, activity: int = 0) -> None:
+        """Bring a signal into a slot, as if by an active edge."""
+        label = f"outside -> {path}.{slot}" if path else f"outside -> {slot}"
+        line = self.labels.get(label)
+        if line is None:
+            ends = End(ROOT, "event", "outside"), End(self.paths[path], "slot", slot)
+            edge = Edge(len(self.lines), label, *ends, True, 16, "wait", None, (), (), ())
+            line = self.labels[label] = Line(edge, edge.capacity)
+            self.lines.append(line)
+        if self.is_live(line):
+            self.enqueue(line, Token(value, activity, self.now), ROOT)
+        self.settle()
 
     def set_from_outside(self, path: str, parameter: str, value: Any) -> None:
         """Set a parameter between firings."""

@@ -113,14 +113,27 @@ class RunningCode(Sending):
 
     def can_go_on(self, flight: Flight) -> bool:
         """Whether something of the flight can happen without time going by."""
+        if flight.elements is not None:
+            return self.is_quiet_inside(flight.station.leaf.index)
         if flight.task is None:
             return flight.in_thread
         if flight.waiting_for and self.has_no_room(flight.station, flight.waiting_for):
             return False
         return self.loop.can_step(flight)
 
+    def is_quiet_inside(self, index: int) -> bool:
+        """Whether nothing moves inside an iterating subgraph (G4)."""
+        raise NotImplementedError
+
+    def go_on_iterating(self, flight: Flight) -> None:
+        """Give the next element inside."""
+        raise NotImplementedError
+
     def go_on(self, flight: Flight) -> None:
-        """Carry the flight on by one step: a signal from its thread, a step of its coroutine, or its end."""
+        """Carry the flight on: an element, a signal from its thread, a step of its coroutine, or its end."""
+        if flight.elements is not None:
+            self.go_on_iterating(flight)
+            return
         if flight.task is None:
             if flight.signals:
                 name, value, activity, stamp = flight.signals.pop(0)

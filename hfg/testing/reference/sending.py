@@ -14,7 +14,7 @@ from typing import Any, Literal
 from hfg.errors import QueueOverflow
 from hfg.testing.reference.operators import Operators
 from hfg.testing.reference.state import Flight, Line, Lying, State, Station
-from hfg.testing.reference.structure import ROOT
+from hfg.testing.reference.structure import ROOT, is_box
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import (
     ActivityChanged,
@@ -75,7 +75,7 @@ class Sending(State):
             if self.stations[sender].active and flight is not None:
                 flight.right = True
             self.set_active(sender, False, "sent")
-        elif sender < ROOT:
+        elif is_box(sender):
             self.quench(-2 - sender, "sent")
 
     def quench(self, box: int, cause: Cause) -> None:
@@ -152,7 +152,7 @@ class Sending(State):
 
     def is_automatic(self, owner: int, name: str) -> bool:
         """Whether nobody declared the event (A9)."""
-        return owner < ROOT or (owner >= 0 and name not in self.stations[owner].type.events)
+        return is_box(owner) or (owner >= 0 and name not in self.stations[owner].type.events)
 
     def event_path(self, owner: int, name: str) -> str:
         """The event's path."""
@@ -214,15 +214,18 @@ class Sending(State):
 
     def settle(self) -> None:
         """Do what rules want "at once", until nothing changes; then see who is enabled now."""
-        while self.drain_once() or self.release_once() or self.end_once() or self.flush_once():
-            pass
-        self.note_places()
+        going = True
+        while going:
+            while self.drain_once():
+                pass
+            self.note_places()
+            going = self.release_once() or self.end_once() or self.flush_once()
 
     def drain_once(self) -> bool:
         """Markers into slots, and tokens for nodes that are ending, are processed at once (T4, F12)."""
         for line in self.lines:
             target = line.edge.target
-            if not line.queue or target.owner == ROOT:
+            if not line.queue or self.is_outside(target.owner):
                 continue
             marker = (
                 target.kind in ("slot", "parameter")

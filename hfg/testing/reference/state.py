@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from hfg.errors import EndOfStream
-from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, dissolve
+from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, boundary_of, is_box, whole
 from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import TraceEvent
@@ -70,6 +70,8 @@ class Flight:
     error: BaseException | None = None
     waiting_for: str = ""  # an event whose queues have no room (trigger_wait)
     void: bool = False  # the node was disabled meanwhile: outputs go nowhere (F10)
+    elements: list[dict[str, Any]] | None = None  # what an iterating subgraph has still to give inside (G4)
+    results: dict[str, list[Any]] = field(default_factory=dict)
     slot: str = ""
     line: Line | None = None  # the edge a slot call took its token from
 
@@ -115,8 +117,10 @@ class Station:
 class State:
     """One moment of a run, and what can be asked about it."""
 
-    def __init__(self, graph: Any, *, structure: Structure | None = None) -> None:
-        self.structure = dissolve(graph) if structure is None else structure
+    structure: Structure
+
+    def __init__(self, graph: Any) -> None:
+        self.structure = whole(graph)
         self.graph = graph
         self.now = 0.0
         self.tick = 0
@@ -167,22 +171,33 @@ class State:
     def is_live(self, line: Line) -> bool:
         """A live edge: both ends are enabled, or the target port is an `enable` slot."""
         source, target = line.edge.source, line.edge.target
-        if source.owner != ROOT and not self.is_enabled(source.owner):
+        if not self.is_enabled(source.owner):
             return False
         if any(not self._box_open(box) for box in line.edge.via):
             return target.kind == "slot" and target.name == "enable"
-        if target.owner == ROOT or (target.kind == "slot" and target.name == "enable"):
+        if self.is_outside(target.owner) or (target.kind == "slot" and target.name == "enable"):
             return True
         return self.is_enabled(target.owner)
+
+    def is_outside(self, owner: int) -> bool:
+        """Whether a port belongs to the world outside, of the graph or of an iterating subgraph."""
+        return owner < 0 and not is_box(owner)
 
     def is_enabled(self, owner: int) -> bool:
         """A node is enabled if it and all subgraphs around it are."""
         if owner == ROOT:
             return True
-        if owner < ROOT:
+        if is_box(owner):
             return self._box_open(-2 - owner)
+        if owner < 0:
+            return self.is_enabled(boundary_of(0) - owner)
         station = self.stations[owner]
-        return station.enabled and all(self._box_open(box) for box in station.leaf.boxes)
+        around = station.leaf.within
+        return (
+            station.enabled
+            and all(self._box_open(box) for box in station.leaf.boxes)
+            and (around is None or self.is_enabled(around))
+        )
 
     def _box_open(self, box: int) -> bool:
         around = (*self.structure.boxes[box].boxes, box)
@@ -227,10 +242,10 @@ class State:
 
     def is_active(self, owner: int) -> bool:
         """A(v); of a subgraph by G2: a node inside is active, or +1 is under way between two of them."""
-        if owner == ROOT:
-            return False
         if owner >= 0:
             return self.stations[owner].active
+        if not is_box(owner):
+            return False
         members = self.structure.boxes[-2 - owner].members
         return any(self.stations[member].active for member in members) or any(
             lying.token.activity == 1 for line in self.lines_inside(-2 - owner) for lying in line.queue
@@ -251,17 +266,19 @@ class State:
         `ignore`: "queues" leaves F8 out; "timers" leaves out F11, A11 and back-off.
         """
         station = self.stations[index]
-        if not self.is_enabled(index) or station.ending or station.ended or station.type.process_kind == "none":
+        if not self.is_enabled(index) or station.ending or station.ended:
+            return False
+        if station.type.process_kind == "none" and station.leaf.inside is None:
             return False
         if not self.has_all_inputs(index) or not self.outputs_are_free(index):
             return False
-        if ignore != "queues" and self.full_lines(index):
+        if "queues" not in ignore and self.full_lines(index):
             return False
-        if ignore != "timers" and (self.is_held_by_time(index) or self.is_resting(index)):
+        if "timers" not in ignore and (self.is_held_by_time(index) or self.is_resting(index)):
             return False
         if self.is_suspended_source(index):
             return False
-        return ignore == "timers" or self.says_ready(station)  # asked last: until a timer is over nobody knows
+        return "timers" in ignore or self.says_ready(station)  # asked last: until a timer is over nobody knows
 
     def has_all_inputs(self, index: int) -> bool:
         """A source or a live input edge; a live edge at each mandatory input; a token on all that take part."""
@@ -326,8 +343,6 @@ class State:
 
 
 def _fresh(leaf: Leaf) -> Any:
-    if leaf.inside is not None:
-        return leaf.node
     node = leaf.node._copy()
     node._place = leaf.node._place  # code may ask where it is
     return node

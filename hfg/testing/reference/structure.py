@@ -11,10 +11,41 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
-__all__ = ["ROOT", "Box", "Edge", "End", "Gate", "Leaf", "Structure", "dissolve"]
+__all__ = [
+    "ROOT",
+    "Box",
+    "Edge",
+    "End",
+    "Gate",
+    "Leaf",
+    "Structure",
+    "boundary_of",
+    "box_owner",
+    "dissolve",
+    "is_box",
+    "whole",
+]
 
 ROOT: Final = -1
 """The owner of the graph's own ports; box k owns its automatic ports as -2 - k."""
+
+
+_BOUNDARIES: Final = -1_000_000
+
+
+def box_owner(box: int) -> int:
+    """The owner of a subgraph's automatic ports."""
+    return -2 - box
+
+
+def is_box(owner: int) -> bool:
+    """Whether ports of this owner are those of a dissolved subgraph."""
+    return _BOUNDARIES < owner < ROOT
+
+
+def boundary_of(leaf: int) -> int:
+    """The owner of the inner sides of an iterating subgraph's ports: elements come from there, results go there."""
+    return _BOUNDARIES - leaf
 
 
 class End(NamedTuple):
@@ -38,6 +69,7 @@ class Leaf:
     options: Any
     boxes: tuple[int, ...]
     inside: Structure | None = None
+    within: int | None = None  # the iterating subgraph around it
 
 
 @dataclass
@@ -67,6 +99,7 @@ class Edge:
     through: tuple[Any, ...]
     initial: tuple[Any, ...]
     via: tuple[int, ...]
+    within: int | None = None  # the iterating subgraph around it
 
     @property
     def is_event(self) -> bool:
@@ -97,6 +130,45 @@ class Structure:
 def dissolve(graph: Any, prefix: str = "", group: str = "loop") -> Structure:
     """Dissolve all subgraphs but those that iterate; the graph stays as it is."""
     return _Dissolving(graph, prefix, group).result
+
+
+def whole(graph: Any) -> Structure:
+    """Dissolve a graph and lay what is inside iterating subgraphs beside the rest, with their boundaries as owners."""
+    result = dissolve(graph)
+    waiting = [leaf for leaf in result.leaves if leaf.inside is not None]
+    while waiting:
+        around = waiting.pop(0)
+        inside = around.inside
+        assert inside is not None
+        first_leaf, first_box = len(result.leaves), len(result.boxes)
+
+        def moved(end: End, around: Leaf = around, first_leaf: int = first_leaf, first_box: int = first_box) -> End:
+            if end.owner == ROOT:
+                return end._replace(owner=boundary_of(around.index))
+            return end._replace(owner=end.owner + first_leaf if end.owner >= 0 else end.owner - first_box)
+
+        for leaf in inside.leaves:
+            leaf.index += first_leaf
+            leaf.boxes = tuple(box + first_box for box in leaf.boxes)
+            leaf.within = around.index
+            result.leaves.append(leaf)
+            waiting += [leaf] if leaf.inside is not None else []
+        for box in inside.boxes:
+            box.index += first_box
+            box.boxes = tuple(one + first_box for one in box.boxes)
+            box.members = [member + first_leaf for member in box.members]
+            result.boxes.append(box)
+        for edge in inside.edges:
+            edge.index = len(result.edges)
+            edge.source, edge.target = moved(edge.source), moved(edge.target)
+            edge.via = tuple(box + first_box for box in edge.via)
+            edge.within = around.index
+            result.edges.append(edge)
+        for gate in inside.gates:
+            gate.targets = [target + first_leaf for target in gate.targets]
+            gate.by = gate.by + first_leaf if gate.by >= 0 else gate.by - first_box
+            result.gates.append(gate)
+    return result
 
 
 class _Dissolving:
