@@ -25,6 +25,7 @@ from hfg.engine.sending import (
     release,
     send_end,
     touch,
+    unplace,
 )
 from hfg.engine.wiring import rewire
 from hfg.engine.worker import CALLS_BLOCKED, ENDED, UNREADY, Worker
@@ -169,6 +170,8 @@ def fire(worker: Worker) -> None:
         if options.max_rate_hz:
             worker.next_start = now + 1.0 / options.max_rate_hz
         worker.gate_next = now
+        if worker.paced:
+            unplace(worker)  # what an input that has ended gave a place to is held by the rate from now on
         _place_next(worker)
         _run_process(worker, edges, tokens)
 

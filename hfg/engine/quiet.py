@@ -144,7 +144,10 @@ def _feeds_only_ended(source: Worker) -> bool:
 
 
 def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
-    """R5: a source that feeds only ended nodes does not keep the run alive, even while it waits or works in a thread."""
+    """R5: a source that feeds only ended nodes does not keep the run alive.
+
+    Even while it waits or works in a thread.
+    """
     busy = [worker for worker in core.workers if worker.in_flight]
     return bool(busy) and all(worker.blocked & FUTILE and (threads_too or not worker.group.threaded) for worker in busy)
 
