@@ -9,8 +9,9 @@ from collections.abc import Callable
 from typing import Any
 
 from hfg.engine import wiring
+from hfg.engine.core import Core
 from hfg.engine.sending import block, consider, derive_scopes, discard, release, unblock
-from hfg.engine.worker import DISABLED, ENDED, Worker
+from hfg.engine.worker import DISABLED, ENDED, FUTILE, Worker
 from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge
 from hfg.trace import NodeEnabled
@@ -120,9 +121,18 @@ def enable(worker: Worker, then: Callable[[], None]) -> None:
             core.trace(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
         consider(worker)
+        _sources_matter_again(core)
         then()
 
     set_up(worker, up)
+
+
+def _sources_matter_again(core: Core) -> None:
+    """A node that had ended is back: sources that fed only ended nodes are not futile any more (R5)."""
+    if core.futile:
+        core.futile = False
+        for source in core.sources:
+            unblock(source, FUTILE)
 
 
 def reset(worker: Worker, then: Callable[[], None]) -> None:
@@ -139,6 +149,7 @@ def reset(worker: Worker, then: Callable[[], None]) -> None:
             edge.ended = False
         unblock(worker, ENDED)
         wiring.refresh(worker)
+        _sources_matter_again(core)
         then()
 
     def down(error: NodeError | None) -> None:

@@ -374,6 +374,8 @@ def trigger(
     """
     worker = event.worker
     core = worker.core
+    if core.over:
+        return  # code that was under way at the end speaks to nobody
     if type(value) is Token:
         explicit = value.activity if explicit is None else explicit
         stamp = value.stamp if stamp is None else stamp
