@@ -108,10 +108,10 @@ def _ask_ready(worker: Worker) -> None:
 def idle_again(worker: Worker, *, asked: bool = False) -> None:
     """A firing, call or question is over: see what is next."""
     worker.busy = ""
-    while worker.on_idle and not worker.busy:
-        worker.on_idle.pop(0)()
-    if worker.busy:
-        return
+    if worker.on_idle is not None:
+        _let_others(worker)
+        if worker.busy:
+            return
     if not asked:
         worker.blocked &= ~UNREADY
     if worker.placed:
@@ -120,6 +120,15 @@ def idle_again(worker: Worker, *, asked: bool = False) -> None:
         consider(worker)
     if worker.calls and not worker.blocked & CALLS_BLOCKED:
         queue(worker)
+
+
+def _let_others(worker: Worker) -> None:
+    """What waits until the node is not busy has its turn, before the next firing or call."""
+    while worker.on_idle and not worker.busy:
+        worker.on_idle.pop(0)()
+    if not worker.on_idle:
+        worker.on_idle = None
+        worker.core.upstairs.choose_step(worker)
 
 
 # --- firing ---------------------------------------------------------------------------------------------------------

@@ -50,6 +50,8 @@ def choose(worker: Worker) -> None:
         return
     if worker.gates_over or worker.iteration is not None or worker.ready_hook is not None or worker.observed:
         return
+    if worker.on_idle is not None:
+        return
     options = worker.options
     if (
         options.max_rate_hz

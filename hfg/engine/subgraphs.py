@@ -72,10 +72,11 @@ def _alone(worker: Worker, action: Action, then: Callable[[], None]) -> None:
 
     if not worker.busy:
         begin()
-    elif worker.on_idle is None:
-        worker.on_idle = [begin]
-    else:
-        worker.on_idle.append(begin)
+        return
+    if worker.on_idle is None:
+        worker.on_idle = []
+        worker.core.upstairs.choose_step(worker)  # the short ways do not look whether somebody waits
+    worker.on_idle.append(begin)
 
 
 def disable_scope(scope: Scope) -> None:
