@@ -1,4 +1,7 @@
-"""Nodes that raise, block, never come back, write wrongly or give back the wrong thing: one clear sentence with the path."""
+"""Nodes that raise, block, never come back, write wrongly or give back the wrong thing.
+
+One clear sentence with the path.
+"""
 
 from __future__ import annotations
 

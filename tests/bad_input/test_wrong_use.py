@@ -1,4 +1,7 @@
-"""Calls at the wrong moment or with the wrong thing: one sentence with the path and the remedy, and nothing has happened."""
+"""Calls at the wrong moment or with the wrong thing: one sentence with the path and the remedy.
+
+And nothing has happened.
+"""
 
 from __future__ import annotations
 
