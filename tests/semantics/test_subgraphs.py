@@ -681,3 +681,76 @@ def test_active_edges_sources_and_signals_over_the_border_are_refused() -> None:
     graph.connect(values.out, other.values)
     with pytest.raises(hfg.errors.CheckFailed, match=r"numbers"):
         run(graph)
+
+
+class Box3(hfg.Subgraph):
+    """A node that takes three seconds, and is set up in one."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        slow = graph.add(Slow3(), name="slow")
+        graph.connect(self.value.inner, slow.value)
+        graph.connect(slow.out, self.out.inner)
+
+
+class Slow3(hfg.Node):
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    story: list[tuple[str, float]] = []  # noqa: RUF012 - over setups
+
+    async def setup(self) -> None:
+        self.story.append(("setup", hfg.now()))
+        await asyncio.sleep(1)
+
+    async def process(self, value: int) -> int:
+        await asyncio.sleep(3)
+        self.story.append((f"{value} over", hfg.now()))
+        return value
+
+
+@pytest.mark.rule("F10", "F9")
+@pytest.mark.parametrize("slot", ["enable", "reset"])
+def test_a_node_starts_afresh_only_when_the_firing_under_way_is_over(slot: str, fast: bool) -> None:
+    async def main() -> list[object]:
+        graph = hfg.Graph()
+        box, sink = graph.add(Box3()), graph.add(Keep())
+        graph.connect(graph.input("in", int), box.value)
+        graph.connect(box.out, sink.value)
+        async with hfg.running(graph, fast=fast) as run, run.feed("in") as feed:
+            sending = asyncio.create_task(feed.send(1))
+            await asyncio.sleep(1)
+            if slot == "enable":
+                await run.trigger(box.disable)
+            await run.trigger(box.ports.slots[slot])
+            await asyncio.sleep(10)
+            await sending
+            await feed.send(2)
+        return sink.values
+
+    Slow3.story.clear()
+    values = drive(main)
+    assert values == ([2] if slot == "enable" else [1, 2])
+    assert Slow3.story == [("setup", 0), ("1 over", 4), ("setup", 4), ("2 over", 15)]
+
+
+class Many(hfg.Subgraph):
+    """Thousands of nodes."""
+
+    def build(self, graph: hfg.Graph) -> None:
+        for _ in range(2_000):
+            graph.add(Ear())
+
+
+@pytest.mark.rule("F10")
+def test_a_box_of_thousands_is_disabled_enabled_and_reset_without_a_deep_stack(fast: bool) -> None:
+    async def main() -> None:
+        graph = hfg.Graph()
+        box = graph.add(Many())
+        async with hfg.running(graph, fast=fast) as run:
+            for port in (box.disable, box.enable, box.reset):
+                await run.trigger(port)
+                await run.wait_quiet()
+
+    drive(main)
