@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import threading
+import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
@@ -363,3 +365,67 @@ class Burst(hfg.Node):
         self.over = True
         for number in range(1, self.count + 1):
             self.rang.trigger(number)
+
+
+class KeepsModifiers(hfg.Node):
+    seen = hfg.State(factory=list)
+    passed = hfg.Event(object)
+
+    @hfg.slot
+    def hear(self, token: hfg.Token[object]) -> None:
+        self.seen.append(token.activity)
+        self.passed.trigger(token.value)
+
+
+class Pair(hfg.Node):
+    """Two inputs, so that two modifiers arrive in one firing."""
+
+    a = hfg.Input(object)
+    b = hfg.Input(object)
+    seen = hfg.State(factory=list)
+
+    def process(self, a: object, b: object) -> None:
+        self.seen.append(self.active)
+
+
+class Where(hfg.Node):
+    """Which threads its code ran on, and whether two of its group ever ran at once."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    threads = hfg.State(factory=set)
+    running: list[str] = []  # noqa: RUF012 - of all
+    worst: list[int] = []  # noqa: RUF012
+
+    def process(self, value: int) -> int:
+        self.threads.add(threading.current_thread().name)
+        self.running.append("x")
+        self.worst.append(len(self.running))
+        time.sleep(0.001)
+        self.running.pop()
+        return value
+
+    @hfg.slot
+    def hear(self, value: int) -> None:
+        self.process(value)
+
+
+class Runner(hfg.Node):
+    """Can be made active, then fires."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    rang = hfg.Event(int)
+    seen = hfg.State(factory=list)
+
+    @hfg.slot
+    def begin(self) -> None:
+        pass
+
+    @hfg.slot
+    def ring(self, value: int) -> None:
+        self.rang.trigger(value)
+
+    def process(self, value: int) -> int | None:
+        self.seen.append(self.active)
+        return value if value % 2 else None
