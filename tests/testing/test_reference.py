@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -10,7 +10,7 @@ import pytest
 import reactivex.operators as ops
 
 import hfg
-from hfg.testing import ReferenceMachine, ReferenceReport, recorder, reference_run
+from hfg.testing import ReferenceMachine, ReferenceReport, recorder, reference_run, replay
 from hfg.testing.nodes import (
     AsyncRelay,
     Counter,
@@ -592,6 +592,99 @@ def test_a_subgraph_is_active_while_something_inside_is() -> None:
     inner.start.activates(inner["counter"].activate)
     report = reference_run(graph)
     assert report.activity == [("pair/counter", True), ("pair/counter", False), ("doubter", True)]
+
+
+class EachDoubled(hfg.Subgraph):
+    items = hfg.Input(int)
+    offset = hfg.Input(int, optional=True, default=0)
+    doubled = hfg.Output(int)
+    even = hfg.Output(int)
+    iterate_over = ("items",)
+
+    def build(self, graph: hfg.Graph) -> None:
+        twice, total, chosen = graph.add(double()), graph.add(add()), graph.add(some())
+        graph.connect(self.items.inner, twice.value)
+        graph.connect(self.items.inner, chosen.value)
+        graph.connect(twice.out, total.a)
+        graph.connect(self.offset.inner, total.b)
+        graph.connect(total.out, self.doubled.inner)
+        graph.connect(chosen.out, self.even.inner)
+
+
+@hfg.node
+def lists(*, values: tuple[list[int], ...]) -> Iterator[list[int]]:
+    yield from values
+
+
+@hfg.node
+def show(value: list[int]) -> None:
+    """Take it."""
+
+
+def iterating() -> hfg.Graph:
+    graph = hfg.Graph()
+    source, each = graph.add(lists(values=([1, 2, 3], [], [4]))), graph.add(EachDoubled())
+    graph.connect(source.out, each.items)
+    graph.connect(graph.add(script(values=(10, 20, 30))).out, each.offset)
+    graph.connect(each.doubled, graph.add(show(), name="all").value)
+    graph.connect(each.even, graph.add(show(), name="even").value)
+    return graph
+
+
+@pytest.mark.rule("G4")
+def test_an_iterating_subgraph_gives_lists_of_what_came_out() -> None:
+    found = every_schedule(
+        iterating,
+        lambda r: (r.values("each_doubled.doubled -> all.value"), r.values("each_doubled.even -> even.value")),
+    )
+    assert found == ([[12, 14, 16], [], [38], END], [[2], [], [4], END])
+
+
+@pytest.mark.rule("G4")
+@pytest.mark.parametrize("seed", range(10))
+def test_the_engine_iterates_as_the_oracle_does(seed: int) -> None:
+    seen = recorder()
+    hfg.run(iterating(), clock="virtual", policy="random", seed=seed, trace=seen)
+    replay(iterating, seen)
+
+
+@pytest.mark.rule("P10")
+@pytest.mark.parametrize("seed", range(5))
+def test_outputs_of_the_graph_that_nobody_reads_are_collected(seed: int) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        values = graph.output("values", int)
+        source = graph.add(Script(count=3))
+        graph.connect(source.out, values)
+        return graph
+
+    machine = ReferenceMachine(build())
+    machine.start()
+    while moves := machine.moves():
+        machine.apply(moves[0])
+    assert machine.collected == {"values": [1, 2, 3]}
+    seen = recorder()
+    report = hfg.run(build(), clock="virtual", policy="random", seed=seed, trace=seen)
+    assert report.outputs == {"values": [1, 2, 3]}
+    replay(build, seen)
+
+
+@pytest.mark.rule("P10")
+def test_a_feed_puts_a_token_when_the_input_is_free_and_end_closes_it() -> None:
+    graph = hfg.Graph()
+    keys = graph.input("keys", int)
+    graph.connect(keys, graph.add(double()).value)
+    machine = ReferenceMachine(graph, held_open=True)
+    machine.start()
+    assert machine.moves() == []
+    machine.feed("keys", 3)
+    machine.feed("keys", 4)
+    machine.feed("keys", END)
+    taken = []
+    while moves := machine.moves():
+        taken.append(str(moves[0]))
+        machine.apply(moves[0])
+    assert taken == ["feed keys", 'fire "double"'] * 3
 
 
 # --- errors and ends

@@ -128,6 +128,14 @@ class ReferenceMachine(Calling):
             found += [Move("wait", time=due)] if Move("wait", time=due) not in found else []
         return found
 
+    def owed_moves(self) -> list[Move]:
+        """Give the moves of which one must be taken before anybody may call it quiet."""
+        if self.outcome is not None:
+            return []
+        moot = self.moot_sources()
+        idle = {self.stations[index].path for index in moot}
+        return [move for move in self.working_moves() if move.node not in idle] or self.quiet_moves(moot)
+
     def working_moves(self, without: int | None = None) -> list[Move]:
         """Firings, calls, and what goes on in those under way."""
         found = [Move("feed", edge=name) for name, values in self.feeding.items() if values and self.can_feed(name)]
@@ -153,9 +161,7 @@ class ReferenceMachine(Calling):
             move = self.next_of(index)
             if move is not None:
                 found.append(move)
-            line = self.next_call(index)
-            if move is not None and move.kind == "fire" and line is not None and index in self.moot_sources():
-                found.append(Move("call", station.path, line.edge.label))  # its firing may as well rest
+            found += self.either_way(index, move)
         return found
 
     def can_feed(self, name: str) -> bool:
@@ -193,6 +199,21 @@ class ReferenceMachine(Calling):
         if station.place is not None and self.may_fire(index):
             return Move("fire", station.path)
         return None
+
+    def either_way(self, index: int, move: Move | None) -> list[Move]:
+        """A second move where the order of F9 is open.
+
+        Timers of one moment take effect in any order; and the firing of a source for ended nodes may as well rest.
+        """
+        station, line = self.stations[index], self.next_call(index)
+        if move is None or line is None or station.place is None:
+            return []
+        same_moment = station.timed is not None and abs(line.queue[0].since - station.timed) <= MOMENT_S
+        if move.kind == "fire" and (same_moment or index in self.moot_sources()):
+            return [Move("call", station.path, line.edge.label)]
+        if move.kind == "call" and same_moment and self.may_fire(index):
+            return [Move("fire", station.path)]
+        return []
 
     def quiet_moves(self, moot: Set[int]) -> list[Move]:
         """What follows when nothing runs and nothing can start, `moot` sources apart."""
@@ -357,6 +378,7 @@ class ReferenceMachine(Calling):
     def wait_until(self, time: float) -> None:
         """Let time go on; what is due then becomes possible or happens."""
         self.now = max(self.now, time)
+        self.in_timers = True
         self.loop.ring()
         for line in self.lines:
             if line.operators is not None:
@@ -373,6 +395,7 @@ class ReferenceMachine(Calling):
                 self.box_since[box.index] = None
                 self.trigger(-2 - box.index, "timeout")
         self.settle()
+        self.in_timers = False
 
     def time_activity_out(self, station: Station) -> None:
         """A12: once for each unbroken activity; it takes the right of A3 away."""

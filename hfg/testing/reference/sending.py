@@ -110,7 +110,7 @@ class Sending(State):
         if full and policy in ("drop_newest", "error"):  # "error": only what operators give out, for nobody triggers it
             self.observe(TokenDropped(self.now, line.edge.label, token, "overflow"))
             return
-        line.queue.append(Lying(token, self.next_tick(), sender))
+        line.queue.append(Lying(token, self.next_tick(), sender, self.now))
         if not line.edge.is_event and line.delay and len(line.queue) <= line.delay:
             self.observe(TokenProcessed(self.now, line.edge.label))  # P7: a delay ends the wave
 
@@ -327,6 +327,7 @@ class Sending(State):
                 station.place = None
             elif station.place is None:
                 station.place = self.next_tick()
+                station.timed = self.now if self.in_timers else None
 
     def make_operators(self) -> None:
         """Put the operators of P9 in front of their queues."""

@@ -27,6 +27,7 @@ class Lying:
     token: Token[Any]
     place: int
     sender: int
+    since: float = 0.0
 
 
 @dataclass
@@ -88,6 +89,7 @@ class Station:
     ended: bool = False
     flight: Flight | None = None
     place: int | None = None  # since when it is enabled for a firing (F9)
+    timed: float | None = None  # when, if a timer made it so
     firings: int = 0
     calls: int = 0
     owed: list[Line] = field(default_factory=list)  # taken by the last firing, processed when the outputs are (F5)
@@ -134,6 +136,7 @@ class State:
         self.held_open = False
         self.readers: set[str] = set()
         self.outcome: str | None = None
+        self.in_timers = False  # whether what happens now happens because time went on
         self.error: BaseException | None = None
         self.observed: list[TraceEvent] = []
         self.lost_activity = 0
@@ -285,8 +288,8 @@ class State:
         station = self.stations[index]
         joined = self.lines_joined(index)
         waited = [line for line in joined if self.takes_part(line)]
-        if not station.type.is_source and not any(self.is_live(line) or line in waited for line in joined):
-            return False
+        if not station.type.is_source and not waited:
+            return False  # no live input edge, or all that there were have ended
         connected = {line.edge.target.name for line in waited if line.edge.target.kind == "input"}
         mandatory = {name for name, spec in station.type.inputs.items() if not spec.optional}
         return mandatory <= connected and all(line.queue for line in waited)
