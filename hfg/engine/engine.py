@@ -260,12 +260,11 @@ class Engine:
         while True:
             if ready_groups:
                 ready_groups.popleft().dispatch()
-            if not policy:
-                if ready_groups:
-                    continue
+            if policy:
+                worker = pop()
+                worker.step(worker)
+            elif not ready_groups:
                 return
-            worker = pop()
-            worker.step(worker)
             left -= 1
             if not left:
                 if core.over:

@@ -33,6 +33,9 @@ __all__ = [
 ]
 
 
+_DISPATCH_STEPS = 16  # how much one group may do on the loop before others have their turn
+
+
 class Policy(Protocol):
     """Which of the workers that can move is next (R2).
 
@@ -188,9 +191,13 @@ class ThreadGroup(Group):
     def dispatch(self) -> None:
         """Let nodes start until the thread is busy; on the loop."""
         policy = self.policy
-        while not self.running and len(policy):
+        for _ in range(_DISPATCH_STEPS):
+            if self.running or not len(policy):
+                return
             worker = policy.pop()
             worker.step(worker)
+        if not self.running and len(policy):
+            self._ready_groups.append(self)  # silent firings need no thread: others have their turn
 
     def submit(self, job: Job) -> None:
         """Give the thread a job; on the loop."""
