@@ -18,7 +18,7 @@ help:
 	@echo "make clean   remove .venv and everything tools have left"
 
 demo: $(READY)
-	$(BIN)/hfg run examples/photographs.py --clock virtual -v
+	$(BIN)/python examples/photographs.py
 
 test: $(READY)
 	$(BIN)/python -m pytest
