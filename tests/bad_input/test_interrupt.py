@@ -129,7 +129,7 @@ def test_one_press_tears_down_and_ends_within_two_seconds_with_a_sentence(
 @pytest.mark.parametrize("where", PLACES)
 def test_a_second_press_ends_at_once(where: str, outcomes: dict[tuple[str, int], Future[Ended]]) -> None:
     ended = outcomes[where, 2].result()
-    assert ended.seconds < 1.1
+    assert ended.seconds < 2  # mostly a tenth; for a machine under load
     assert ended.error.splitlines()[-1].startswith('KeyboardInterrupt: graph "busy" was interrupted; ')
     assert ended.said[-1] == "after None"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -14,8 +15,10 @@ from tests.semantics.nodes import (
     Keep,
     Ringing,
     Where,
+    forward,
     forward_later,
     numbers,
+    only_odd,
     run,
 )
 
@@ -192,3 +195,21 @@ def test_a_thread_group_has_a_policy_too() -> None:
         graph.connect(source.rang, node.hear)
     run(graph)
     assert "".join(Named.story) in ("cfbead", "acfbed")  # the first may have begun before the others came
+
+
+@pytest.mark.rule("R1")
+@pytest.mark.parametrize("group", ["loop", "work"])
+def test_what_goes_round_without_end_leaves_everybody_else_a_turn(group: str, fast: bool) -> None:
+    async def main() -> str:
+        graph = hfg.Graph()
+        graph.group("work", threads=1)
+        odd, back = graph.add(only_odd(), group=group), graph.add(forward(), group=group)
+        graph.connect(odd.out, back.value)
+        graph.connect(back.out, odd.value, initial=[2])  # silence for ever
+        async with asyncio.timeout(5):
+            async with hfg.running(graph, fast=fast) as run:
+                await asyncio.sleep(0.02)
+                assert run.statistics().nodes["only_odd"].silent > 10
+        return run.report().outcome
+
+    assert asyncio.run(main()) == "stopped"
