@@ -251,6 +251,7 @@ class Replay:
     def _begin(self, event: FiringStarted | CallStarted) -> None:
         if self.expected:
             raise Divergence("the run went on before all of the last decision was done", event, self)
+        self._end_rest(event.node)
         for move in self.machine.moves():
             fires = move.kind == "fire" and isinstance(event, FiringStarted)
             calls = move.kind == "call" and isinstance(event, CallStarted) and move.edge == event.edge
@@ -260,6 +261,12 @@ class Replay:
                     raise Divergence("it is another kind of firing or call", event, self)
                 return
         raise Divergence("the run moved when the rules forbid it", event, self)
+
+    def _end_rest(self, node: str) -> None:
+        """Nobody sees a restarted node come back, but that it goes on."""
+        for move in self.machine.moves():
+            if move.kind == "timer" and move.node == node and not self.machine.times_out(self.machine.paths[node]):
+                self._apply(move)
 
     def _end(self, event: RunEnded) -> None:
         if not any(move.kind == "finish" for move in self.machine.moves()):
@@ -285,6 +292,8 @@ class Replay:
         for move in moves:
             if move.kind in ("go on", "time out") and move.node == node:
                 return move
+            if move.kind == "timer" and (move.node or self._source_of(move.edge)) == node:
+                return move
             if move.kind == "call" and isinstance(event, TokenTaken) and move.edge == event.edge:
                 return move
             if move.kind == "read" and isinstance(event, TokenTaken) and move.edge == event.edge:
@@ -301,6 +310,9 @@ class Replay:
                 return move
             if move.kind == "finish" and isinstance(event, TokenDropped) and event.reason == "stopped":
                 return move
+        for move in moves:  # steps of which nothing was seen
+            if move.kind == "timer" and not (move.node and self.machine.times_out(self.machine.paths[move.node])):
+                return move
         return None if self.sees_inside else next((move for move in moves if self._moves_inside(move)), None)
 
     def _moves_inside(self, move: Move) -> bool:
@@ -310,6 +322,9 @@ class Replay:
         return (line is not None and line.edge.within is not None) or (
             node >= 0 and self.machine.stations[node].leaf.within is not None
         )
+
+    def _source_of(self, label: str) -> str:
+        return self.machine.path_of(self.machine.labels[label].edge.source.owner)
 
     def _comes_from(self, event: TokenSent, name: str) -> bool:
         source = self.machine.labels[event.edge].edge.source
@@ -332,7 +347,7 @@ class Replay:
             steps = [
                 move
                 for move in self.machine.moves()
-                if move.kind == "go on" or (move.kind == "feed" and not self._reaches(move.edge))
+                if move.kind in ("go on", "timer") or (move.kind == "feed" and not self._reaches(move.edge))
             ]
             if not steps:
                 return

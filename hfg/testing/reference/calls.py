@@ -77,7 +77,9 @@ class Calling(Firing):
     def launch_call(self, flight: Flight, handler: Callable[[], Any]) -> None:
         """Run the handler where its group runs."""
         automatic = flight.slot not in flight.station.type.slots
-        self.begin_in_group(flight, automatic or self.is_async_slot(flight))
+        # `setup` and `teardown` run where the node does
+        at_once = automatic and flight.slot not in ("reset", "enable")
+        self.begin_in_group(flight, at_once or (not automatic and self.is_async_slot(flight)))
         self.launch(flight, handler, lambda _, error: self.end_call(flight, error))
 
     def is_async_slot(self, flight: Flight) -> bool:

@@ -33,7 +33,7 @@ class Firing(RunningCode):
     def start_firing(self, index: int) -> None:
         """Take a token from every edge, let activity and parameters act, decide what kind of firing it is, begin."""
         station = self.stations[index]
-        station.place = None
+        station.place, station.rested = None, False
         station.firings += 1
         joined = [line for line in self.lines_joined(index) if self.is_live(line) or self.takes_part(line)]
         taken = self.take_all([line for line in joined if self.takes_part(line)])
@@ -44,7 +44,7 @@ class Firing(RunningCode):
         station.flight = flight
         self.observe(FiringStarted(self.now, station.path, flight.number, kind))
         self.receive_activity(index, [token.activity for token in tokens])
-        if kind != "silent":
+        if kind == "process":
             rate = station.leaf.options.max_rate_hz
             station.hold_until = self.now + 1 / rate if rate else station.hold_until
         failure = self.set_parameters(station, taken)

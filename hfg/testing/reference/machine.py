@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from hfg.errors import QueueLimit, Stalled
 from hfg.testing.reference.calls import Calling
-from hfg.testing.reference.state import Line, Station
+from hfg.testing.reference.state import Line
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
 from hfg.token import END, NO_MESSAGE, Token
@@ -37,14 +37,26 @@ class Move:
     """One permitted step.
 
     Attributes:
-      kind: "fire" node; "call" a slot of node with the token of `edge`; "go on" with the firing or call of node; "time
-        out" the firing of node (X2);
-        "wait" until `time`; "grow" the queue of `edge`; "complete" operators; "end events"; "finish" the run.
+      kind: "fire" node; "call" a slot of node with the token of `edge`; "go on" with the firing or call of node;
+        "time out" the firing of node (X2); "timer": what a timer of node, or the operators of `edge`, waited for;
+        "feed" the graph's input `edge`, "read" the output at the end of `edge` (P10); "wait" until `time`;
+        "grow" the queue of `edge`; "complete" operators; "end events"; "finish" the run.
       outcome: of "finish".
     """
 
     kind: Literal[
-        "fire", "call", "go on", "time out", "feed", "read", "wait", "grow", "complete", "end events", "finish"
+        "fire",
+        "call",
+        "go on",
+        "time out",
+        "timer",
+        "feed",
+        "read",
+        "wait",
+        "grow",
+        "complete",
+        "end events",
+        "finish",
     ]
     node: str = ""
     edge: str = ""
@@ -57,6 +69,8 @@ class Move:
                 return f"wait until {self.time:g} s"
             case "finish":
                 return f"finish: {self.outcome}"
+            case "timer":
+                return f'timer of "{self.node or self.edge}"'
             case "grow" | "feed" | "read":
                 return f"{self.kind} {self.edge}"
             case "call":
@@ -139,6 +153,7 @@ class ReferenceMachine(Calling):
     def working_moves(self, without: int | None = None) -> list[Move]:
         """Firings, calls, and what goes on in those under way."""
         found = [Move("feed", edge=name) for name, values in self.feeding.items() if values and self.can_feed(name)]
+        found += self.timers_due()
         found += [Move("read", edge=line.edge.label) for line in self.lines if line.queue and self.is_read(line)]
         for owner in [ROOT, *(-2 - box.index for box in self.structure.boxes)]:
             line = self.next_call(owner)
@@ -209,7 +224,7 @@ class ReferenceMachine(Calling):
         if move is None or line is None or station.place is None:
             return []
         same_moment = station.timed is not None and abs(line.queue[0].since - station.timed) <= MOMENT_S
-        if move.kind == "fire" and (same_moment or index in self.moot_sources()):
+        if move.kind == "fire" and (same_moment or station.rested):
             return [Move("call", station.path, line.edge.label)]
         if move.kind == "call" and same_moment and self.may_fire(index):
             return [Move("fire", station.path)]
@@ -239,7 +254,7 @@ class ReferenceMachine(Calling):
     def next_timer(self, without: Set[int] = frozenset()) -> float | None:
         """The next moment at which something could start: rate, gate, back-off, time-out, operator, waiting code."""
         ignored = {id(self.stations[index].flight) for index in without}
-        times = [] if (due := self.loop.next_time(ignored)) is None else [due]
+        times: list[float | None] = [self.loop.next_time(ignored)]
         for index, station in enumerate(self.stations):
             if index in without:
                 continue
@@ -258,20 +273,12 @@ class ReferenceMachine(Calling):
                 times += [
                     station.last_function + 1 / rate for rate in self.gates_of(index) if rate and self.is_resting(index)
                 ]
-            if (
-                options.active_for_s is not None
-                and station.active_since is not None
-                and self.lines_from(index, "event", "timeout")
-            ):
-                times.append(station.active_since + options.active_for_s)
-        for box in self.structure.boxes:
-            since, limit = self.box_since[box.index], box.options.active_for_s
-            if since is not None and limit is not None and self.lines_from(-2 - box.index, "event", "timeout"):
-                times.append(since + limit)
+            times.append(self.time_of_timeout(index))
+        times += [self.time_of_timeout(-2 - box.index) for box in self.structure.boxes]
         for line in self.lines:
             if line.operators is not None and (due := line.operators.due()) is not None:
                 times.append(max(due, self.now))
-        return min(times, default=None)
+        return min((time for time in times if time is not None), default=None)
 
     def queue_to_grow(self) -> Line | None:
         """F8: if only full queues hold nodes back, the smallest of those queues."""
@@ -325,6 +332,8 @@ class ReferenceMachine(Calling):
 
     def is_moot(self, index: int) -> bool:
         """R5: a source with edges only into ended nodes."""
+        if not self.stations[index].type.is_source:
+            return False
         lines = [line for line in self.lines if line.edge.source.owner == index]
         targets = {line.edge.target.owner for line in lines}
         return bool(lines) and all(target >= 0 and self.stations[target].ended for target in targets)
@@ -362,6 +371,10 @@ class ReferenceMachine(Calling):
                 self.feed_once(move.edge)
             case "read":
                 self.read_once(self.labels[move.edge])
+            case "timer":
+                self.in_timers = True
+                self.take_timer(move)
+                self.in_timers = False
             case "wait":
                 self.wait_until(move.time)
             case "grow":
@@ -376,33 +389,65 @@ class ReferenceMachine(Calling):
         return self.observed_since(mark)
 
     def wait_until(self, time: float) -> None:
-        """Let time go on; what is due then becomes possible or happens."""
+        """Let time go on; what is due then becomes possible."""
         self.now = max(self.now, time)
         self.in_timers = True
         self.loop.ring()
         for line in self.lines:
             if line.operators is not None:
-                line.operators.advance(self.now)
-        for station in self.stations:
-            if station.resting_until is not None and self.is_over(station.resting_until):
-                self.restart(station)
-            limit = station.leaf.options.active_for_s
-            if limit is not None and station.active_since is not None and self.is_over(station.active_since + limit):
-                self.time_activity_out(station)
-        for box in self.structure.boxes:
-            since, limit = self.box_since[box.index], box.options.active_for_s
-            if since is not None and limit is not None and self.is_over(since + limit):
-                self.box_since[box.index] = None
-                self.trigger(-2 - box.index, "timeout")
+                line.operators.tell_time(self.now)
         self.settle()
         self.in_timers = False
 
-    def time_activity_out(self, station: Station) -> None:
+    def timers_due(self) -> list[Move]:
+        """Timers whose moment has come; those of one moment ring in any order."""
+        found = []
+        for index, station in enumerate(self.stations):
+            if self.times_out(index) or (station.resting_until is not None and self.is_over(station.resting_until)):
+                found.append(Move("timer", station.path))
+        found += [Move("timer", box.path) for box in self.structure.boxes if self.times_out(-2 - box.index)]
+        for line in self.lines:
+            if line.operators is not None and (due := line.operators.due()) is not None and self.is_over(due):
+                found.append(Move("timer", edge=line.edge.label))
+        return found
+
+    def times_out(self, owner: int) -> bool:
+        """Whether the node or subgraph has been active for so long that its event `timeout` is due (A12)."""
+        moment = self.time_of_timeout(owner)
+        return moment is not None and self.is_over(moment)
+
+    def time_of_timeout(self, owner: int) -> float | None:
+        """When that will be; None if never, or if nobody is connected."""
+        if owner >= 0:
+            since, limit = self.stations[owner].active_since, self.stations[owner].leaf.options.active_for_s
+        else:
+            since, limit = self.box_since[-2 - owner], self.structure.boxes[-2 - owner].options.active_for_s
+        if since is None or limit is None or not self.lines_from(owner, "event", "timeout"):
+            return None
+        return float(since + limit)
+
+    def take_timer(self, move: Move) -> None:
+        """Do what a timer was set for."""
+        if move.edge:
+            self.labels[move.edge].operators.advance(self.now)
+        else:
+            owner = self.paths[move.node]
+            if self.times_out(owner):
+                self.time_activity_out(owner)
+            elif owner >= 0:
+                self.restart(self.stations[owner])
+        self.settle()
+
+    def time_activity_out(self, owner: int) -> None:
         """A12: once for each unbroken activity; it takes the right of A3 away."""
-        station.active_since = None
-        if station.flight is not None:
-            station.flight.right = False
-        self.trigger(station.leaf.index, "timeout")
+        if owner >= 0:
+            station = self.stations[owner]
+            station.active_since = None
+            if station.flight is not None:
+                station.flight.right = False
+        else:
+            self.box_since[-2 - owner] = None
+        self.trigger(owner, "timeout")
 
     def grow(self, line: Line) -> None:
         """F8: one more place, unless the limit forbids it."""

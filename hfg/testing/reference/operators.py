@@ -91,8 +91,12 @@ class Operators:
         """When something will happen by itself."""
         return self._clock.due()
 
+    def tell_time(self, now: float) -> None:
+        """Let the time be `now`, without anything happening yet."""
+        self._clock.seconds = max(self._clock.seconds, now)
+
     def advance(self, now: float) -> None:
-        """Let the time be `now`."""
+        """Do what is due until `now`."""
         self._clock.advance(now)
 
     def _out(self, value: Any) -> None:

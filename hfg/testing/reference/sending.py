@@ -275,7 +275,8 @@ class Sending(State):
         """END follows on all outputs as soon as they are free (F4); then drained modifiers act (F12)."""
         for station in self.stations:
             index = station.leaf.index
-            if station.ending and not station.ended and station.flight is None and self.outputs_are_free(index):
+            firing = station.flight is not None and station.flight.what == "firing"
+            if station.ending and not station.ended and not firing and self.outputs_are_free(index):
                 station.ended = True
                 lines = self.in_order_of_outputs(station)
                 self.send(index, [(line, END, None, station.stamp) for line in lines])
@@ -320,6 +321,10 @@ class Sending(State):
         """Whether a node inside is amid a step of its own, so that the subgraph's activity is not looked at yet."""
         return False
 
+    def is_moot(self, index: int) -> bool:
+        """Whether a source works for ended nodes only (R5)."""
+        raise NotImplementedError
+
     def note_places(self) -> None:
         """Give a place to each node that has become enabled for a firing, and take it from those that are not (F9)."""
         for station in self.stations:
@@ -328,6 +333,7 @@ class Sending(State):
             elif station.place is None:
                 station.place = self.next_tick()
                 station.timed = self.now if self.in_timers else None
+            station.rested |= station.place is not None and self.is_moot(station.leaf.index)
 
     def make_operators(self) -> None:
         """Put the operators of P9 in front of their queues."""

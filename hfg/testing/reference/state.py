@@ -90,6 +90,7 @@ class Station:
     flight: Flight | None = None
     place: int | None = None  # since when it is enabled for a firing (F9)
     timed: float | None = None  # when, if a timer made it so
+    rested: bool = False  # it worked for ended nodes only and may have given its place away
     firings: int = 0
     calls: int = 0
     owed: list[Line] = field(default_factory=list)  # taken by the last firing, processed when the outputs are (F5)
