@@ -62,7 +62,7 @@ def choose(worker: Worker) -> None:
     ):
         return
     if worker.slot_edges and not worker.in_edges and not worker.is_source:
-        worker.step = _call_step(worker)
+        worker.step = _calls_step(worker)
         return
     if worker.slot_edges or "processed" in worker.events:
         return
@@ -363,25 +363,40 @@ def _generator_step(worker: Worker, given: SyncEdge) -> Step:
     return step
 
 
-def _call_step(worker: Worker) -> Step:
+def _calls_step(worker: Worker) -> Step:
     """A node that lives by its slots."""
+    general = firing.step
+    calls: Any = worker.calls
+    steps = {edge: _call_step(worker, edge) for edge in worker.slot_edges}
+    if len(steps) == 1:
+        return steps.popitem()[1]
+
+    def step(worker: Worker) -> None:
+        if calls:
+            steps[calls[0]](worker)
+        else:
+            general(worker)
+
+    return step
+
+
+def _call_step(worker: Worker, edge: EventEdge) -> Step:
+    """One edge into one slot, whose handler takes the value."""
+    handler: Any = edge.handler
+    if handler is None or type(edge) is not EventEdge:
+        return firing.step
     core = worker.core
     node = worker.node
     general = firing.step
     calls: Any = worker.calls
+    queue = edge.queue
 
     def step(worker: Worker) -> None:
         if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
             general(worker)
             return
-        edge = calls[0]
-        handler = edge.handler
-        if handler is None:
-            general(worker)
-            return
         # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
         calls.popleft()
-        queue = edge.queue
         token = queue.popleft()
         worker.call_number += 1
         if edge.full and len(queue) < edge.capacity:
@@ -450,11 +465,12 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
     carries = edge.active
     scopes = target.scopes
 
-    def emit(value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+    # (parameters by keyword alone would cost 20 ns; who gives them by position is refused by the type checker)
+    def emit(value: Any = None, activity: int | None = None, stamp: float | None = None) -> None:
         if (
             activity is not None
-            or not core.plain
             or core.current is not worker  # perhaps a thread, while the loop is at work
+            or not core.plain
             or port._observers is not None
             or not edge.live
             or type(value) is Token
@@ -486,5 +502,7 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
         ):  # if it is busy or blocked its step does nothing, and it is queued again when that is over
             target.queued = True
             target.push(target)
+        if core.current is not worker:  # a thread was here after all, and perhaps the loop has gone to rest
+            host.from_any_thread(host.kick)
 
     return emit

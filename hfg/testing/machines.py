@@ -11,6 +11,7 @@ import contextlib
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+from hypothesis import assume
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
@@ -23,6 +24,7 @@ from hfg.testing.recording import Recorder
 from hfg.testing.reference import ReferenceMachine, reference_run
 from hfg.testing.strategies import graphs
 from hfg.token import END
+from hfg.trace import TraceEvent
 
 __all__ = ["STIMULATED", "EngineAgainstOracle"]
 
@@ -30,6 +32,7 @@ STIMULATED = Allowed(max_nodes=5, feeds=True, gates=False, operators=False, fail
 """What occurs in the graphs of the machine."""
 
 MOST_MOVES = 800
+MOST_EVENTS = 4000
 
 
 class _LiveRun:
@@ -38,6 +41,7 @@ class _LiveRun:
     def __init__(self, plan: GraphPlan, seed: int) -> None:
         self.graph = plan.build()
         self.trace = Recorder()
+        self.goes_round = False  # what came from outside has set something going that never stops
         self.failure: HfgError | None = None
         self.now = 0.0
         self.feeds: dict[str, Any] = {}
@@ -82,7 +86,8 @@ class _LiveRun:
 
     async def _hold(self) -> None:
         try:
-            async with hfg.running(self.graph, policy="random", seed=self._seed, trace=self.trace) as run:
+            async with hfg.running(self.graph, policy="random", seed=self._seed, trace=self._see) as run:
+                self._run = run
                 for name, port in self.graph.inputs.items():
                     self.feeds[name] = await run.feed(port).__aenter__()
                 await self._rest(run)
@@ -96,6 +101,12 @@ class _LiveRun:
                 await run.wait_finished()
         except HfgError as error:
             self.failure = error
+
+    def _see(self, event: TraceEvent) -> None:
+        self.trace.append(event)
+        if len(self.trace) == MOST_EVENTS:
+            self.goes_round = True
+            asyncio.get_running_loop().call_soon(self._run.stop)
 
     async def _rest(self, run: Any) -> None:
         await asyncio.sleep(0)
@@ -227,6 +238,7 @@ class EngineAgainstOracle(RuleBasedStateMachine):
     def compare(self) -> None:
         """Replay what the run did since the last time."""
         assert self.live is not None
+        assume(not self.live.goes_round)
         self.differs = True  # until all of it is seen to be right
         for event in self.live.trace[self.seen :]:
             self.replaying.see(event)
@@ -241,7 +253,7 @@ class EngineAgainstOracle(RuleBasedStateMachine):
         """Let the run end by itself and compare the end as well."""
         if self.live is None:
             return
-        if self.differs or self.live.is_over or self.replaying.machine.outcome is not None:
+        if self.differs or self.live.goes_round or self.live.is_over or self.replaying.machine.outcome is not None:
             self.live.close()
             return
         for name in self.plan.feeds:
