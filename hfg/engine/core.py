@@ -157,6 +157,7 @@ class Core:
         self.errors: list[HfgError] = []
         self.lost_activity = 0
         self.dirty_scopes: list[Scope] = []
+        self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
         self.sources: list[Worker] = []
         self.feeds: list[Worker] = []  # the graph's own inputs (P10)
         self.readers: list[Worker] = []  # the graph's own outputs

@@ -92,7 +92,8 @@ def _ask_ready(worker: Worker) -> None:
             worker.placed = False
             worker.blocked |= UNREADY
             worker.core.upstairs.fail(worker, "ready()", error, answer=False)
-            idle_again(worker, asked=True)
+            if not worker.busy:  # else its restart has begun
+                idle_again(worker, asked=True)
         elif ready and worker.placed:
             fire(worker)
         elif worker.placed:
@@ -226,7 +227,7 @@ def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]], mo
         else:
             has_value = True
         has_mandatory = has_mandatory or edge.mandatory
-    if end or (any(token.value is END for token in tokens) and _all_ended(worker)):
+    if end or (any(token.value is END for token in tokens) and _all_ended(worker, edges)):
         return "end"
     if any(edge.ended for edge in edges):
         rewire(worker)
@@ -246,12 +247,17 @@ def _idle_turn(worker: Worker, idle_rate_hz: float | None) -> bool:
     return idle_rate_hz is not None and worker.core.now() + SAME_MOMENT_S >= worker.gate_next + 1.0 / idle_rate_hz
 
 
-def _all_ended(worker: Worker) -> bool:
-    """F4(1): every live input has ended; edges with initial tokens do not count, and one other must have."""
+def _all_ended(worker: Worker, taking_part: Sequence[Any]) -> bool:
+    """F4(1): every live input has ended; edges with initial tokens do not count, and one other must have.
+
+    Args:
+      worker: whose inputs.
+      taking_part: the edges of this firing; also one whose source was disabled and that still delivers (F10).
+    """
     live = [
         edge
         for edge in worker.in_edges
-        if edge.live and not (type(edge) is EventEdge and edge.target_kind == "parameter")
+        if edge in taking_part or (edge.live and not (type(edge) is EventEdge and edge.target_kind == "parameter"))
     ]
     counted = [edge for edge in live if not getattr(edge, "initial", ())]
     return bool(counted) and all(edge.ended for edge in counted)

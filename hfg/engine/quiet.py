@@ -140,7 +140,12 @@ def node_ended(worker: Worker) -> None:
 
 def _feeds_only_ended(source: Worker) -> bool:
     edges = list(source.all_out_edges())
-    return bool(edges) and all(edge.target.blocked & ENDED for edge in edges)
+    return bool(edges) and all(edge.target.blocked & ENDED and not _is_called(edge) for edge in edges)
+
+
+def _is_called(edge: Any) -> bool:
+    """Whether it leads to slot calls, which go on when the node has ended (F12)."""
+    return edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge)
 
 
 def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:

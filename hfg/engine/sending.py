@@ -172,6 +172,8 @@ def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float |
         unplace(worker)
     if carried:
         _activity_left(worker)
+    if worker.core.drained:
+        _drained_act(worker.core)
 
 
 def _activity_left(worker: Worker) -> None:
@@ -252,32 +254,30 @@ def add_call(target: Worker, edge: Edge) -> None:
 
 
 def _drain(edge: Edge, token: Token[Any]) -> None:
-    """T4, F12: the token is processed at once, without a firing or call; its modifier still acts."""
+    """T4, F12: the token is processed at once, without a firing or call; its modifier acts behind the sending."""
     target: Worker = edge.target
     core = target.core
-    if edge.target_kind == "slot":
-        if core.trace is not None:
-            core.trace(TokenDrained(core.now(), edge.label, token))
-        if token.activity:
-            receive(target, (token.activity,))
-            _flush_idle(target)
-        return
-    edge.drained += 1
+    into_slot = edge.target_kind == "slot"
+    if not into_slot:
+        edge.drained += 1
     if core.trace is not None:
         core.trace(TokenDrained(core.now(), edge.label, token))
     if token.activity:
-        if target.deferred is not None:
+        if target.deferred is not None and not into_slot:
             target.deferred.append(token.activity)
         else:
-            receive(target, (token.activity,))
-            _flush_idle(target)
+            core.drained.append((target, token.activity))
 
 
-def _flush_idle(worker: Worker) -> None:
-    """What arose outside a firing or call leaves at once; else it follows the one under way."""
-    derive_scopes(worker.core)
-    if not worker.busy:
-        flush_automatic(worker)
+def _drained_act(core: Core) -> None:
+    """The sending is on its edges: the modifiers of what was drained act; then what arose by that leaves."""
+    drained, core.drained = core.drained, []
+    for target, modifier in drained:
+        receive(target, (modifier,))
+    derive_scopes(core)
+    for target, _ in drained:
+        if not target.busy:  # else it follows the firing or call under way
+            flush_automatic(target)
 
 
 def release(edges: Sequence[Any]) -> None:
@@ -327,9 +327,9 @@ def send_end(worker: Worker) -> None:
     if core.trace is not None:
         core.trace(NodeEnded(core.now(), worker.path))
     deferred, worker.deferred = worker.deferred, None
-    if deferred:
-        receive(worker, deferred)
-        derive_scopes(core)
+    for modifier in deferred or ():
+        receive(worker, (modifier,))
+    derive_scopes(core)
     flush_automatic(worker)
     core.upstairs.node_ended(worker)
 
@@ -410,9 +410,11 @@ def trigger(
         if edge.pipeline is not None:
             _into_operators(edge, Token(value, modifier, stamp))
         else:
-            enqueue(edge, value, modifier, stamp)
+            _append(edge, value, modifier, stamp)
     if carried:
         _activity_left(worker)
+    if core.drained:
+        _drained_act(core)
     if not core.pumping:
         core.host.kick()
 
@@ -427,6 +429,14 @@ def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
 
 
 def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
+    """One token on one event edge, a sending of its own."""
+    _append(edge, value, modifier, stamp)
+    core = edge.target.core
+    if core.drained:
+        _drained_act(core)
+
+
+def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
     """Put one token into the queue of an event edge, by its policy (P5, F8)."""
     edge.sent = number = edge.sent + 1
     token = Token(value, modifier, stamp, number)

@@ -335,8 +335,12 @@ class ReferenceMachine(Calling):
         if not self.stations[index].type.is_source:
             return False
         lines = [line for line in self.lines if line.edge.source.owner == index]
-        targets = {line.edge.target.owner for line in lines}
-        return bool(lines) and all(target >= 0 and self.stations[target].ended for target in targets)
+        return bool(lines) and all(self._ends_with(line) for line in lines)
+
+    def _ends_with(self, line: Line) -> bool:
+        """Whether what comes on the edge is for an ended node; its slots go on (F12)."""
+        target = line.edge.target.owner
+        return target >= 0 and self.stations[target].ended and line in self.lines_joined(target)
 
     def moot_sources(self) -> set[int]:
         """Sources that have not ended but have edges only into ended nodes."""
@@ -561,7 +565,7 @@ class ReferenceMachine(Calling):
             if station.active:
                 station.active = station.node._active = False
                 station.active_since = None
-                station.changes.append("deactivated")
+                station.changes.append((self.next_tick(), "deactivated"))
                 self.observe(ActivityChanged(self.now, station.path, False, "reset"))
         self.settle()
         self.trigger(ROOT, "start", activity=1)

@@ -51,7 +51,12 @@ class Sending(State):
     # --- one sending
 
     def send(self, sender: int, shipments: Iterable[Shipment], flight: Flight | None = None) -> None:
-        """Put all tokens of one sending, slots first; then A(sender) follows (A3, A5)."""
+        """Put all tokens of one sending, slots first; then A(sender) follows (A3, A5), and all that comes of it."""
+        self.put_together(sender, shipments, flight)
+        self.settle()
+
+    def put_together(self, sender: int, shipments: Iterable[Shipment], flight: Flight | None = None) -> None:
+        """Put all tokens of one sending; nothing comes of it yet."""
         ordered = sorted(shipments, key=lambda shipment: shipment[0].edge.target.kind != "slot")
         gives = self.is_active(sender) or (flight is not None and flight.right)
         gave = False
@@ -67,7 +72,6 @@ class Sending(State):
             self.put(line, Token(value, modifier, stamp), sender)
         if gave:
             self.take_activity(sender, flight)
-        self.settle()
 
     def take_activity(self, sender: int, flight: Flight | None) -> None:
         """A5, and for a subgraph: activity that leaves by its events is taken from everything inside (G2)."""
@@ -170,7 +174,7 @@ class Sending(State):
         station.active = station.node._active = active
         station.active_since = self.now if active else None
         self.observe(ActivityChanged(self.now, station.path, active, cause))
-        station.changes.append("activated" if active else "deactivated")
+        station.changes.append((self.next_tick(), "activated" if active else "deactivated"))
         hook = station.node._hook("on_activated" if active else "on_deactivated")
         if hook is not None:
             self.run_hook(station, hook)
@@ -193,7 +197,7 @@ class Sending(State):
     def flush_changes(self, station: Station) -> None:
         """Send the automatic events that arose, each a sending of its own: +1 only if the node is active right then."""
         while station.changes:
-            self.trigger(station.leaf.index, station.changes.pop(0))
+            self.trigger(station.leaf.index, station.changes.pop(0)[1])
 
     # --- discarding
 
@@ -214,7 +218,7 @@ class Sending(State):
 
     def settle(self) -> None:
         """Do what rules want "at once", until nothing changes; then see who is enabled now."""
-        going = True
+        going = self.outcome is None  # what is over speaks no more
         while going:
             while self.drain_once():
                 pass
@@ -277,9 +281,11 @@ class Sending(State):
             index = station.leaf.index
             firing = station.flight is not None and station.flight.what == "firing"
             if station.ending and not station.ended and not firing and self.outputs_are_free(index):
-                station.ended = True
                 lines = self.in_order_of_outputs(station)
-                self.send(index, [(line, END, None, station.stamp) for line in lines])
+                self.put_together(index, [(line, END, None, station.stamp) for line in lines])
+                while self.drain_once():  # the own END too, if it comes round
+                    pass
+                station.ended = True
                 self.observe(NodeEnded(self.now, station.path))
                 self.complete_operators(station)
                 waiting, station.drained_modifiers = station.drained_modifiers, []
@@ -304,10 +310,11 @@ class Sending(State):
 
     def flush_once(self) -> bool:
         """Automatic events of changes outside a firing or call; then those of subgraphs (G2)."""
-        for station in self.stations:
-            if station.changes and station.flight is None:
-                self.trigger(station.leaf.index, station.changes.pop(0))
-                return True
+        waiting = [station for station in self.stations if station.changes and station.flight is None]
+        if waiting:
+            first = min(waiting, key=lambda station: station.changes[0])
+            self.trigger(first.leaf.index, first.changes.pop(0)[1])
+            return True
         for box in self.structure.boxes:
             active = self.is_active(-2 - box.index)
             if active != self.box_active[box.index] and not self.is_amid(box.index):
