@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.engine import firing, lifecycle
-from hfg.engine.sending import automatic, block, flush_automatic, put_outputs, report_error, unblock
-from hfg.engine.worker import BACKOFF, TORN_DOWN, UNREADY, Worker
-from hfg.errors import EndOfStream, FiringTimeout, HfgError, NodeError, QueueLimit
+from hfg.engine.sending import automatic, block, flush_automatic, put_outputs, report_error
+from hfg.engine.worker import BACKOFF, Worker
+from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit
 from hfg.ports.edges import EventEdge
 
 __all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "operator_failed", "time_out"]
@@ -54,7 +54,8 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any 
     """X1: the node's policy decides."""
     core = worker.core
     policy = worker.options.on_error if worker.options is not None else "stop"
-    if policy == "restart" and worker.restarts >= worker.options.restart_limit:
+    restarts = policy == "restart" and not worker.blocked & BACKOFF  # else that is under way
+    if restarts and worker.restarts >= worker.options.restart_limit:
         policy = "stop"
     report_error(worker, problem.what, problem.__cause__ or problem, policy)
     worker.written = None
@@ -65,7 +66,7 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any 
     automatic(worker, "failed", problem)
     if answer and policy != "disable":
         put_outputs(worker, None)
-    if policy == "restart":
+    if restarts:
         worker.restarts += 1
         block(worker, BACKOFF)
     if answer:
@@ -76,25 +77,8 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any 
         flush_automatic(worker)
     if policy == "disable":
         lifecycle.disable(worker)
-    elif policy == "restart":
-        _restart(worker)
-
-
-def _restart(worker: Worker) -> None:
-    """Teardown, wait, setup; the wait doubles with each restart."""
-    core = worker.core
-    delay = worker.options.restart_backoff_s * 2 ** (worker.restarts - 1)
-
-    def torn_down() -> None:
-        core.after(delay, lambda: lifecycle.set_up(worker, up))
-
-    def up(error: HfgError | None) -> None:
-        if error is not None:
-            core.host.finish("failed", error)
-        elif not worker.blocked & TORN_DOWN:
-            unblock(worker, BACKOFF | UNREADY)
-
-    lifecycle.tear_down(worker, lambda _error: torn_down())
+    elif restarts:
+        lifecycle.restart(worker, worker.options.restart_backoff_s * 2 ** (worker.restarts - 1))
 
 
 def time_out(worker: Worker) -> None:

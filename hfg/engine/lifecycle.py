@@ -1,6 +1,7 @@
 """Beginning, ending, disabling and enabling single nodes (rules F10, A9 reset, X1 restart).
 
-Stands on `sending` and `wiring`; hooks are run by the host, one after another.
+Each setup is followed by a teardown before the next one, whatever happens to a node meanwhile. Stands on `sending` and
+`wiring`; hooks are run by the host, one after another.
 """
 
 from __future__ import annotations
@@ -11,14 +12,34 @@ from typing import Any
 from hfg.engine import wiring
 from hfg.engine.core import Core
 from hfg.engine.sending import block, consider, derive_scopes, discard, release, unblock
-from hfg.engine.worker import DISABLED, ENDED, FUTILE, Worker
+from hfg.engine.worker import BACKOFF, DISABLED, ENDED, FUTILE, TORN_DOWN, Worker
 from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge
 from hfg.trace import NodeEnabled
 
-__all__ = ["disable", "enable", "reset", "set_up", "settle_disabled", "tear_down"]
+__all__ = ["disable", "enable", "reset", "restart", "set_up", "settle_disabled", "tear_down", "when_idle"]
 
 Then = Callable[[NodeError | None], None]
+
+
+def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], None], then: Callable[[], None]) -> None:
+    """Do it when the node's firing or call under way is over, and let none begin meanwhile (F9, F10)."""
+
+    def begin() -> None:
+        worker.busy = "setup"
+        action(worker, over)
+
+    def over() -> None:
+        worker.core.upstairs.idle_again(worker)
+        then()
+
+    if not worker.busy:
+        begin()
+        return
+    if worker.on_idle is None:
+        worker.on_idle = []
+        worker.core.upstairs.choose_step(worker)  # the short ways do not look whether somebody waits
+    worker.on_idle.append(begin)
 
 
 def _run_hook(worker: Worker, name: str, then: Then) -> None:
@@ -43,17 +64,18 @@ def set_up(worker: Worker, then: Then) -> None:
     if worker.node is None:
         then(None)
         return
+    worker.is_up = True  # from here on, for `teardown` follows a setup that fails half-way too
     worker.node._reset_states()
-    worker.generator = None
     worker.core.upstairs.bind_ports(worker)
     _run_hook(worker, "setup", then)
 
 
 def tear_down(worker: Worker, then: Then) -> None:
-    """Close the node's generator and run its `teardown()`."""
-    if worker.node is None:
+    """Close the node's generator and run its `teardown()`, unless nothing was set up since the last time."""
+    if worker.node is None or not worker.is_up:
         then(None)
         return
+    worker.is_up = False
     generator, worker.generator = worker.generator, None
 
     def closed(_result: Any, error: BaseException | None) -> None:
@@ -98,25 +120,19 @@ def settle_disabled(worker: Worker) -> None:
 
 
 def enable(worker: Worker, then: Callable[[], None]) -> None:
-    """F10: the node starts afresh; A(v) is kept."""
+    """F10: the node starts afresh; A(v) is kept. In the back-off of a restart that sets it up, when it is over."""
     core = worker.core
     worker.own_enabled = True
     if not worker.blocked & DISABLED or not all(scope.enabled for scope in worker.around):
         then()
         return
 
-    def up(error: NodeError | None) -> None:
-        if error is not None:
-            core.host.finish("failed", error)
-            return
+    def up() -> None:
         if not worker.own_enabled or not all(scope.enabled for scope in worker.around):
             then()  # disabled again meanwhile
             return
         worker.blocked &= ~(DISABLED | ENDED)
-        worker.pending_end = False
-        worker.deferred = None
-        for edge in worker.in_edges:
-            edge.ended = False
+        _not_ended(worker)
         if core.trace is not None:
             core.trace(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
@@ -124,7 +140,36 @@ def enable(worker: Worker, then: Callable[[], None]) -> None:
         _sources_matter_again(core)
         then()
 
-    set_up(worker, up)
+    _afresh(worker, up)
+
+
+def _afresh(worker: Worker, then: Callable[[], None]) -> None:
+    """Teardown of what is set up, then setup; a failure ends the run. A restart under way does it in its time (X1)."""
+    host = worker.core.host
+
+    def down(error: NodeError | None) -> None:
+        if error is not None:
+            host.finish("failed", error)
+        else:
+            set_up(worker, up)
+
+    def up(error: NodeError | None) -> None:
+        if error is not None:
+            host.finish("failed", error)
+        else:
+            then()
+
+    if worker.blocked & BACKOFF:
+        then()
+    else:
+        tear_down(worker, down)
+
+
+def _not_ended(worker: Worker) -> None:
+    worker.pending_end = False
+    worker.deferred = None
+    for edge in worker.in_edges:
+        edge.ended = False
 
 
 def _sources_matter_again(core: Core) -> None:
@@ -137,25 +182,44 @@ def _sources_matter_again(core: Core) -> None:
 
 def reset(worker: Worker, then: Callable[[], None]) -> None:
     """The slot `reset`: teardown, setup, not ended; tokens and A(v) stay (A9)."""
-    core = worker.core
 
-    def up(error: NodeError | None) -> None:
-        if error is not None:
-            core.host.finish("failed", error)
-            return
-        worker.pending_end = False
-        worker.deferred = None
-        for edge in worker.in_edges:
-            edge.ended = False
+    def up() -> None:
+        _not_ended(worker)
         unblock(worker, ENDED)
         wiring.refresh(worker)
-        _sources_matter_again(core)
+        _sources_matter_again(worker.core)
         then()
 
-    def down(error: NodeError | None) -> None:
+    _afresh(worker, up)
+
+
+def restart(worker: Worker, backoff_s: float) -> None:
+    """X1: teardown, a pause, setup; a node that is disabled by then is set up when it is enabled.
+
+    The caller has blocked it with `BACKOFF`.
+    """
+    core = worker.core
+
+    def down(worker: Worker, then: Callable[[], None]) -> None:
+        tear_down(worker, lambda _error: then())
+
+    def rested() -> None:
+        when_idle(worker, up, lambda: None)
+
+    def up(worker: Worker, then: Callable[[], None]) -> None:
+        if worker.blocked & DISABLED:
+            over(None, then)
+        else:
+            set_up(worker, lambda error: over(error, then))
+
+    def over(error: NodeError | None, then: Callable[[], None]) -> None:
         if error is not None:
             core.host.finish("failed", error)
-            return
-        set_up(worker, up)
+        elif not worker.blocked & TORN_DOWN:
+            worker.blocked &= ~BACKOFF  # before those that wait have their turn: they may enable or reset it
+            then()
 
-    tear_down(worker, down)
+    def rest() -> None:
+        core.after(backoff_s, rested)
+
+    when_idle(worker, down, rest)

@@ -255,7 +255,7 @@ class Lifetime:
 
     async def _tear_down_one(self, worker: Worker) -> NodeError | None:
         engine = self._engine
-        if worker.node is None or worker.in_flight:
+        if worker.node is None or worker.in_flight or not worker.is_up:
             return None
         if worker.generator is None and worker.node._hook("teardown") is None:
             return None

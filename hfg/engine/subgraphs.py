@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 
 from hfg.engine import lifecycle, wiring
 from hfg.engine.activity import deactivate_inside, scopes_changed
+from hfg.engine.lifecycle import when_idle
 from hfg.engine.scopes import Scope
 from hfg.engine.sending import block, consider
 from hfg.engine.worker import DISABLED, Worker
@@ -34,7 +35,7 @@ def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
     elif name == "enable":
         enable_scope(scope, then)
     else:
-        _each(scope.members, lambda worker, done: _alone(worker, lifecycle.reset, done), then)
+        _each(scope.members, lambda worker, done: when_idle(worker, lifecycle.reset, done), then)
 
 
 def _each(workers: Sequence[Worker], action: Action, then: Callable[[], None]) -> None:
@@ -57,26 +58,6 @@ def _each(workers: Sequence[Worker], action: Action, then: Callable[[], None]) -
         then()
 
     step()
-
-
-def _alone(worker: Worker, action: Action, then: Callable[[], None]) -> None:
-    """Do it when the node's firing or call under way is over, and let none begin meanwhile (F9, F10)."""
-
-    def begin() -> None:
-        worker.busy = "setup"
-        action(worker, over)
-
-    def over() -> None:
-        worker.core.upstairs.idle_again(worker)
-        then()
-
-    if not worker.busy:
-        begin()
-        return
-    if worker.on_idle is None:
-        worker.on_idle = []
-        worker.core.upstairs.choose_step(worker)  # the short ways do not look whether somebody waits
-    worker.on_idle.append(begin)
 
 
 def disable_scope(scope: Scope) -> None:
@@ -107,7 +88,7 @@ def enable_scope(scope: Scope, then: Callable[[], None]) -> None:
 
     def one(worker: Worker, done: Callable[[], None]) -> None:
         if worker.own_enabled and all(around.enabled for around in worker.around):
-            _alone(worker, lifecycle.enable, done)
+            when_idle(worker, lifecycle.enable, done)
         else:
             done()
 

@@ -127,6 +127,7 @@ class Worker:
         "is_async",
         "is_boundary_output",
         "is_source",
+        "is_up",
         "iteration",
         "job",
         "limit_timer",
@@ -245,6 +246,7 @@ class Worker:
         self.end_stamp: float | None = None  # of the firing that ended it, and so of END (T5)
         self.pending_end = False  # END leaves as soon as the outputs are free (F4)
         self.deferred: list[int] | None = None  # modifiers drained before END was sent (F12)
+        self.is_up = False  # its setup has begun, its teardown has not
         self.generator: Any = None
         self.carrier: Any = None
         self.call_edge: Any = None
