@@ -13,7 +13,7 @@ from reactivex import Observable
 from typing_extensions import TypeForm
 
 from hfg import errors
-from hfg.errors import GraphError
+from hfg.errors import GraphError, UsageError
 from hfg.graph.boundary import GraphInput, GraphOutput, lifecycle_ports
 from hfg.graph.boxes import is_box
 from hfg.graph.edges import Edge, end_path, is_single, refuse
@@ -46,6 +46,8 @@ T = TypeVar("T")
 
 class Graph:
     """An activity flow graph; inside a subgraph, the part of it that lies there.
+
+    While it runs its structure stays as it is: whatever would change it raises `UsageError`.
 
     Attributes:
       name: for people; not part of any path.
@@ -146,6 +148,7 @@ class Graph:
           GraphError: the name is taken or not allowed, an option is out of its range, or the node is in a graph
             already; nothing was changed.
         """
+        self._need_rest("adding a node")
         need_new(node)
         if name is None:
             base = node._type.name
@@ -234,6 +237,7 @@ class Graph:
         Raises:
           ConnectionError: the edge cannot be; nothing was changed.
         """
+        self._need_rest("connecting")
         if source is self.start and self._is_around(target):
             # `graph.start.activates(...)` inside a subgraph: the edge belongs where its node is (rule A10).
             inside: Graph = target.graph
@@ -303,6 +307,7 @@ class Graph:
         Raises:
           GraphError: a value is out of its range, or the group is declared otherwise already.
         """
+        self._need_rest("declaring a group")
         spec = group_spec(name, (0 if name == "loop" else 1) if threads is None else threads, policy, seed)
         root = self._root
         if name in root._declared_groups and root._groups[name] != spec:
@@ -324,6 +329,7 @@ class Graph:
         Raises:
           GraphError: one of the two is not in this graph, or `target` has a gate already; nothing was changed.
         """
+        self._need_rest("gating")
         refuse_gate(self, target, by, idle_rate_hz)
         gate = Gate(target, by, idle_rate_hz)
         self.gates.append(gate)
@@ -362,6 +368,7 @@ class Graph:
         Raises:
           GraphError: the two cannot be one; nothing was changed.
         """
+        self._need_rest("promoting a parameter")
         refuse_promotion(self, outer, inner)
         try:
             inner.value = outer.value
@@ -401,6 +408,13 @@ class Graph:
         return f"<{self._title}: {len(self.nodes)} nodes, {len(self.edges)} edges>"
 
     # --- inside ---
+
+    def _need_rest(self, doing: str) -> None:
+        """Refuse to change the structure under a run, which would not hear of it."""
+        if self._root._run is not None:
+            raise UsageError(
+                f"{self._title} runs, so {doing} is refused: build the graph before the run, or stop the run first"
+            )
 
     @property
     def _title(self) -> str:
@@ -447,6 +461,7 @@ class Graph:
         return isinstance(home, Graph) and home is not self and home._root is self
 
     def _new_port(self, kind: str, name: str) -> str:
+        self._need_rest("declaring a port")
         if self._owner is not None:
             raise GraphError(
                 f'the graph inside "{self.path}" has the ports of its subgraph; '

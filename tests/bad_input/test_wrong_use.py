@@ -6,6 +6,7 @@ And nothing has happened.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -33,6 +34,53 @@ def test_a_second_run_of_a_running_graph_is_refused_and_the_first_goes_on(fast: 
         return sink.values
 
     assert drive(main) == [1]
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_graph_that_runs_is_not_edited_and_goes_on(inside: bool, fast: bool) -> None:
+    class Box(hfg.Subgraph):
+        value = hfg.Input(int)
+        level = hfg.Parameter(1)
+
+        def build(self, graph: hfg.Graph) -> None:
+            graph.connect(self.value.inner, graph.add(Keep()).value)
+
+    async def main() -> None:
+        root = hfg.Graph("busy")
+        box, ear, outside = root.add(Box()), root.add(Ear()), Ear()
+        root.connect(root.input("in", int), box.value)
+        graph = box.graph if inside else root
+        edits: dict[str, Callable[[], object]] = {
+            "adding a node": lambda: graph.add(outside),
+            "connecting": lambda: graph.connect(ear.passed, ear.hear),
+            "declaring a group": lambda: graph.group("late"),
+            "gating": lambda: graph.gate(box, by=ear),
+            "promoting a parameter": lambda: graph.promote(box.level, box.level),
+            "declaring a port": lambda: graph.input("late", int),
+        }
+        if not inside:
+            edits["connecting "] = lambda: ear.passed >> ear.hear
+            edits[" connecting"] = lambda: ear.passed.activates(ear.hear)
+            edits["declaring a port "] = lambda: graph.output("late", int)
+        async with hfg.running(root, fast=fast) as run:
+            title = 'the graph inside "box"' if inside else 'graph "busy"'
+            for doing, edit in edits.items():
+                with pytest.raises(hfg.errors.UsageError) as refused:
+                    edit()
+                assert str(refused.value) == (
+                    f"{title} runs, so {doing.strip()} is refused: build the graph before the run, or stop the run "
+                    "first"
+                )
+            ear.activated.subscribe(print)  # automatic ports are made when they are asked for, also now
+            await run.trigger(ear.disable)
+            async with run.feed("in") as feed:
+                await feed.send(1)
+            await run.wait_finished()
+        assert outside.place is None
+        assert graph["keep" if inside else "box/keep"].values == [1]
+        graph.add(outside)
+
+    drive(main)
 
 
 def test_a_graph_that_failed_may_run_again(fast: bool) -> None:
