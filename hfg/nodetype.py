@@ -358,8 +358,8 @@ class Node:
         """
         candidates = [*self.ports.inputs.values(), *self.ports.slots.values()]
         if len(candidates) > 1 and self._place is not None:
-            taken = {id(edge.target) for edge in self._place.graph.edges}
-            candidates = [port for port in candidates if port.kind == "slot" or id(port) not in taken]
+            is_taken = self._place.graph._is_taken
+            candidates = [port for port in candidates if not is_taken(port)]
         target: Target[Any] = _only(self, candidates, "free input or slot")
         return target
 

@@ -455,6 +455,10 @@ class Graph:
             if hasattr(one, "_graph"):
                 del one._graph
 
+    def _is_taken(self, port: Port) -> bool:
+        """Whether it is an input that has its edge."""
+        return port in self._into
+
     def _is_around(self, target: Any) -> bool:
         """Whether a port lies in a graph inside this one."""
         home = getattr(target, "graph", None)

@@ -288,6 +288,18 @@ def test_arrows_connect_the_only_free_port_of_each_side(graph: Graph) -> None:
     assert [edge.label for edge in graph.edges] == ["numbers.out -> double.value", "double.out -> show.value"]
 
 
+def test_arrows_do_not_look_through_all_edges(graph: Graph) -> None:
+    class Edges(list[Any]):
+        def __iter__(self) -> Any:
+            raise AssertionError("the time for an arrow would grow with the graph")
+
+    source, lookup = graph.add(numbers()), graph.add(MapLookup())
+    graph.connect(source.out, lookup.key)
+    graph.edges = Edges(graph.edges)
+    source >> lookup  # its slot alone is free now
+    assert graph.edges[-1].target is lookup.forget
+
+
 def test_ambiguous_arrow_names_the_candidates_and_changes_nothing(graph: Graph) -> None:
     source, lookup = graph.add(numbers()), graph.add(MapLookup())
     with pytest.raises(hfg.errors.UsageError, match=r'"map_lookup\.key" and slot "map_lookup\.forget"'):

@@ -60,6 +60,9 @@ class FakeGraph:
         self.edges.append(SimpleNamespace(source=source, target=target, active=active))
         return self.edges[-1]
 
+    def _is_taken(self, port: Any) -> bool:
+        return port.kind == "input" and any(edge.target is port for edge in self.edges)
+
 
 def test_kinds_are_told_by_name() -> None:
     ports = Detector().ports
