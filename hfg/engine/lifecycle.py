@@ -169,7 +169,7 @@ def _not_ended(worker: Worker) -> None:
     worker.pending_end = False
     worker.deferred = None
     for edge in worker.in_edges:
-        edge.ended = False
+        edge.ended = edge.ended and not edge.mandatory  # who has said END to an optional input has said it (F4)
 
 
 def _sources_matter_again(core: Core) -> None:

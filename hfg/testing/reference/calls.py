@@ -36,7 +36,7 @@ class Calling(Firing):
         station = self.stations[owner]
         flight = Flight(station, "call", number, "call", lying.token.stamp, slot=name, line=line)
         station.flight = flight
-        self.note_places()  # a queue may have room again
+        self.settle()  # a queue may have room again
         self.receive_activity(owner, [lying.token.activity])
         self.launch_call(flight, self.handler_of(station, name, lying.token))
         self.settle()

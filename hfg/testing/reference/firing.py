@@ -48,7 +48,7 @@ class Firing(RunningCode):
             rate = station.leaf.options.max_rate_hz
             station.hold_until = self.now + 1 / rate if rate else station.hold_until
         failure = self.set_parameters(station, taken)
-        self.note_places()  # the next firing may be enabled already, all but "not busy" (F9)
+        self.settle()  # a delay may be free (P7), the next firing may be enabled, all but "not busy" (F9)
         if kind == "end":
             for line, lying in taken:
                 if not lying.token.is_marker:
