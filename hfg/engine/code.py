@@ -151,7 +151,7 @@ class CodeRunner:
         def back(job: Job) -> None:
             if job is not worker_job:
                 return
-            group.returned()
+            group.returned(job)
             worker.in_flight = False
             worker.core.in_flight -= 1
             if self.core.over:
@@ -161,7 +161,7 @@ class CodeRunner:
             if worker.core.inside is not None:
                 worker.core.inside.look_later()
 
-        worker_job = Job(back, call, arguments, done)
+        worker_job = Job(worker, back, call, arguments, done)
         worker.job = worker_job
         if isinstance(self.loop, VirtualTimeLoop):
             limit = worker.options.max_duration_s if worker.busy == "firing" else None
@@ -211,7 +211,7 @@ class CodeRunner:
             if isinstance(self.loop, VirtualTimeLoop):
                 self.loop.drop(job.held)
                 job.held = None
-            group.abandon(f'"{worker.path}", firing {worker.firings}')
+            group.abandon(f'"{worker.path}", firing {worker.firings}', job)
         else:
             carrier, worker.carrier = worker.carrier, None
             self.given_up.add(carrier)

@@ -19,8 +19,9 @@ from hfg.clock import current_clock
 from hfg.engine import plan, quiet, rx, steps
 from hfg.engine.code import CodeRunner, answer
 from hfg.engine.core import Core
-from hfg.engine.groups import Fifo, Group, LoopGroup, ThreadGroup, make_policy
+from hfg.engine.groups import Dispatching, Group, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.lifetime import Lifetime
+from hfg.engine.policies import make_policy
 from hfg.engine.settings import Settings
 from hfg.engine.upstairs import Deciders
 from hfg.engine.virtual import VirtualTimeLoop
@@ -35,6 +36,7 @@ _LOGGER = logging.getLogger("hfg.engine")
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
 _SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
 _VIRTUAL_SLICE_STEPS = 2048  # in virtual time a slice must not depend on how fast the machine is
+_VIRTUAL_LOOK_STEPS = 8  # it ends sooner only where code has spent virtual time
 
 _MOST_AT_ONE_INSTANT = 3_000_000  # firings, before a run with `until_s` is taken to stand still
 
@@ -102,7 +104,7 @@ class Engine:
         self.ending: asyncio.Event = asyncio.Event()
         self._scheduled = False
         self._thread = threading.get_ident()
-        self._ready_groups: deque[ThreadGroup] = deque()
+        self._ready_groups: deque[Dispatching] = deque()
         self.scheduler = rx.RunScheduler(self)
         self.code = code = CodeRunner(self)
         self.lifetime = Lifetime(self)
@@ -152,15 +154,16 @@ class Engine:
     def _make_groups(self) -> dict[str, Group]:
         groups: dict[str, Group] = {}
         settings = self.settings
+        clock = self.now if self.virtual else time.perf_counter  # a run in virtual time is the same each time (R6)
         for name, spec in self.flat.groups.items():
             seed = settings.seed if spec.seed is None else spec.seed
             policy = make_policy(settings.policy or spec.policy, seed)
             if spec.threads:
-                groups[name] = ThreadGroup(name, policy, self._ready_groups, self.code.deliver, self.context)
+                groups[name] = ThreadGroup(name, policy, clock, self._ready_groups, self.code.deliver, self.context)
+            elif name == "loop":
+                groups[name] = LoopGroup(name, policy, clock)
             else:
-                groups[name] = LoopGroup(name, policy)
-        if "loop" not in groups:
-            groups["loop"] = LoopGroup("loop", make_policy(settings.policy or "fifo", settings.seed))
+                groups[name] = SideGroup(name, policy, clock, self._ready_groups)
         return groups
 
     def on_loop(self) -> bool:
@@ -213,7 +216,7 @@ class Engine:
         core.pumping = True
         core.plain = core.trace is None
         try:
-            self._drain(policy, policy.popleft if isinstance(policy, Fifo) else policy.pop, self._ready_groups)
+            self._drain(policy, self._loop_group.take, self._ready_groups)
         except Exception as error:
             self.internal_fault(error)
         except (asyncio.CancelledError, GeneratorExit) as error:
@@ -252,16 +255,19 @@ class Engine:
         except Exception as error:
             self.internal_fault(error)
 
-    def _drain(self, policy: Any, pop: Callable[[], Worker], ready_groups: deque[ThreadGroup]) -> None:
+    def _drain(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
         """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock."""
         core = self.core
-        left = _VIRTUAL_SLICE_STEPS if self.virtual else _SLICE_STEPS
+        between_looks = _VIRTUAL_LOOK_STEPS if self.virtual else _SLICE_STEPS
+        left = between_looks
+        looks = _VIRTUAL_SLICE_STEPS // _VIRTUAL_LOOK_STEPS
+        instant = self.loop.time() if self.virtual else 0.0
         until = 0.0
         while True:
             if ready_groups:
                 ready_groups.popleft().dispatch()
             if policy:
-                worker = pop()
+                worker = take()
                 worker.step(worker)
             elif not ready_groups:
                 return
@@ -270,14 +276,19 @@ class Engine:
                 if core.over:
                     return
                 if self.virtual:
-                    self._same_instant()
-                    return
+                    looks -= 1
+                    if not looks:
+                        self._same_instant()
+                    if not looks or self.loop.time() != instant:  # what is due by now has its turn
+                        return
+                    left = between_looks
+                    continue
                 now = time.monotonic()
                 if not until:
                     until = now + _SLICE_S
                 elif now >= until:
                     return
-                left = _SLICE_STEPS
+                left = between_looks
 
     def _same_instant(self) -> None:
         """R6: with `until_s`, something that goes on and on without letting time pass is refused in the end."""

@@ -1,154 +1,134 @@
-"""Where nodes run and in which order: run queues with a policy, the loop group and thread groups (rules R1, R2, X2).
+"""Where nodes run: the loop group, other groups on the loop, and thread groups (rules R1, R2, X2).
 
-A policy is three methods over workers; the loop group's is drained by the pump in `run`. Threads are our own and
-daemons: an executor's stuck job would hold the interpreter's exit. Stands on `worker`.
+Who of a group is next is for its policy. The loop group is drained by the pump in `engine`, the others dispatch when
+the pump lets them. Threads are our own and daemons: an executor's stuck job would hold the interpreter's exit. Stands
+on `worker` and `policies`.
 """
 
 from __future__ import annotations
 
 import contextvars
-import heapq
-import itertools
 import queue
-import random
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
+from hfg.engine.policies import FairShare, Fifo, Policy
 from hfg.engine.worker import Worker
 from hfg.errors import UsageError
 
-__all__ = [
-    "POLICIES",
-    "Fifo",
-    "Group",
-    "Job",
-    "LoopGroup",
-    "Policy",
-    "Priority",
-    "SeededRandom",
-    "ThreadGroup",
-    "make_policy",
-]
+__all__ = ["Dispatching", "Group", "Job", "LoopGroup", "SideGroup", "ThreadGroup"]
 
 
 _DISPATCH_STEPS = 16  # how much one group may do on the loop before others have their turn
 
 
-class Policy(Protocol):
-    """Which of the workers that can move is next (R2).
-
-    A worker stands in it at most once. `push` is called when it can move, `pop` only while there are any; a policy
-    may look at everything a worker and its options say (priority, deadline, busy time), but must not change it.
-    """
-
-    def push(self, worker: Worker) -> None:
-        """Take in a worker that can move."""
-
-    def pop(self) -> Worker:
-        """Give out the next one."""
-
-    def __len__(self) -> int: ...
-
-
-class Fifo(deque[Worker]):
-    """First in, first out: the default."""
-
-    push = deque.append
-    pop = deque.popleft
-
-
-class Priority:
-    """The highest priority first; first in, first out among equals."""
-
-    def __init__(self) -> None:
-        self._heap: list[tuple[int, int, Worker]] = []
-        self._count = itertools.count()
-
-    def push(self, worker: Worker) -> None:
-        """See `Policy`."""
-        heapq.heappush(self._heap, (-worker.priority, next(self._count), worker))
-
-    def pop(self) -> Worker:
-        """See `Policy`."""
-        return heapq.heappop(self._heap)[2]
-
-    def __len__(self) -> int:
-        return len(self._heap)
-
-
-class SeededRandom:
-    """Any of them, the same each time for the same seed: for finding what leans on an order."""
-
-    def __init__(self, seed: int | None = None) -> None:
-        self._random = random.Random(0 if seed is None else seed)
-        self._workers: list[Worker] = []
-
-    def push(self, worker: Worker) -> None:
-        """See `Policy`."""
-        self._workers.append(worker)
-
-    def pop(self) -> Worker:
-        """See `Policy`."""
-        workers = self._workers
-        position = self._random.randrange(len(workers))
-        workers[position], workers[-1] = workers[-1], workers[position]
-        return workers.pop()
-
-    def __len__(self) -> int:
-        return len(self._workers)
-
-
-POLICIES: dict[str, Callable[[int | None], Policy]] = {
-    "fifo": lambda seed: Fifo(),
-    "priority": lambda seed: Priority(),
-    "random": SeededRandom,
-}
-
-
-def make_policy(name: str, seed: int | None) -> Policy:
-    """Make a run queue.
-
-    Raises:
-      UsageError: there is no policy of that name.
-    """
-    if name not in POLICIES:
-        raise UsageError(f'unknown policy "{name}": there are {", ".join(sorted(POLICIES))}')
-    return POLICIES[name](seed)
-
-
 class Group:
-    """Nodes that never run at the same time."""
+    """Nodes that never run at the same time.
+
+    Attributes:
+      push: takes in a worker that can move.
+      take: gives out what is to be stepped next.
+    """
 
     threaded = False
 
-    def __init__(self, name: str, policy: Policy) -> None:
+    def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
         self.name = name
         self.policy = policy
         self.push: Callable[[Worker], None] = policy.push
+        self.take: Callable[[], Any] = policy.popleft if isinstance(policy, Fifo) else policy.pop
+        self.fair = policy if isinstance(policy, FairShare) else None
+        self.clock = clock  # read only where time is shared
+
+    def charge(self, worker: Worker, busy_s: float) -> None:
+        """A worker has kept the group busy for so long."""
+        if self.fair is not None:
+            self.fair.charge(worker, busy_s)
 
 
 class LoopGroup(Group):
     """The nodes that run on the event loop itself."""
 
+    def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
+        super().__init__(name, policy, clock)
+        if self.fair is not None:
+            self.take = _Turn(self).take
+
+
+class _Turn:
+    """Stands for the worker whose turn on the loop is measured; only where time is shared: others pay nothing."""
+
+    __slots__ = ("_clock", "_group", "_worker")
+
+    def __init__(self, group: Group) -> None:
+        self._group = group
+        self._clock = group.clock
+        self._worker: Any = None
+
+    def take(self) -> _Turn:
+        self._worker = self._group.policy.pop()
+        return self
+
+    def step(self, _: _Turn) -> None:
+        worker, began = self._worker, self._clock()
+        try:
+            worker.step(worker)
+        finally:
+            self._group.charge(worker, self._clock() - began)
+
+
+class SideGroup(LoopGroup):
+    """Nodes on the loop that are told apart from the loop group: they have a policy of their own."""
+
+    def __init__(self, name: str, policy: Policy, clock: Callable[[], float], ready_groups: deque[Dispatching]) -> None:
+        super().__init__(name, policy, clock)
+        self.push = self._push
+        self._ready_groups = ready_groups
+        self._stands = False  # in ready_groups
+
+    def _push(self, worker: Worker) -> None:
+        self.policy.push(worker)
+        self._stand()
+
+    def _stand(self) -> None:
+        if not self._stands and len(self.policy):
+            self._stands = True
+            self._ready_groups.append(self)
+
+    def dispatch(self) -> None:
+        """Let some nodes move; then others have their turn."""
+        self._stands = False
+        try:
+            for _ in range(_DISPATCH_STEPS):
+                if not len(self.policy):
+                    return
+                worker = self.take()
+                worker.step(worker)
+        finally:
+            self._stand()
+
 
 class Job:
     """A call for a thread, and what came of it."""
 
-    __slots__ = ("arguments", "call", "done", "error", "held", "owner", "result")
+    __slots__ = ("arguments", "began", "call", "done", "error", "held", "owner", "result", "worker")
 
     def __init__(
         self,
+        worker: Worker,
         owner: Any,
         call: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any, BaseException | None], None],
     ) -> None:
+        self.worker = worker
         self.owner = owner
         self.call = call
         self.arguments = arguments
         self.done = done
+        self.began = 0.0  # where time is shared
         self.held: Any = None  # what keeps virtual time from passing until it is back
         self.result: Any = None
         self.error: BaseException | None = None
@@ -170,11 +150,12 @@ class ThreadGroup(Group):
         self,
         name: str,
         policy: Policy,
-        ready_groups: deque[ThreadGroup],
+        clock: Callable[[], float],
+        ready_groups: deque[Dispatching],
         deliver: Callable[[deque[Any]], None],
         context: contextvars.Context,
     ) -> None:
-        super().__init__(name, policy)
+        super().__init__(name, policy, clock)
         self.push = self._push
         self.running = 0
         self._ready_groups = ready_groups
@@ -194,7 +175,7 @@ class ThreadGroup(Group):
         for _ in range(_DISPATCH_STEPS):
             if self.running or not len(policy):
                 return
-            worker = policy.pop()
+            worker = self.take()
             worker.step(worker)
         if not self.running and len(policy):
             self._ready_groups.append(self)  # silent firings need no thread: others have their turn
@@ -204,11 +185,15 @@ class ThreadGroup(Group):
         if self._lane is None:
             self._lane = _Lane(self.name, self._deliver, self._context.copy())
         self.running += 1
+        if self.fair is not None:
+            job.began = self.clock()
         self._lane.jobs.put(job)
 
-    def returned(self) -> None:
+    def returned(self, job: Job) -> None:
         """A job came back; on the loop."""
         self.running -= 1
+        if self.fair is not None:
+            self.charge(job.worker, self.clock() - job.began)
         if not self.running and len(self.policy):
             self._ready_groups.append(self)
 
@@ -221,8 +206,10 @@ class ThreadGroup(Group):
             )
         lane.send(call)
 
-    def abandon(self, what: str) -> None:
+    def abandon(self, what: str, job: Job) -> None:
         """X2: the job under way does not come back; the group goes on in a new thread."""
+        if self.fair is not None:
+            self.charge(job.worker, self.clock() - job.began)
         lane, self._lane = self._lane, None
         if lane is not None:
             lane.given_up = True
@@ -239,6 +226,10 @@ class ThreadGroup(Group):
             return None
         lane.jobs.put(None)
         return lane.thread
+
+
+Dispatching: TypeAlias = SideGroup | ThreadGroup
+"""Groups that let their nodes move when the pump comes to them."""
 
 
 class _Lane:

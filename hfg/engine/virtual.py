@@ -113,6 +113,18 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             context.run(current_clock.set, self.time)
         return super().create_task(coro, context=context, **options)
 
+    def spend(self, seconds: float) -> None:
+        """Let time pass at once, as code that computes would: what is due meanwhile comes late.
+
+        For trying a graph under load; by itself code takes no virtual time.
+
+        Raises:
+          ValueError: time does not go back.
+        """
+        if not seconds >= 0:
+            raise ValueError(f"time goes forward: spend() takes seconds from 0 on, got {seconds!r}")
+        self._virtual_now += seconds
+
     def hold(self, limit_s: float | None = None, give_up: Callable[[], None] | None = None) -> Held:
         """Let the clock stand still until this work is back (`deliver` set, on the loop) or dropped.
 

@@ -11,7 +11,7 @@ from hfg.graph.naming import path_of, suggest
 from hfg.graph.options import NodeOptions
 from hfg.nodetype import Node
 
-__all__ = ["iterated_inputs", "need_new", "need_subgraph_options"]
+__all__ = ["iterated_inputs", "need_new", "need_subgraph_options", "refuse_move"]
 
 
 def need_new(node: Any) -> None:
@@ -72,3 +72,21 @@ def need_subgraph_options(node: Node, options: NodeOptions) -> None:
                 f'subgraph "{path_of(node)}": it does not fire itself, so {name} means nothing; '
                 "give it to the nodes inside, in build()"
             )
+
+
+def refuse_move(graph: Any, node: Any, group: Any) -> None:
+    """Refuse to let a node run in another group; changes nothing.
+
+    Raises:
+      GraphError: the node is not in the graph, or the group is not declared.
+    """
+    if not isinstance(node, Node):
+        raise GraphError(f"graph.move takes a node of the graph, got {node!r}; give the node itself, graph[path]")
+    if node._place is None or node._place.graph._root is not graph._root:
+        raise GraphError(f'"{path_of(node)}" is not in {graph._title}, so it cannot be moved there; add it first')
+    if group is not None and group not in graph.groups:
+        hint = suggest(group, graph.groups) if isinstance(group, str) else f"it has {', '.join(graph.groups)}"
+        raise GraphError(
+            f'"{path_of(node)}" cannot move to group {group!r}, which is not declared: {hint}; '
+            'declare it first, as in graph.group("vision", threads=1)'
+        )

@@ -32,12 +32,12 @@ __all__ = [
 OnError: TypeAlias = Literal["stop", "skip", "disable", "restart"]
 Release: TypeAlias = Literal["auto", "sequential", "pipelined"]
 Overflow: TypeAlias = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
-Policy: TypeAlias = Literal["fifo", "priority", "random"]
+Policy: TypeAlias = Literal["fifo", "priority", "deadline", "fair", "random"]
 
 ON_ERROR: Final[tuple[OnError, ...]] = ("stop", "skip", "disable", "restart")
 RELEASE: Final[tuple[Release, ...]] = ("auto", "sequential", "pipelined")
 OVERFLOW: Final[tuple[Overflow, ...]] = ("wait", "drop_oldest", "drop_newest", "latest", "error")
-POLICY: Final[tuple[Policy, ...]] = ("fifo", "priority", "random")
+POLICY: Final[tuple[Policy, ...]] = ("fifo", "priority", "deadline", "fair", "random")
 DEFAULT_CAPACITY: Final = 16
 
 Options = TypeVar("Options")
@@ -54,7 +54,7 @@ class NodeOptions(msgspec.Struct, frozen=True, kw_only=True):
       max_duration_s: the time limit of a firing (rule X2).
       release: when the tokens it takes count as processed (rule F5).
       active_for_s: `timeout` is triggered after so long an activity (rule A12).
-      deadline_s: relative to the stamp of its oldest token (rule R2).
+      deadline_s: how old the oldest token it takes may become, in a group with policy "deadline" (rule R2).
       enabled: whether it is at the start of a run.
       iterate_over: names of a subgraph's inputs that take collections (rule G4).
     """
@@ -157,8 +157,8 @@ def _shared_node_options(**given: Any) -> NodeOptions:
 
 
 @functools.lru_cache(maxsize=1024)
-def in_group(options: NodeOptions, group: str) -> NodeOptions:
-    """The same options with the group that was inherited."""
+def in_group(options: NodeOptions, group: str | None) -> NodeOptions:
+    """The same options in another group, or in that of the subgraph around."""
     return msgspec.structs.replace(options, group=group)
 
 

@@ -18,7 +18,7 @@ from hfg.graph.boundary import GraphInput, GraphOutput, lifecycle_ports
 from hfg.graph.boxes import is_box
 from hfg.graph.edges import Edge, end_path, is_single, refuse
 from hfg.graph.gates import Gate, refuse_gate
-from hfg.graph.members import iterated_inputs, need_new, need_subgraph_options
+from hfg.graph.members import iterated_inputs, need_new, need_subgraph_options, refuse_move
 from hfg.graph.naming import default_name, find, need_name, path_of
 from hfg.graph.options import (
     DEFAULT_CAPACITY,
@@ -30,6 +30,7 @@ from hfg.graph.options import (
     Release,
     edge_options,
     group_spec,
+    in_group,
     node_options,
 )
 from hfg.graph.promotions import refuse_promotion
@@ -140,7 +141,7 @@ class Graph:
           max_duration_s: the time limit of a firing (rule X2).
           release: when what it takes counts as processed (rule F5).
           active_for_s: how long it may stay active before its `timeout` (rule A12).
-          deadline_s: how old a token may be when it is worked on (rule R2).
+          deadline_s: how old a token may become, in a group with policy "deadline" (rule R2).
           enabled: whether it is at the start of a run.
           iterate_over: of a subgraph: inputs that take collections (rule G4).
 
@@ -317,6 +318,20 @@ class Graph:
         root._declared_groups.add(name)
         root._groups[name] = spec
         return spec
+
+    def move(self, node: Node, *, group: str | None) -> None:
+        """Let a node run in another group; with a subgraph go all inside that have no group of their own.
+
+        Args:
+          node: of this graph or of a subgraph in it.
+          group: one that is declared; None is that of the subgraph around the node, at last the loop.
+
+        Raises:
+          GraphError: the node is not in this graph, or the group is not declared; nothing was changed.
+        """
+        self._need_rest("moving a node")
+        refuse_move(self, node, group)
+        node._options = in_group(node._options, group)
 
     def gate(self, target: Node, *, by: Node, idle_rate_hz: float | None = None) -> Gate:
         """Couple the work of a node or subgraph to the activity of another: it works while `by` is active (rule A11).
