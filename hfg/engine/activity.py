@@ -9,19 +9,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from hfg.engine.agenda import block, consider, must_wait, unblock
 from hfg.engine.core import Core
+from hfg.engine.modifiers import automatic, set_active, touch
 from hfg.engine.scopes import Scope
-from hfg.engine.sending import (
-    automatic,
-    block,
-    consider,
-    flush_automatic,
-    must_wait,
-    set_active,
-    touch,
-    trigger,
-    unblock,
-)
+from hfg.engine.sending import flush_automatic, trigger
 from hfg.engine.worker import RATE, RESTING, Worker
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "scopes_changed", "strip"]

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hfg.engine import lifecycle, subgraphs
-from hfg.engine.sending import set_active
+from hfg.engine.modifiers import set_active
 from hfg.engine.worker import Worker
 from hfg.errors import Aborted
 from hfg.token import Token

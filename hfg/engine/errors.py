@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from hfg.engine import firing, lifecycle
-from hfg.engine.sending import automatic, block, flush_automatic, put_outputs, report_error
+from hfg.engine import calls, firing, lifecycle
+from hfg.engine.agenda import block
+from hfg.engine.modifiers import automatic, report_error
+from hfg.engine.sending import flush_automatic, put_outputs
 from hfg.engine.worker import BACKOFF, Worker
 from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit
 from hfg.ports.edges import EventEdge
@@ -47,7 +49,7 @@ def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
         worker.core.host.finish("failed", problem)
         return
     worker.core.errors.append(problem)
-    firing.finish_call(worker, "failed")
+    calls.finish_call(worker, "failed")
 
 
 def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any = None) -> None:

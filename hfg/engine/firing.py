@@ -1,64 +1,31 @@
-"""What a node does next: a firing, a slot call, its end (rules F1-F4, F9, F11, F12, P6, P8, A6, A11, T5).
+"""What a node does next: a firing (rules F1-F4, F9, F11, P6, P8, A6, A11, T5).
 
-The general way; `steps` has shorter ones for the common shapes, which fall back to this one. Stands on `sending`; a
-node's code is run by the host.
+The general way; `steps` has shorter ones for the common shapes, which fall back to this one. Stands on `ending` and
+`calls`; a node's code is run by the host.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import CoroutineType
 from typing import Any
 
 from hfg.activity.rules import after_receipt
-from hfg.engine import builtin_slots
-from hfg.engine.sending import (
-    SAME_MOMENT_S,
-    automatic,
-    block,
-    consider,
-    derive_scopes,
-    flush_automatic,
-    freed,
-    put_outputs,
-    queue,
-    receive,
-    release,
-    send_end,
-    touch,
-    unplace,
-)
+from hfg.engine.agenda import SAME_MOMENT_S, cancel_limit, consider, freed, idle_again, unplace
+from hfg.engine.calls import call, set_parameter
+from hfg.engine.ending import end, source_ended
+from hfg.engine.modifiers import automatic, derive_scopes, receive, touch
+from hfg.engine.releasing import release
+from hfg.engine.sending import flush_automatic, put_outputs
 from hfg.engine.wiring import rewire
-from hfg.engine.worker import CALLS_BLOCKED, ENDED, UNREADY, Worker
+from hfg.engine.worker import CALLS_BLOCKED, UNREADY, Worker
 from hfg.errors import EndOfStream, UsageError
 from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
-from hfg.trace import (
-    CallEnded,
-    CallStarted,
-    FiringEnded,
-    FiringStarted,
-    ParameterSet,
-    TokenDrained,
-    TokenDropped,
-    TokenTaken,
-)
+from hfg.trace import FiringEnded, FiringStarted, TokenTaken
 from hfg.types import accepts, describe
 
-__all__ = [
-    "await_call",
-    "call",
-    "complete_firing",
-    "drain_left",
-    "finish_call",
-    "finish_firing",
-    "fire",
-    "idle_again",
-    "merge",
-    "set_parameter",
-    "source_ended",
-    "step",
-    "write",
-]
+__all__ = ["complete_firing", "finish_firing", "fire", "merge", "step", "write"]
 
 
 def step(worker: Worker) -> None:
@@ -106,35 +73,6 @@ def _ask_ready(worker: Worker) -> None:
     worker.core.host.execute(worker, hook, (), answered)
 
 
-def idle_again(worker: Worker, *, asked: bool = False) -> None:
-    """A firing, call or question is over: see what is next."""
-    worker.busy = ""
-    if worker.on_idle is not None:
-        _let_others(worker)
-        if worker.busy:
-            return
-    if not asked:
-        worker.blocked &= ~UNREADY
-    if worker.placed:
-        queue(worker)
-    else:
-        consider(worker)
-    if worker.calls and not worker.blocked & CALLS_BLOCKED:
-        queue(worker)
-
-
-def _let_others(worker: Worker) -> None:
-    """What waits until the node is not busy has its turn, before the next firing or call."""
-    while worker.on_idle and not worker.busy:
-        worker.on_idle.pop(0)()
-    if not worker.on_idle:
-        worker.on_idle = None
-        worker.core.upstairs.choose_step(worker)
-
-
-# --- firing ---------------------------------------------------------------------------------------------------------
-
-
 def fire(worker: Worker) -> None:
     """Take one token from every live input and decide by F4 what becomes of them."""
     core = worker.core
@@ -169,7 +107,7 @@ def fire(worker: Worker) -> None:
         derive_scopes(core)
     _set_parameters(worker, edges, tokens)
     if kind == "end":
-        _end(worker, edges, tokens)
+        end(worker, edges, tokens)
     elif kind == "silent":
         worker.silent += 1
         _place_next(worker)
@@ -270,17 +208,6 @@ def _set_parameters(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token
             set_parameter(worker, edge.port_name, token.value)
 
 
-def set_parameter(worker: Worker, name: str, value: Any) -> None:
-    """Give a parameter a value that came by a token; one out of its limits is an error of the node (X1)."""
-    try:
-        worker.node._set_parameter(name, value)
-    except Exception as error:
-        worker.core.upstairs.fail(worker, f"parameter {name}", error, answer=False)
-        return
-    if worker.core.trace is not None:
-        worker.core.trace(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))
-
-
 def _arguments(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:
     """One argument per declared input: the value, the token if asked for, the default if absent (P6)."""
     arguments = list(worker.unset)
@@ -319,6 +246,9 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
 
 def complete_firing(worker: Worker, result: Any) -> None:
     """The process function ran to its end: its outputs leave together (F3)."""
+    if type(result) is CoroutineType:
+        _await_result(worker, result)
+        return
     try:
         written = merge(worker, result)
     except Exception as error:
@@ -330,29 +260,51 @@ def complete_firing(worker: Worker, result: Any) -> None:
     finish_firing(worker, "done")
 
 
+def _await_result(worker: Worker, coroutine: Any) -> None:
+    """A plain function has called an async one and given back what is to be awaited: then that is part of it."""
+    what = f"firing {worker.firings}"
+    if worker.group.threaded:
+        worker.core.upstairs.fail(worker, what, _no_coroutine(worker, coroutine), answer=True)
+        return
+    ticket = worker.ticket
+
+    def done(result: Any, error: BaseException | None) -> None:
+        if worker.ticket != ticket:
+            return  # X2: it came too late, its firing was given up
+        if error is None:
+            complete_firing(worker, result)
+        else:
+            worker.core.upstairs.fail(worker, what, error, answer=True)
+
+    worker.core.host.drive(worker, coroutine, done)
+
+
+def _no_coroutine(worker: Worker, coroutine: Any) -> TypeError:
+    """Close what code in a thread cannot await, and say what to do."""
+    coroutine.close()
+    return TypeError(
+        f'it gave back a coroutine, but its group "{worker.group.name}" is a thread and async code runs on the loop; '
+        "write `async def` and leave out group="
+    )
+
+
 def merge(worker: Worker, result: Any) -> list[Any] | None:
     """Join what was returned with what was sent; both for one output is writing twice (F3)."""
     written = worker.written
     node_type = worker.type
     if result is not None:
-        if node_type.result == "none":
-            if worker.out_names and len(worker.out_names) > len(node_type.parameters):
-                raise TypeError(
-                    f"process returned {describe(type(result))}, but it writes its outputs with send(): return None"
+        values = worker.node._split(result)
+        if written is None:
+            written = [None] * len(worker.out_edges)
+        for position, value in enumerate(values):
+            if value is None:
+                continue
+            if written[position] is not None:
+                raise UsageError(
+                    f'output "{worker.path}.{worker.out_names[position]}" was written twice in one '
+                    f"firing: return or send, once"
                 )
-        else:
-            values = worker.node._split(result)
-            if written is None:
-                written = [None] * len(worker.out_edges)
-            for position, value in enumerate(values):
-                if value is None:
-                    continue
-                if written[position] is not None:
-                    raise UsageError(
-                        f'output "{worker.path}.{worker.out_names[position]}" was written twice in one '
-                        f"firing: return or send, once"
-                    )
-                written[position] = _entry(value)
+            written[position] = _entry(value)
     if worker.core.debug and written is not None:
         for position, name in enumerate(node_type.outputs):
             entry = written[position]
@@ -412,7 +364,7 @@ def write(worker: Worker, position: int, value: Any, activity: int | None, stamp
 def finish_firing(worker: Worker, outcome: Any) -> None:
     """The automatic events follow (A9), then the firing is over and releases what it took (F5)."""
     core = worker.core
-    _cancel_limit(worker)
+    cancel_limit(worker)
     flush_automatic(worker)
     if core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, outcome))
@@ -425,173 +377,6 @@ def finish_firing(worker: Worker, outcome: Any) -> None:
             release([edge for edge in taken if not edge.sequential])
     elif taken:
         release(taken)
-    worker.right = False
-    worker.stamp = None
-    idle_again(worker)
-
-
-def _cancel_limit(worker: Worker) -> None:
-    if worker.limit_timer is not None:
-        worker.limit_timer.cancel()
-        worker.limit_timer = None
-
-
-# --- the end of a node ----------------------------------------------------------------------------------------------
-
-
-def source_ended(worker: Worker) -> None:
-    """F2: the generator returned or the code raised EndOfStream; what the firing wrote before stays unsent."""
-    worker.generator = None  # nothing is left to close
-    worker.written = None
-    _end(worker, (), ())
-
-
-def _end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
-    """F4(1): `end()` is called, what it writes leaves as one full firing, END follows (F12 begins here)."""
-    core = worker.core
-    for edge, token in zip(edges, tokens, strict=True):
-        if type(token.value) is not Marker:
-            edge.dropped += 1
-            if core.trace is not None:
-                core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
-    worker.end_firings += 1
-    block(worker, ENDED)
-    worker.deferred = []
-    _cancel_limit(worker)
-    for edge in worker.in_edges:
-        drain_left(edge)
-    hook = worker.node._hook("end") if worker.node is not None else None
-    if hook is None:
-        _ended(worker, None, None)
-        return
-    worker.busy = "ending"
-    core.host.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
-
-
-def drain_left(edge: Any) -> None:
-    """F12: what still lies on an input of an ended node is processed without a firing."""
-    if type(edge) is EventEdge and edge.target_kind == "parameter":
-        return
-    worker: Worker = edge.target
-    core = worker.core
-    for token in edge.clear():
-        edge.drained += 1
-        if core.trace is not None:
-            core.trace(TokenDrained(core.now(), edge.label, token))
-        if token.activity and worker.deferred is not None:
-            worker.deferred.append(token.activity)
-    if type(edge) is EventEdge:
-        freed(edge)
-    elif edge.held:
-        release((edge,))
-
-
-def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
-    core = worker.core
-    worker.busy = "firing"
-    if error is not None:
-        worker.written = None
-        worker.core.upstairs.fail(worker, "end()", error, answer=False)
-    written = worker.written
-    worker.written = None
-    wrote = written is not None and any(entry is not None for entry in written)
-    if wrote:
-        put_outputs(worker, written)
-    flush_automatic(worker)
-    if core.trace is not None:
-        core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended"))
-    taken = worker.taken
-    worker.taken = ()
-    release(taken)
-    worker.end_stamp = worker.stamp
-    worker.right = False  # the firing is over; END is not part of it (A3)
-    if worker.outputs.missing:
-        worker.pending_end = True
-    else:
-        send_end(worker)
-    flush_automatic(worker)
-    worker.right = False
-    worker.stamp = None
-    idle_again(worker)
-
-
-# --- slot calls -----------------------------------------------------------------------------------------------------
-
-
-def call(worker: Worker) -> None:
-    """Take the oldest waiting slot token and run its handler (F9)."""
-    core = worker.core
-    assert worker.calls is not None
-    edge = worker.calls.popleft()
-    if worker.placed and worker.ahead:
-        worker.ahead -= 1
-    if type(edge) is SyncEdge:
-        token = edge.token
-        edge.token = None
-        assert token is not None
-    else:
-        token = edge.queue.popleft()
-    worker.busy = "call"
-    worker.call_number += 1
-    worker.ticket += 1
-    worker.call_edge = edge
-    worker.stamp = token.stamp
-    name = edge.port_name
-    if core.trace is not None:
-        now = core.now()
-        core.trace(CallStarted(now, worker.path, worker.call_number, name, edge.label))
-        core.trace(TokenTaken(now, edge.label, token))
-    if type(edge) is EventEdge:
-        freed(edge)
-    if token.activity:
-        if worker.scopes:
-            touch(core, worker.scopes)
-        receive(worker, (token.activity,))
-        derive_scopes(core)
-    if edge.target_kind == "parameter":
-        set_parameter(worker, name, token.value)
-        finish_call(worker, "done")
-        return
-    handler = worker.handlers.get(name)
-    if handler is None:
-        builtin_slots.run(worker, name, token, lambda: finish_call(worker, "done"))
-        return
-    ticket = worker.ticket
-
-    def done(_result: Any, error: BaseException | None) -> None:
-        if worker.ticket != ticket:
-            return
-        if error is None:
-            finish_call(worker, "done")
-        else:
-            worker.core.upstairs.fail_call(worker, name, error)
-
-    core.host.execute(worker, handler, (token,), done)
-
-
-def await_call(worker: Worker, name: str, coroutine: Any) -> None:
-    """A handler of a short step turned out to wait."""
-
-    def done(_result: Any, error: BaseException | None) -> None:
-        if error is None:
-            finish_call(worker, "done")
-        else:
-            worker.core.upstairs.fail_call(worker, name, error)
-
-    worker.core.host.drive(worker, coroutine, done)
-
-
-def finish_call(worker: Worker, outcome: Any) -> None:
-    """The automatic events follow (A9), then the call is over: an O->S token is processed (F6)."""
-    core = worker.core
-    derive_scopes(core)
-    flush_automatic(worker)
-    if core.trace is not None:
-        core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
-    edge = worker.call_edge
-    worker.call_edge = None
-    if type(edge) is SyncEdge:
-        release((edge,))
     worker.right = False
     worker.stamp = None
     idle_again(worker)

@@ -13,7 +13,8 @@ from typing import Any
 
 from hfg.engine import errors, firing, plan, quiet
 from hfg.engine.core import Core, Timer
-from hfg.engine.sending import put_outputs, take_from_reader
+from hfg.engine.releasing import take_from_reader
+from hfg.engine.sending import put_outputs
 from hfg.engine.worker import Worker
 from hfg.graph.flat import FlatGraph
 from hfg.token import NO_MESSAGE, Marker

@@ -10,8 +10,10 @@ from collections.abc import Callable
 from typing import Any
 
 from hfg.engine import wiring
+from hfg.engine.agenda import block, consider, unblock
 from hfg.engine.core import Core
-from hfg.engine.sending import block, consider, derive_scopes, discard, release, unblock
+from hfg.engine.modifiers import derive_scopes, discard
+from hfg.engine.releasing import release
 from hfg.engine.worker import BACKOFF, DISABLED, ENDED, FUTILE, TORN_DOWN, Worker
 from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge

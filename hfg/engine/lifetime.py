@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any
 from hfg.engine import lifecycle, plan, rx, wiring
 from hfg.engine import ports as engine_ports
 from hfg.engine.activity import gate_changed
+from hfg.engine.agenda import consider, note_full
 from hfg.engine.code import answer
 from hfg.engine.core import Core
 from hfg.engine.groups import ThreadGroup
-from hfg.engine.sending import consider, discard, note_full, trigger
+from hfg.engine.modifiers import discard
+from hfg.engine.sending import trigger
 from hfg.engine.watchdog import Watch, watchdog
 from hfg.engine.worker import STARTING, Worker
 from hfg.errors import HfgError, NodeError, TeardownError

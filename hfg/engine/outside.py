@@ -16,7 +16,8 @@ from typing import Any
 from hfg.engine.code import answer
 from hfg.engine.engine import Engine
 from hfg.engine.plan import prepare_slot
-from hfg.engine.sending import enqueue, put_outputs, take_from_reader
+from hfg.engine.releasing import take_from_reader
+from hfg.engine.sending import enqueue, put_outputs
 from hfg.engine.worker import ENDED, Worker
 from hfg.errors import NotRunning, UsageError
 from hfg.token import END, NO_MESSAGE, Marker, Token

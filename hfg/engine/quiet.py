@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from hfg.engine.agenda import block, freed, must_wait
 from hfg.engine.core import Core
-from hfg.engine.sending import block, enqueue, freed, must_wait, put_outputs
+from hfg.engine.sending import enqueue, put_outputs
 from hfg.engine.worker import CALLS_BLOCKED, DISABLED, ENDED, FULL, FUTILE, RESTING, UNREADY, UNWIRED, Worker
 from hfg.errors import QueueLimit, Stalled
 from hfg.ports.edges import EventEdge

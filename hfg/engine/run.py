@@ -257,7 +257,7 @@ class Run:
 
     def wake(self, node: Node) -> None:
         """Ask a node's `ready()` again (F1)."""
-        from hfg.engine.sending import unblock
+        from hfg.engine.agenda import unblock
         from hfg.engine.worker import UNREADY
 
         unblock(self._worker(node), UNREADY)

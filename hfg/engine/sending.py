@@ -1,140 +1,24 @@
-"""What leaves a node and what that changes (rules T, P4-P7, F3, F5, F6, F8, A3-A8, A12).
+"""What leaves a node: one token per output edge, signals, END, automatic events (rules T, P4-P7, F3, F8, A3-A5, A9).
 
-Plain functions over the run's state; they queue workers and never run a node's code, except the short hooks of
-activity. Stands on `worker`, `core`.
+A sending is on all its edges before anything comes of it. Stands on `modifiers`.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
-from hfg.activity.rules import after_receipt, leaving
-from hfg.engine.worker import CALLS_BLOCKED, ENDED, FULL, RATE, RunningEvent, Worker
+from hfg.activity.rules import leaving
+from hfg.engine.agenda import add_call, arrived, note_full, remove_call, unplace
+from hfg.engine.core import Core
+from hfg.engine.modifiers import derive_scopes, drop, receive, set_active, touch
+from hfg.engine.worker import ENDED, RunningEvent, Worker
 from hfg.errors import EngineInternalError, QueueOverflow
 from hfg.ports.edges import Edge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
-from hfg.trace import (
-    ActivityChanged,
-    ActivityLost,
-    ErrorRaised,
-    EventTriggered,
-    NodeEnded,
-    TokenDrained,
-    TokenDropped,
-    TokenProcessed,
-    TokenSent,
-    TokenTaken,
-)
+from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenSent
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hfg.engine.core import Core
-    from hfg.engine.scopes import Scope
-
-SAME_MOMENT_S = 1e-9  # times that differ by less are one: sums of floats do
-
-__all__ = [
-    "add_call",
-    "arrived",
-    "automatic",
-    "block",
-    "consider",
-    "derive_scopes",
-    "discard",
-    "enqueue",
-    "flush_automatic",
-    "freed",
-    "give_back",
-    "must_wait",
-    "note_full",
-    "outputs_free",
-    "put",
-    "put_outputs",
-    "queue",
-    "receive",
-    "release",
-    "report_error",
-    "send_end",
-    "set_active",
-    "take_from_reader",
-    "touch",
-    "trigger",
-    "unblock",
-    "unplace",
-]
-
-
-# --- who may move ---------------------------------------------------------------------------------------------------
-
-
-def queue(worker: Worker) -> None:
-    """Put it into its group's run queue, once."""
-    if not worker.queued and not worker.busy:
-        worker.queued = True
-        worker.push(worker)
-
-
-def consider(worker: Worker) -> None:
-    """Something that F1 asks for has changed: give the next firing its place if all of it holds now (F9, D1)."""
-    if worker.inputs.missing or worker.outputs.missing or worker.blocked or worker.placed:
-        return
-    if worker.paced and must_wait(worker):
-        return
-    worker.placed = True
-    worker.ahead = len(worker.calls) if worker.calls else 0
-    queue(worker)
-
-
-def must_wait(worker: Worker) -> bool:
-    """F11 and D7: nothing starts before the rate allows it; the timer is set only when something would."""
-    when = worker.next_start
-    if worker.is_source:
-        for gate in worker.gates_over:
-            if gate.idle_rate_hz is not None and not gate.state.active:
-                when = max(when, worker.gate_next + 1.0 / gate.idle_rate_hz)
-    core = worker.core
-    if when <= core.now() + SAME_MOMENT_S:
-        return False
-    worker.blocked |= RATE
-
-    def over() -> None:
-        worker.rate_timer = None
-        unblock(worker, RATE)
-
-    worker.rate_timer = core.host.call_at(when, over)
-    return True
-
-
-def block(worker: Worker, reason: int) -> None:
-    """Let no firing start; its place in the agenda is lost (D1)."""
-    worker.blocked |= reason
-    if reason == FULL:
-        worker.placed = False  # a rate goes on holding it, and is to be over before a queue grows (F8)
-    else:
-        unplace(worker)
-
-
-def unplace(worker: Worker) -> None:
-    """What F1 asks for holds no more: no place, and no timer that would give one."""
-    worker.placed = False
-    if worker.rate_timer is not None:
-        worker.rate_timer.cancel()
-        worker.rate_timer = None
-        worker.blocked &= ~RATE
-
-
-def unblock(worker: Worker, reason: int) -> None:
-    """Take one reason away and go on if it was the last."""
-    if worker.blocked & reason:
-        worker.blocked &= ~reason
-        consider(worker)
-        if worker.calls and not worker.blocked & CALLS_BLOCKED:
-            queue(worker)
-
-
-# --- synchronous edges ----------------------------------------------------------------------------------------------
+__all__ = ["enqueue", "flush_automatic", "put", "put_outputs", "send_end", "trigger"]
 
 
 def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float | None] | None] | None) -> None:
@@ -230,29 +114,6 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
         touch(core, target.scopes)
 
 
-def arrived(edge: Edge) -> None:
-    """One more input of its target holds a token."""
-    target: Worker = edge.target
-    if edge.ended:  # an optional one that was absent since its END takes part again (F4)
-        target.core.upstairs.rewire(target)
-        return
-    barrier = target.inputs
-    barrier.missing -= 1
-    if not barrier.missing:
-        if barrier.waiters is not None:
-            barrier.notify()
-        consider(target)
-
-
-def add_call(target: Worker, edge: Edge) -> None:
-    """The newest token on the edge waits for a slot call (F9)."""
-    if target.calls is None:
-        target.calls = deque()
-    target.calls.append(edge)
-    if not target.blocked & CALLS_BLOCKED:
-        queue(target)
-
-
 def _drain(edge: Edge, token: Token[Any]) -> None:
     """T4, F12: the token is processed at once, without a firing or call; its modifier acts behind the sending."""
     target: Worker = edge.target
@@ -280,42 +141,6 @@ def _drained_act(core: Core) -> None:
             flush_automatic(target)
 
 
-def release(edges: Sequence[Any]) -> None:
-    """These tokens are processed: free the producers' places, and transitively what waited for them (F5).
-
-    Without recursion.
-    """
-    stack: list[Any] = list(reversed(edges))
-    while stack:
-        edge = stack.pop()
-        if not edge.held:
-            continue
-        edge.held = False
-        producer: Worker = edge.source
-        core = producer.core
-        if core.trace is not None:
-            core.trace(TokenProcessed(core.now(), edge.label))
-        outputs = producer.outputs
-        outputs.missing -= 1
-        if not outputs.missing:
-            stack.extend(reversed(outputs_free(producer)))
-
-
-def outputs_free(worker: Worker) -> Sequence[Any]:
-    """All its tokens are processed: it may go on; gives back the edges that are released by that (F5 sequential)."""
-    released: Sequence[Any] = ()
-    if worker.held:
-        worker.held = False
-        released = [upstream for upstream in worker.taken if upstream.sequential]
-    if worker.outputs.waiters is not None:
-        worker.outputs.notify()
-    if worker.pending_end and not worker.busy:
-        send_end(worker)
-    else:
-        consider(worker)
-    return released
-
-
 def send_end(worker: Worker) -> None:
     """END leaves on all outputs; from here the node is over (F4, F12)."""
     core = worker.core
@@ -332,31 +157,6 @@ def send_end(worker: Worker) -> None:
     derive_scopes(core)
     flush_automatic(worker)
     core.upstairs.node_ended(worker)
-
-
-def take_from_reader(worker: Worker) -> Token[Any]:
-    """Take the token that lies before a reader; its place is free at once."""
-    edge = worker.live_inputs[0]
-    token: Token[Any]
-    if isinstance(edge, SyncEdge):
-        token = edge.token  # type: ignore[assignment]  # the caller has seen that one lies there
-        edge.token = None
-    else:
-        token = edge.queue.popleft()
-    if not edge.untaken:
-        worker.inputs.missing += 1
-    worker.placed = False
-    core = worker.core
-    if core.trace is not None:
-        core.trace(TokenTaken(core.now(), edge.label, token))
-    if isinstance(edge, EventEdge):
-        freed(edge)
-    elif isinstance(edge, SyncEdge) or (edge.held and len(edge.queue) <= edge.delay):
-        release((edge,))
-    return token
-
-
-# --- events ---------------------------------------------------------------------------------------------------------
 
 
 def trigger(
@@ -450,11 +250,11 @@ def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
         return
     if edge.overflows():
         if edge.overflow == "drop_newest":
-            _drop(edge, token, "overflow")
+            drop(edge, token, "overflow")
             return
-        _drop(edge, edge.queue.popleft(), "overflow")
+        drop(edge, edge.queue.popleft(), "overflow")
         if not into_input:
-            _remove_call(target, edge)
+            remove_call(target, edge)
         elif not edge.queue:  # for the input nothing has changed: it still holds a token
             edge.queue.append(token)
             return
@@ -471,77 +271,6 @@ def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
         touch(core, target.scopes)
 
 
-def _remove_call(target: Worker, edge: Edge) -> None:
-    """The call of the edge's oldest token will not come: the token was dropped."""
-    assert target.calls is not None
-    position = target.calls.index(edge)
-    del target.calls[position]
-    if position < target.ahead:
-        target.ahead -= 1
-
-
-def note_full(edge: EventEdge) -> None:
-    """F8: a live `wait` edge that holds its capacity or more keeps its source from starting anything new."""
-    if edge.overflow == "wait" and not edge.full and len(edge.queue) >= edge.capacity and edge.live:
-        edge.full = True
-        source: Worker = edge.source
-        source.full_edges += 1
-        block(source, FULL)
-
-
-def freed(edge: EventEdge) -> None:
-    """A token was taken from the queue: its source may go on if no other queue of it is full (F8)."""
-    if edge.full and len(edge.queue) < edge.capacity:
-        edge.full = False
-        source: Worker = edge.source
-        source.full_edges -= 1
-        if not source.full_edges:
-            if source.room_waiters is not None:
-                waiters, source.room_waiters = source.room_waiters, None
-                for waiter in waiters:
-                    waiter()
-            unblock(source, FULL)
-
-
-# --- activity -------------------------------------------------------------------------------------------------------
-
-
-def receive(worker: Worker, modifiers: Sequence[int]) -> None:
-    """A6: only the net change counts."""
-    active = after_receipt(worker.active, modifiers)
-    if active != worker.active:
-        set_active(worker, active, "token")
-
-
-def set_active(worker: Worker, active: bool, cause: Any) -> None:
-    """A(v) := active, and everything that follows a change."""
-    if worker.active == active:
-        return
-    worker.active = active
-    core = worker.core
-    node = worker.node
-    if node is not None:
-        node._active = active
-    if core.trace is not None:
-        core.trace(ActivityChanged(core.now(), worker.path, active, cause))
-    if not worker.watched:
-        return
-    core.upstairs.activity_changed(worker, active)
-
-
-def touch(core: Core, scopes: Sequence[Scope]) -> None:
-    """Something these subgraphs derive their activity from has changed."""
-    for scope in scopes:
-        if scope not in core.dirty_scopes:
-            core.dirty_scopes.append(scope)
-
-
-def derive_scopes(core: Core) -> None:
-    """After a step that may have moved activity: derive A(subgraph) anew where it is watched (G2)."""
-    if core.dirty_scopes:
-        core.upstairs.scopes_changed(core)
-
-
 def flush_automatic(worker: Worker) -> None:
     """A9: the automatic events follow as sendings of their own, in the order they arose (D3)."""
     while worker.events_due:
@@ -550,61 +279,3 @@ def flush_automatic(worker: Worker) -> None:
             event = worker.events.get(name)
             if event is not None:
                 trigger(event, value, stamp=worker.core.now(), extend_right=False)  # T5: automatic signals: now
-
-
-def automatic(worker: Worker, name: str, value: Any = None) -> None:
-    """An automatic event has arisen; it leaves after the firing or call under way, or at the next flush."""
-    if name in worker.events:
-        if worker.events_due is None:
-            worker.events_due = []
-        worker.events_due.append((name, value))
-
-
-# --- what is discarded ----------------------------------------------------------------------------------------------
-
-
-def discard(edge: Any, reason: Any) -> None:
-    """Take everything from an edge, counted and with its activity given back (F10, A8)."""
-    tokens = edge.clear()
-    target: Worker = edge.target
-    if not tokens:
-        return
-    for token in tokens:
-        _drop(edge, token, reason)
-    if edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge):
-        for _ in tokens:
-            _remove_call(target, edge)
-    elif edge in target.live_inputs:
-        target.inputs.missing += 1
-        unplace(target)
-    if type(edge) is EventEdge:
-        freed(edge)
-
-
-def _drop(edge: Edge, token: Token[Any], reason: Any) -> None:
-    edge.dropped += 1
-    core: Core = edge.target.core
-    if core.trace is not None:
-        core.trace(TokenDropped(core.now(), edge.label, token, reason))
-    if token.activity > 0:
-        give_back(edge)
-        touch(core, edge.target.scopes)
-
-
-def give_back(edge: Edge) -> None:
-    """A8: activity is never lost unseen: the sender has it again, or its loss is counted."""
-    sender: Worker = edge.source
-    core: Core = edge.target.core
-    if sender.node is None:
-        core.lost_activity += 1
-        if core.trace is not None:
-            core.trace(ActivityLost(core.now(), edge.label))
-        return
-    set_active(sender, True, "returned")
-
-
-def report_error(worker: Worker, what: str, error: BaseException, policy: str) -> None:
-    """Tell whoever listens that a node's code failed."""
-    core = worker.core
-    if core.trace is not None:
-        core.trace(ErrorRaised(core.now(), worker.path, what, f"{type(error).__name__}: {error}", policy))

@@ -14,19 +14,12 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
-from hfg.engine import errors, firing
+from hfg.engine import ending, errors, firing
+from hfg.engine.agenda import block, consider, freed
 from hfg.engine.core import PENDING
-from hfg.engine.sending import (
-    block,
-    consider,
-    derive_scopes,
-    flush_automatic,
-    freed,
-    outputs_free,
-    release,
-    touch,
-    trigger,
-)
+from hfg.engine.modifiers import derive_scopes, touch
+from hfg.engine.releasing import outputs_free, release
+from hfg.engine.sending import flush_automatic, trigger
 from hfg.engine.worker import CALLS_BLOCKED, FULL, RunningEvent, Worker
 from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge, SyncEdge
@@ -35,6 +28,9 @@ from hfg.token import Token
 __all__ = ["choose", "emitter"]
 
 Step = Callable[[Worker], None]
+
+_OF_ITS_OWN_KIND = frozenset({type(None), Token, CoroutineType})
+"""Types of results that do not simply leave: silence, a token passed on, code that is still to be awaited."""
 
 
 def choose(worker: Worker) -> None:
@@ -122,6 +118,7 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
     target_outputs: Any = target.outputs if given is not None else None
     carries = given is not None and given.active
     only = (taken,)
+    of_its_own_kind = _OF_ITS_OWN_KIND
 
     def step(worker: Worker) -> None:
         if worker.special or not worker.placed or inputs.missing or worker.busy:
@@ -151,10 +148,11 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
             worker.busy = ""
             worker.stamp = None
         if given is None:
-            if worker.calls or worker.events_due:
+            if result is not None or worker.calls or worker.events_due:
                 worker.busy = "firing"
+                worker.stamp = token.stamp
                 worker.taken = only
-                firing.finish_firing(worker, "done")
+                firing.complete_firing(worker, result)
                 return
             # the sink's firing is over: what it took is processed
             taken.held = False
@@ -162,7 +160,7 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
             if not missing:
                 _outputs_done(producer)
             return
-        if result is None or type(result) is Token:
+        if type(result) in of_its_own_kind:
             worker.busy = "firing"
             worker.stamp = token.stamp
             worker.taken = only
@@ -225,9 +223,8 @@ def _async_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step
             return
         if (
             given is None
-            or result is None
+            or type(result) in _OF_ITS_OWN_KIND
             or worker.step is not step  # somebody has begun to watch, or the wiring has changed
-            or type(result) is Token
             or worker.written is not None
             or worker.right
             or worker.calls
@@ -318,6 +315,7 @@ def _generator_step(worker: Worker, given: SyncEdge) -> Step:
     general = firing.step
     now = core.now
     carries = given.active
+    of_its_own_kind = _OF_ITS_OWN_KIND
 
     def step(worker: Worker) -> None:
         if not worker.placed or worker.special or worker.busy or (worker.active and carries):
@@ -334,14 +332,13 @@ def _generator_step(worker: Worker, given: SyncEdge) -> Step:
         try:
             value = next(generator)
         except (StopIteration, EndOfStream):
-            firing.source_ended(worker)
+            ending.source_ended(worker)
             return
         except Exception as error:
             errors.fail(worker, f"firing {worker.firings}", error, answer=True)
             return
         if (
-            value is None
-            or type(value) is Token
+            type(value) in of_its_own_kind
             or worker.written is not None
             or worker.active
             or worker.right
@@ -413,7 +410,7 @@ def _call_step(worker: Worker, edge: EventEdge) -> Step:
             return
         if result is not None and type(result) is CoroutineType:
             _call_taken(worker, edge)
-            firing.await_call(worker, edge.port_name, result)
+            calls.await_call(worker, edge.port_name, result)
             return
         worker.stamp = None
         worker.right = False

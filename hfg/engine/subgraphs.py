@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 
 from hfg.engine import lifecycle, wiring
 from hfg.engine.activity import deactivate_inside, scopes_changed
+from hfg.engine.agenda import block, consider
 from hfg.engine.lifecycle import when_idle
 from hfg.engine.scopes import Scope
-from hfg.engine.sending import block, consider
 from hfg.engine.worker import DISABLED, Worker
 from hfg.trace import NodeEnabled
 

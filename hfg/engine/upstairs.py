@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hfg.engine import activity, errors, firing, ports, quiet, steps, wiring
+from hfg.engine import activity, agenda, errors, ports, quiet, steps, wiring
 from hfg.engine.iteration import Iteration
 
 __all__ = ["Deciders"]
@@ -11,7 +11,7 @@ __all__ = ["Deciders"]
 class Deciders:
     """See `core.Upstairs`."""
 
-    idle_again = staticmethod(firing.idle_again)
+    idle_again = staticmethod(agenda.idle_again)
     fail = staticmethod(errors.fail)
     fail_call = staticmethod(errors.fail_call)
     operator_failed = staticmethod(errors.operator_failed)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from hfg.engine.agenda import block, consider, note_full, unplace
 from hfg.engine.scopes import Scope
-from hfg.engine.sending import block, consider, note_full, unplace
 from hfg.engine.worker import DISABLED, UNWIRED, Worker
 from hfg.ports.edges import EventEdge
 

@@ -1,0 +1,76 @@
+"""When what was sent counts as processed, and who goes on by that (rules F5, P7, P10).
+
+Stands on `sending`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hfg.engine.agenda import consider, freed
+from hfg.engine.sending import send_end
+from hfg.engine.worker import Worker
+from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.token import Token
+from hfg.trace import TokenProcessed, TokenTaken
+
+__all__ = ["outputs_free", "release", "take_from_reader"]
+
+
+def release(edges: Sequence[Any]) -> None:
+    """These tokens are processed: free the producers' places, and transitively what waited for them (F5).
+
+    Without recursion.
+    """
+    stack: list[Any] = list(reversed(edges))
+    while stack:
+        edge = stack.pop()
+        if not edge.held:
+            continue
+        edge.held = False
+        producer: Worker = edge.source
+        core = producer.core
+        if core.trace is not None:
+            core.trace(TokenProcessed(core.now(), edge.label))
+        outputs = producer.outputs
+        outputs.missing -= 1
+        if not outputs.missing:
+            stack.extend(reversed(outputs_free(producer)))
+
+
+def outputs_free(worker: Worker) -> Sequence[Any]:
+    """All its tokens are processed: it may go on; gives back the edges that are released by that (F5 sequential)."""
+    released: Sequence[Any] = ()
+    if worker.held:
+        worker.held = False
+        released = [upstream for upstream in worker.taken if upstream.sequential]
+    if worker.outputs.waiters is not None:
+        worker.outputs.notify()
+    if worker.pending_end and not worker.busy:
+        send_end(worker)
+    else:
+        consider(worker)
+    return released
+
+
+def take_from_reader(worker: Worker) -> Token[Any]:
+    """Take the token that lies before a reader; its place is free at once."""
+    edge = worker.live_inputs[0]
+    token: Token[Any]
+    if isinstance(edge, SyncEdge):
+        token = edge.token  # type: ignore[assignment]  # the caller has seen that one lies there
+        edge.token = None
+    else:
+        token = edge.queue.popleft()
+    if not edge.untaken:
+        worker.inputs.missing += 1
+    worker.placed = False
+    core = worker.core
+    if core.trace is not None:
+        core.trace(TokenTaken(core.now(), edge.label, token))
+    if isinstance(edge, EventEdge):
+        freed(edge)
+    elif isinstance(edge, SyncEdge) or (edge.held and len(edge.queue) <= edge.delay):
+        release((edge,))
+    return token
