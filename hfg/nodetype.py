@@ -165,8 +165,16 @@ class Node:
         return Ports(self)
 
     @property
-    def place(self) -> Place | None:
-        """Graph, name and path; None before the node is added to a graph."""
+    def place(self) -> Place:
+        """Graph, name and path.
+
+        Raises:
+          UsageError: the node is in no graph.
+        """
+        if self._place is None:
+            raise UsageError(
+                f'node "{_name(self)}" is in no graph, so it has no place: add it first, with graph.add(node)'
+            )
         return self._place
 
     @property

@@ -394,14 +394,15 @@ def test_a_node_can_always_be_made_again() -> None:
     node = MapLookup(tolerance=0.3)
     node._place = Place(None, "lookup", "lookup")
     twin = node._copy()
-    assert (type(twin), twin._parameters, twin.place) == (MapLookup, {"tolerance": 0.3}, None)
+    assert (type(twin), twin._parameters, twin._place) == (MapLookup, {"tolerance": 0.3}, None)
     assert twin._parameters is not node._parameters
 
 
 def test_outside_a_run_a_node_is_not_active_and_has_no_place() -> None:
     node = MapLookup()
     assert not node.active
-    assert node.place is None
+    with pytest.raises(UsageError, match=r'^node "map_lookup" is in no graph, so it has no place: add it first, with'):
+        _ = node.place
     assert repr(node) == "<MapLookup(tolerance=0.1)>"
     node._place = Place(None, "lookup", "fetch/lookup")
     assert repr(node) == '<MapLookup(tolerance=0.1) at "fetch/lookup">'

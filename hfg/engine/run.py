@@ -296,7 +296,7 @@ class Run:
     # --- inside -----------------------------------------------------------------------------------------------------
 
     def _worker(self, node: Any) -> Worker:
-        place = getattr(node, "place", None)
+        place = getattr(node, "_place", None)
         if node is self.graph:
             worker = self._engine.core.boundary
         else:

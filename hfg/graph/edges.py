@@ -130,7 +130,7 @@ def _wrong_end(found: Any, role: str, expected: str, *, swap: bool) -> NoReturn:
         if isinstance(found, Port) and is_box(found.node):
             remedy += f', or inside the subgraph use its inner side, "{found.path}.inner"'
     elif isinstance(found, Node):
-        place = found.place
+        place = found._place
         what = f'the node "{place.path if place else found._type.name}"'
         remedy = "name one of its ports, as in node.out, or connect nodes with >>"
     elif getattr(type(found), "kind", None) is not None:  # Input, Output, ... as declared in a class body

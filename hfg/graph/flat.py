@@ -257,7 +257,7 @@ class _Edges:
             self.flat.gates.append(FlatGate(target, by, gate.idle_rate_hz))
             return
         lost = gate.target if target is None else gate.by
-        place = lost.place
+        place = lost._place
         self.flat.findings.append(
             Problem(
                 path=lost._type.name if place is None else place.path,

@@ -415,7 +415,7 @@ class Graph:
         return "" if self._owner is None else path_of(self._owner)
 
     @property
-    def place(self) -> Place:
+    def _place(self) -> Place:
         """Where its own ports are; asked by them."""
         return Place(self, self.name, "")
 

@@ -25,7 +25,7 @@ class Owner(Protocol):
     """What a port needs of the node (or graph) it belongs to."""
 
     @property
-    def place(self) -> Any:
+    def _place(self) -> Any:
         """Where the node is: has `graph`, `name` and `path`; None before it is added."""
 
 
@@ -86,7 +86,7 @@ class Port:
     @property
     def graph(self) -> Any:
         """The graph in which its edges are drawn."""
-        place = self.node.place
+        place = self.node._place
         return None if place is None else place.graph
 
     def __repr__(self) -> str:
@@ -101,7 +101,7 @@ class Port:
 
 def path_of(node: Any, name: str) -> str:
     """Give the path of a port called `name` of `node`; the ports of a root graph stand without a dot."""
-    place = node.place
+    place = node._place
     if place is not None:
         return f"{place.path}.{name}" if place.path else name
     kind = getattr(node, "_type", None)

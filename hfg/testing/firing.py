@@ -99,7 +99,7 @@ def fire(
       >>> fire(door, push=True).outputs
       {'out': 1}
     """
-    place = node.place
+    place = node._place
     if place is not None and place.graph._root._run is not None:
         raise UsageError(f'"{place.path}" is running: fire a node that no run has')
     for name, value in (parameters or {}).items():

@@ -64,7 +64,6 @@ def graph() -> Graph:
 def test_add_gives_the_node_back_with_its_place(graph: Graph) -> None:
     node = MapLookup()
     assert graph.add(node) is node
-    assert node.place is not None
     assert (node.place.graph, node.place.name, node.place.path) == (graph, "map_lookup", "map_lookup")
     assert graph.nodes == {"map_lookup": node}
 
@@ -104,7 +103,7 @@ def test_doubled_name_is_refused_and_changes_nothing(graph: Graph) -> None:
     late = double()
     with pytest.raises(GraphError, match='has a node "it" already'):
         graph.add(late, name="it")
-    assert late.place is None
+    assert late._place is None
     assert len(graph.nodes) == 1
 
 

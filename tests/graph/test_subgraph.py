@@ -53,9 +53,8 @@ class Broken(Subgraph):
         graph.add(FollowPerson())
         self.kept = graph.add(Plan())
         graph.gate(self.kept, by=graph.nodes["follow_person"])
-        place = self.place
-        assert place is not None
-        place.graph.connect(place.graph.start, self.enable)
+        around = self.place.graph
+        around.connect(around.start, self.enable)
         raise RuntimeError("no camera")
 
 
@@ -75,9 +74,7 @@ def test_subgraph_is_built_when_it_is_added(graph: Graph) -> None:
     graph.add(follow)
     assert list(follow.graph.nodes) == ["plan"]
     assert follow.graph.path == "follow_person"
-    place = follow.graph.nodes["plan"].place
-    assert place is not None
-    assert place.path == "follow_person/plan"
+    assert follow.graph.nodes["plan"].place.path == "follow_person/plan"
 
 
 @pytest.mark.rule("G3")
@@ -95,8 +92,9 @@ def test_build_that_raises_leaves_nothing(graph: Graph) -> None:
     assert list(graph.nodes) == ["plan"]
     assert [edge.label for edge in graph.edges] == ["start -> plan.enable"]
     assert list(graph.groups) == ["loop"]
-    assert broken.place is None
-    assert broken.kept.place is None
+    for node in (broken, broken.kept):
+        with pytest.raises(UsageError, match="is in no graph"):
+            _ = node.place
     with pytest.raises(UsageError, match="has no graph yet"):
         _ = broken.graph
     graph.connect(graph.start, graph.add(broken.kept, name="broken").enable)  # nothing of it is taken

@@ -49,7 +49,7 @@ class FakeGraph:
     """Remembers what it was asked to connect."""
 
     def __init__(self) -> None:
-        self.place = None
+        self._place = None
         self.edges: list[Any] = []
 
     def add(self, node: Any, path: str) -> Any:

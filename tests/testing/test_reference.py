@@ -56,7 +56,7 @@ def signs(report: ReferenceReport, edge: str) -> list[tuple[Any, int]]:
 def chain(*nodes: hfg.Node) -> hfg.Graph:
     graph = hfg.Graph()
     for earlier, later in pairwise(nodes):
-        if earlier.place is None:
+        if earlier._place is None:
             graph.add(earlier)
         graph.add(later)
         graph.connect(next(iter(earlier.ports.outputs.values())), next(iter(later.ports.inputs.values())))

@@ -111,7 +111,7 @@ class MapLookup(hfg.Node):
             self.pose.send(map[key], activity=-1, stamp=1.0)
         self.unknown.trigger(key, activity=+1)
         self.done.trigger()
-        self.log.info("%s", self.place)
+        self.log.info("%s", self.place.path)
 
     @hfg.slot
     def forget(self, key: int) -> None: ...
@@ -202,6 +202,7 @@ graph.connect(lookup.pose, graph.output("poses", Pose))
 graph.gate(lookup, by=lookup, idle_rate_hz=1.0)
 assert_type(graph.group("vision", threads=1, policy="priority"), GroupSpec)
 assert_type(graph.check(), list[Problem])
+assert_type(lookup.place.path, str)
 
 
 class FollowPerson(hfg.Subgraph):
