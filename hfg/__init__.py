@@ -15,6 +15,7 @@ A graph is built (floors 0-3) without any engine; the engine runs what it finds 
 """
 
 from hfg import errors
+from hfg.activity import StateMachine
 from hfg.clock import now
 from hfg.engine import Report, Run, VirtualTimeLoop, run, run_async, running
 from hfg.errors import EndOfStream
@@ -37,6 +38,7 @@ __all__ = [
     "Report",
     "Run",
     "State",
+    "StateMachine",
     "Subgraph",
     "Token",
     "VirtualTimeLoop",

@@ -5,6 +5,7 @@
     ├── GraphError            the structure is wrong (raised where it is built, or by a check)
     │   ├── ConnectionError   an edge that rules P1-P9 refuse
     │   └── CheckFailed       a check found errors; `problems` holds all of them
+    ├── MachineError          what is no state machine, as a description or a graph; `problems` holds all that is wrong
     ├── UsageError            a call at the wrong moment (a port outside a run, a second run, ...)
     │   └── NotRunning        the run that the call needs has not begun or is over
     ├── TargetError           a TARGET of the command line that cannot be found or imported
@@ -41,6 +42,7 @@ __all__ = [
     "FiringTimeout",
     "GraphError",
     "HfgError",
+    "MachineError",
     "NodeError",
     "NotRunning",
     "QueueLimit",
@@ -87,6 +89,22 @@ class CheckFailed(GraphError):
         if len(errors) > _SHOWN:
             lines.append(f"  ... and {len(errors) - _SHOWN} more: graph.check() lists them all")
         super().__init__("\n".join([f"the graph has {count}:", *lines]))
+
+
+class MachineError(HfgError):
+    """What should be a state machine is none: a description, a dict or a region of a graph.
+
+    Attributes:
+      problems: every finding, errors first.
+    """
+
+    def __init__(self, sentence: str, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        count = "1 finding" if len(self.problems) == 1 else f"{len(self.problems)} findings"
+        lines = [f"  {problem}" for problem in self.problems[:_SHOWN]]
+        if len(self.problems) > _SHOWN:
+            lines.append(f"  ... and {len(self.problems) - _SHOWN} more: the error's problems hold them all")
+        super().__init__("\n".join([f"{sentence}, {count}:", *lines]))
 
 
 class UsageError(HfgError):

@@ -1,5 +1,13 @@
-"""The rules of activity, pure (rules A3-A6)."""
+"""Activity, pure: nothing here waits.
 
+rules          what a node becomes by what it takes, and what leaves it (A3-A6)
+fsm            StateMachine: a description, its words, what is wrong with one
+machine_dicts  machines from dicts          translation   a machine as a graph and back (A13)
+states         nodes that are states
+"""
+
+from hfg.activity.fsm import StateMachine, Transition
 from hfg.activity.rules import after_receipt, leaving
+from hfg.activity.states import StateNode
 
-__all__ = ["after_receipt", "leaving"]
+__all__ = ["StateMachine", "StateNode", "Transition", "after_receipt", "leaving"]

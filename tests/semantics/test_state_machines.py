@@ -10,80 +10,131 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hfg
+from hfg.activity import StateMachine, StateNode
 
-Machine = tuple[tuple[tuple[int, int], ...], frozenset[int]]  # per state where "a" and "b" lead; the final states
-
-
-class State(hfg.Node):
-    """A state of a machine over the letters a and b; which of them it answers is where its activity goes."""
-
-    a = hfg.Event()
-    b = hfg.Event()
-
-    @hfg.slot
-    def enter(self) -> None:
-        """Become active: the edge does that."""
-
-    @hfg.slot
-    def read(self, letter: str) -> None:
-        """Leave over the letter's edge."""
-        if self.active:
-            (self.a if letter == "a" else self.b).trigger()
-
-
-class Letters(hfg.Node):
-    """Tell every state the next letter, over edges that are not active."""
-
-    letter = hfg.Event(str)
+LETTERS = ("a", "b", "go home", "timeout", "ß.")  # the last three cannot be names of events of their own
 
 
 @st.composite
-def machines(draw: st.DrawFn) -> Machine:
-    """Deterministic and complete machines of up to five states; state 0 is the initial one."""
-    count = draw(st.integers(1, 5))
-    state = st.integers(0, count - 1)
-    return tuple(draw(st.tuples(state, state)) for _ in range(count)), draw(st.frozensets(state))
+def machines(draw: st.DrawFn) -> StateMachine:
+    """Draw deterministic machines of up to six states in which transitions may be missing."""
+    states = [f"s{number}" for number in range(draw(st.integers(1, 6)))]
+    letters = draw(st.lists(st.sampled_from(LETTERS), min_size=1, unique=True))
+    transitions = [
+        (letter, state, draw(st.sampled_from(states)))
+        for state in states
+        for letter in letters
+        if draw(st.integers(0, 4)) > 0
+    ]
+    return StateMachine(
+        states,
+        transitions,
+        initial=draw(st.sampled_from(states)),
+        final=draw(st.sets(st.sampled_from(states))),
+        missing=draw(st.sampled_from(["dead", "ignore"])),
+    )
 
 
-def translate(machine: Machine) -> tuple[hfg.Graph, Letters, list[State]]:
-    """Make a node of each state, an active edge of each transition; `start` is the edge into the initial state."""
-    transitions, _ = machine
-    graph = hfg.Graph("machine")
-    letters = graph.add(Letters())
-    states = [graph.add(State(), name=f"s{number}") for number in range(len(transitions))]
-    graph.start.activates(states[0].enter)
-    for state, (after_a, after_b) in zip(states, transitions, strict=True):
-        graph.connect(letters.letter, state.read)
-        state.a.activates(states[after_a].enter)
-        state.b.activates(states[after_b].enter)
-    return graph, letters, states
+words = st.lists(st.sampled_from([*LETTERS, "unheard"]), max_size=8)
+schedules = st.one_of(st.just(("fifo", None)), st.tuples(st.just("random"), st.integers(0, 2**31 - 1)))
 
 
-async def active_after_each(machine: Machine, word: Sequence[str], policy: str, seed: int) -> list[list[int]]:
-    """Feed the word letter by letter, each to quiet; give the active states before and after each."""
-    graph, letters, states = translate(machine)
-    async with hfg.running(graph, policy=policy, seed=seed) as run:
+async def active_states(
+    machine: StateMachine, word: Sequence[str], schedule: tuple[str, int | None], *, wait: bool
+) -> list[list[str]]:
+    """Feed a word to the machine's graph; give the active nodes before and after each letter, or at the end alone."""
+    graph = machine.graph()
+    policy, seed = schedule
+    async with hfg.running(graph, policy=policy, seed=seed) as run, run.feed(graph.inputs["letters"]) as feed:
         await run.wait_quiet()
-        seen = [[number for number, state in enumerate(states) if state.active]]
+        seen = [run.active()]
         for letter in word:
-            await run.trigger(letters.letter, letter)
-            await run.wait_quiet()
-            seen.append([number for number, state in enumerate(states) if state.active])
-        return seen
+            await feed.send(letter)
+            if wait:
+                await run.wait_quiet()
+                seen.append(run.active())
+        await run.wait_quiet()
+        return [*seen, run.active()]
+
+
+def accept_the_same(machine: StateMachine, word: Sequence[str], schedule: tuple[str, int | None]) -> None:
+    """One state is active after each letter, the machine's; letters that follow at once lead to the same state."""
+    expected = [machine.after(word[:length]) or "dead" for length in range(len(word) + 1)]
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        seen = runner.run(active_states(machine, word, schedule, wait=True))
+        assert seen == [[state] for state in [*expected, expected[-1]]]
+        assert machine.accepts(word) == (seen[-1][0] in machine.final)
+        in_haste = runner.run(active_states(machine, word, schedule, wait=False))
+        assert in_haste[-1] == seen[-1]
 
 
 @pytest.mark.rule("A13")
-@settings(max_examples=40, deadline=None)
-@given(machines(), st.lists(st.sampled_from("ab"), max_size=8), st.sampled_from(["fifo", "random"]), st.integers(0, 9))
-def test_a_machine_and_its_graph_accept_the_same_words_with_one_active_state_after_every_letter(
-    machine: Machine, word: list[str], policy: str, seed: int
+@settings(max_examples=200, deadline=None)
+@given(machines(), words, schedules)
+def test_a_machine_and_its_graph_accept_the_same_words_with_one_active_state_under_every_schedule(
+    machine: StateMachine, word: list[str], schedule: tuple[str, int | None]
 ) -> None:
-    transitions, final = machine
-    state, path = 0, [0]
-    for letter in word:
-        state = transitions[state]["ab".index(letter)]
-        path.append(state)
-    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
-        seen = runner.run(active_after_each(machine, word, policy, seed))
-    assert seen == [[one] for one in path]
-    assert (seen[-1][0] in final) == (state in final)
+    accept_the_same(machine, word, schedule)
+
+
+@pytest.mark.rule("A13")
+@settings(max_examples=100, deadline=None)
+@given(machines())
+def test_the_machine_can_be_read_out_of_its_graph(machine: StateMachine) -> None:
+    assert StateMachine.of(machine.graph()) == machine
+
+
+def test_states_of_ones_own_do_their_work_and_move_on_by_their_own_events() -> None:
+    told: list[str] = []
+
+    class Closed(StateNode):
+        push = hfg.Event()
+
+        def on_activated(self) -> None:
+            told.append(f"closed at {hfg.now():.0f} s")
+
+    class Open(hfg.Node):  # no `enter` and no `read`: it leaves by time alone
+        def on_activated(self) -> None:
+            told.append(f"open at {hfg.now():.0f} s")
+
+    class Visitor(hfg.Node):
+        gone = hfg.Event(str)
+
+        @hfg.slot
+        async def come(self) -> None:
+            for _ in range(2):
+                await asyncio.sleep(3)
+                self.gone.trigger("push")
+
+    door = hfg.StateMachine(
+        ["closed", "open"], [("push", "closed", "open"), ("timeout", "open", "closed")], initial="closed"
+    )
+    graph = hfg.Graph("door")
+    visitor = graph.add(Visitor())
+    opened = graph.add(Open(), name="ajar", active_for_s=2)
+    graph.connect(graph.start, visitor.come)
+    # The letter "timeout" is the automatic event of a node of one's own.
+    nodes = door.build(graph, letters=visitor.gone, nodes={"closed": Closed(), "open": opened})
+    assert [node.place and node.place.path for node in nodes.values()] == ["closed", "ajar"]
+    hfg.run(graph, clock="virtual")
+    assert told == ["closed at 0 s", "open at 3 s", "closed at 5 s", "open at 6 s", "closed at 8 s"]
+
+
+@pytest.mark.rule("A13")
+def test_signals_in_one_burst_are_read_one_after_the_other() -> None:
+    class Keyboard(hfg.Node):
+        typed = hfg.Event(str)
+
+        @hfg.slot
+        def type_all(self) -> None:
+            for letter in "abcabcab":
+                self.typed.trigger(letter)
+
+    ring = StateMachine(["x", "y", "z"], [("a", "x", "y"), ("b", "y", "z"), ("c", "z", "x")], initial="x", final=["z"])
+    graph = hfg.Graph()
+    keyboard = graph.add(Keyboard())
+    graph.connect(graph.start, keyboard.type_all)
+    ring.build(graph, letters=keyboard.typed)
+    for seed in range(20):
+        report = hfg.run(graph, clock="virtual", policy="random", seed=seed)
+        assert [path for path, node in report.nodes.items() if node.active] == ["z"]

@@ -1,0 +1,100 @@
+"""Nodes that are states of a machine: what a letter does to them, and a type for each set of letters.
+
+A state that nobody wrote has an event for each letter it knows. Such a type is made from its letters alone, so it can
+be found by name like any other: `hfg.activity.states:State[push,pull]`. Stands on node types; knows neither machines
+nor graphs.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from typing import Any, Final
+from urllib.parse import quote, unquote
+
+from hfg.declaration import RESERVED
+from hfg.functions import node
+from hfg.nodetype import Node
+from hfg.ports import Event, Parameter, slot
+
+__all__ = ["StateNode", "event_name", "letter_name", "one_by_one", "state_type"]
+
+_MANGLED: Final = "letter_"
+_OWN: Final = frozenset({"enter", "final", "missing", "read"})
+
+
+class StateNode(Node):
+    """A state: while it is active it answers a letter by the event of that name, and an active edge leads on.
+
+    Derive from it for states that do something: declare an event for each letter, and work in `on_activated` or in an
+    `enter` of your own.
+
+    Attributes:
+      enter: activity comes in here.
+      read: takes every letter; only an active state answers.
+      missing: answers letters that the state has no event for.
+      final: whether a word that ends here is accepted; for whoever reads the machine out of the graph.
+    """
+
+    missing = Event(str)
+    final = Parameter(False)
+
+    @slot
+    def enter(self) -> None:
+        """Become active: the edge does that."""
+
+    @slot
+    def read(self, letter: str) -> None:
+        """Answer a letter."""
+        if not self.active:
+            return
+        name = event_name(letter)
+        if name in self._type.events:
+            self.ports.events[name].trigger()
+        else:
+            self.missing.trigger(letter)
+
+
+@node
+def one_by_one(letter: str) -> str:
+    """Give letters on as data, so that each is read by all states before the next one comes.
+
+    Signals alone would not do: a letter could reach the state that is about to become active too early.
+    """
+    return letter
+
+
+def event_name(letter: str) -> str:
+    """Give the name of the event that answers a letter: itself, unless no event can be called that."""
+    can_be = letter.isidentifier() and not letter.startswith(("_", _MANGLED))
+    if can_be and letter not in RESERVED and letter not in _OWN:
+        return letter
+    return _MANGLED + "".join(one if one.isascii() and one.isalnum() else f"_{ord(one):x}_" for one in letter)
+
+
+def letter_name(event: str) -> str:
+    """Give the letter that an event answers; the inverse of `event_name`."""
+    if not event.startswith(_MANGLED):
+        return event
+    parts = event.removeprefix(_MANGLED).split("_")
+    return "".join(chr(int(part, 16)) if place % 2 else part for place, part in enumerate(parts))
+
+
+def state_type(letters: Iterable[str]) -> type[StateNode]:
+    """Give the type of states that know these letters; the same one for the same letters."""
+    return _state_type(tuple(dict.fromkeys(letters)))
+
+
+@functools.cache
+def _state_type(letters: tuple[str, ...]) -> type[StateNode]:
+    name = f"State[{','.join(quote(letter, safe='').replace('.', '%2E') for letter in letters)}]"
+    body: dict[str, Any] = {event_name(letter): Event() for letter in letters}
+    body |= {"__module__": __name__, "__qualname__": name, "__doc__": "A state of a machine."}
+    return type("State", (StateNode,), body)
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("State[") and name.endswith("]"):
+        inside = name.removeprefix("State[").removesuffix("]")
+        return state_type(unquote(letter) for letter in inside.split(",") if letter)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
