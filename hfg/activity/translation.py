@@ -55,7 +55,7 @@ def build(machine: StateMachine, graph: Graph, letters: Any, begin: Any, given: 
 
 
 def _state(machine: StateMachine, graph: Graph, state: str, letters: list[str], given: Node | None) -> Node:
-    if given is not None and given.place is not None:
+    if given is not None and given._place is not None:
         return given
     return graph.add(state_type(letters)(final=state in machine.final) if given is None else given, name=state)
 
@@ -109,8 +109,8 @@ def _unfit(
             yield error(
                 f"nodes[{state!r}]", f"got {node!r:.80}", "a state is a node", "make one: nodes={...: Closed()}"
             )
-        elif node.place is not None and node.place.graph is not graph:
-            where = node.place.graph._title
+        elif node._place is not None and node._place.graph is not graph:
+            where = node._place.graph._title
             yield error(
                 f"nodes[{state!r}]", f"it is in {where}", f"the machine comes into {graph._title}", "make another"
             )
@@ -170,7 +170,7 @@ def _members(flat: FlatGraph, graph: Graph, nodes: Iterable[Node | str] | None) 
         return {node.index for node in flat.nodes if node.index in ends or isinstance(node.node, StateNode)}
     wanted = [graph[one] if isinstance(one, str) else one for one in nodes]
     for one in wanted:
-        if not isinstance(one, Node) or one.place is None or one.place.graph._root is not graph:
+        if not isinstance(one, Node) or one._place is None or one._place.graph._root is not graph:
             raise GraphError(f"a region is nodes of {graph._title}, got {one!r}; name nodes, or their paths")
     members = {node.index for node in flat.nodes if node.node in wanted}
     for scope in flat.scopes:

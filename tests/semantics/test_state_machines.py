@@ -115,7 +115,7 @@ def test_states_of_ones_own_do_their_work_and_move_on_by_their_own_events() -> N
     graph.connect(graph.start, visitor.come)
     # The letter "timeout" is the automatic event of a node of one's own.
     nodes = door.build(graph, letters=visitor.gone, nodes={"closed": Closed(), "open": opened})
-    assert [node.place and node.place.path for node in nodes.values()] == ["closed", "ajar"]
+    assert [node.place.path for node in nodes.values()] == ["closed", "ajar"]
     hfg.run(graph, clock="virtual")
     assert told == ["closed at 0 s", "open at 3 s", "closed at 5 s", "open at 6 s", "closed at 8 s"]
 
