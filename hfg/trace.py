@@ -94,14 +94,14 @@ class CallEnded(TraceEvent, frozen=True):
     outcome: Literal["done", "failed", "abandoned"]
 
 
-class TokenSent(TraceEvent, frozen=True):
+class TokenSent(TraceEvent, frozen=True, gc=False):
     """A token, marker or not, was put on an edge and took the edge's next number."""
 
     edge: str
     token: Token[Any]
 
 
-class TokenTaken(TraceEvent, frozen=True):
+class TokenTaken(TraceEvent, frozen=True, gc=False):
     """A firing or call removed the token from its edge."""
 
     edge: str
@@ -114,7 +114,7 @@ class TokenProcessed(TraceEvent, frozen=True):
     edge: str
 
 
-class TokenDropped(TraceEvent, frozen=True):
+class TokenDropped(TraceEvent, frozen=True, gc=False):
     """A token was discarded and counted: "overflow" (P5), "disabled" (F10), "ended" (F4), "removed" (R4).
 
     "stopped" (left when the run ended).
@@ -125,14 +125,14 @@ class TokenDropped(TraceEvent, frozen=True):
     reason: Literal["overflow", "disabled", "ended", "removed", "stopped"]
 
 
-class TokenDrained(TraceEvent, frozen=True):
+class TokenDrained(TraceEvent, frozen=True, gc=False):
     """A token for a node that has ended was processed at once (F12); a marker into a slot likewise (T4)."""
 
     edge: str
     token: Token[Any]
 
 
-class EventTriggered(TraceEvent, frozen=True):
+class EventTriggered(TraceEvent, frozen=True, gc=False):
     """An event was triggered; the token is the signal before any edge gave it a number."""
 
     event: str

@@ -8,6 +8,7 @@ Which module stands on which; imports go down only:
     upstairs    ties the deciding modules together
     iteration   plan  ports  rx                carrier  virtual  watchdog  report
     steps       short ways for common shapes   quiet       growing, ending, stalling
+    watched     the same while somebody looks  consumers   who listens to the trace
     errors      what a failure brings          activity    what a change of A(v) brings
     firing      what a node does next          builtin_slots  subgraphs  lifecycle
     wiring      which edges are live

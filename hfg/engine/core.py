@@ -8,15 +8,17 @@ are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asy
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import CoroutineType
 from typing import Any, Protocol
 
 from hfg.engine.scopes import Scope
 from hfg.engine.worker import Worker
 from hfg.errors import HfgError
 from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
+from hfg.token import Token
 from hfg.trace import TraceEvent
 
-__all__ = ["PENDING", "Core", "Host", "Timer", "Upstairs"]
+__all__ = ["OF_ITS_OWN_KIND", "PENDING", "Core", "Host", "Timer", "Upstairs"]
 
 
 class _Pending:
@@ -26,6 +28,10 @@ class _Pending:
 
 PENDING = _Pending()
 """What an executor returns for code that waits: its result comes later."""
+
+
+OF_ITS_OWN_KIND = frozenset({type(None), Token, CoroutineType})
+"""Types of results that do not simply leave: silence, a token passed on, code that is still to be awaited."""
 
 
 class Timer(Protocol):

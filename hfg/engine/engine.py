@@ -18,6 +18,7 @@ from typing import Any
 from hfg.clock import current_clock
 from hfg.engine import plan, quiet, rx, steps
 from hfg.engine.code import CodeRunner, answer
+from hfg.engine.consumers import Consumers
 from hfg.engine.core import Core
 from hfg.engine.groups import Dispatching, Group, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.lifetime import Lifetime
@@ -78,6 +79,8 @@ class Engine:
 
     Attributes:
       core: the state the deciding modules work on.
+      epoch: what the run's clock is ahead of the machine's monotonic one; None: it follows another.
+      consumers: who listens to the trace.
       finished: done when the run is over and torn down; its result is the outcome, its exception what went wrong.
       holds: people outside who may still bring something (R5).
       readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
@@ -89,10 +92,12 @@ class Engine:
         self.settings = settings
         self.virtual = isinstance(self.loop, VirtualTimeLoop)
         self._epoch = 0.0 if self.virtual else time.time() - self.loop.time()
+        standard = type(self.loop).time is asyncio.BaseEventLoop.time
+        self.epoch = self._epoch if standard else None
         self.context = contextvars.copy_context()
         self.context.run(current_clock.set, self.now)
         self.core: Core = Core(self, Deciders())
-        self._consumers: list[Callable[[TraceEvent], None]] = []
+        self.consumers = Consumers(self._listen, self)
         self.core.debug = settings.debug
         self.core.fast = settings.fast
         self.flat = flat
@@ -128,7 +133,7 @@ class Engine:
         self._instant_steps = 0
         plan.build(self.core, flat, self.groups, loop=self._loop_group)
         if settings.trace is not None:
-            self.add_consumer(settings.trace)
+            self.consumers.add(settings.trace)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -417,45 +422,11 @@ class Engine:
 
     # --- the trace --------------------------------------------------------------------------------------------------
 
-    def add_consumer(self, consumer: Callable[[TraceEvent], None]) -> Callable[[], None]:
-        """Let a consumer see every event from now on.
-
-        Gives back what removes it. One that raises is logged and removed (R7).
-        """
-
-        def guarded(event: TraceEvent) -> None:
-            try:
-                consumer(event)
-            except Exception:
-                _LOGGER.exception("a consumer of the trace failed and was removed")
-                remove()
-
-        def remove() -> None:
-            if guarded in self._consumers:
-                self._consumers.remove(guarded)
-                self._listen()
-
-        self._consumers.append(guarded)
-        self._listen()
-        return remove
-
-    def _listen(self) -> None:
-        """Nobody listens: nothing is built (R7). One: it is called. Several: one after the other."""
-        consumers = tuple(self._consumers)
+    def _listen(self, take: Callable[[TraceEvent], None] | None) -> None:
+        """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""
         core = self.core
-        before = core.trace
-        if not consumers:
-            core.trace = None
-        elif len(consumers) == 1:
-            core.trace = consumers[0]
-        else:
-
-            def tell(event: TraceEvent) -> None:
-                for consumer in consumers:
-                    consumer(event)
-
-            core.trace = tell
-        core.plain = core.pumping and core.trace is None
-        if core.started and (before is None) != (core.trace is None):
+        core.trace = take
+        core.plain = core.pumping and take is None
+        if core.started:
             for worker in core.workers:
                 steps.choose(worker)

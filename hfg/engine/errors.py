@@ -13,9 +13,9 @@ from hfg.engine.modifiers import automatic, report_error
 from hfg.engine.sending import flush_automatic, put_outputs
 from hfg.engine.worker import BACKOFF, Worker
 from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import EventEdge, SyncEdge
 
-__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "operator_failed", "time_out"]
+__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "fail_taken", "operator_failed", "time_out"]
 
 
 def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
@@ -37,6 +37,14 @@ def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> No
         return
     worker.failed += 1
     apply_policy(worker, as_node_error(worker, what, error), answer=answer)
+
+
+def fail_taken(worker: Worker, stamp: float, taken: tuple[SyncEdge, ...], error: BaseException) -> None:
+    """The function of a short step raised: the firing is one like any other from here."""
+    worker.busy = "firing"
+    worker.stamp = stamp
+    worker.taken = taken
+    fail(worker, f"firing {worker.firings}", error, answer=True)
 
 
 def fail_call(worker: Worker, slot: str, error: BaseException) -> None:

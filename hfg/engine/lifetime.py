@@ -188,6 +188,7 @@ class Lifetime:
         engine.ended_how = (outcome, error)
         if core.trace is not None:
             core.trace(RunEnded(engine.now(), outcome))
+        await engine.consumers.end()
 
     def _let_go(self) -> None:
         """Whatever happened: nothing of the run goes on, and the graph is free."""

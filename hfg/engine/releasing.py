@@ -5,7 +5,7 @@ Stands on `sending`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from hfg.engine.agenda import consider, freed
@@ -13,9 +13,9 @@ from hfg.engine.sending import send_end
 from hfg.engine.worker import Worker
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import Token
-from hfg.trace import TokenProcessed, TokenTaken
+from hfg.trace import TokenProcessed, TokenTaken, TraceEvent
 
-__all__ = ["outputs_free", "release", "take_from_reader"]
+__all__ = ["outputs_done", "outputs_free", "release", "take_from_reader"]
 
 
 def release(edges: Sequence[Any]) -> None:
@@ -52,6 +52,32 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
     else:
         consider(worker)
     return released
+
+
+def outputs_done(worker: Worker, trace: Callable[[TraceEvent], None] | None = None, time: float = 0.0) -> None:
+    """All its tokens are processed: the short form of `release`, up a chain; `trace` hears of it, at `time`."""
+    while True:
+        if worker.outputs.waiters is not None or worker.pending_end or len(worker.taken) > 1:
+            release(outputs_free(worker))
+            return
+        upstream: Any = None
+        if worker.held:
+            worker.held = False
+            taken = worker.taken
+            if taken and taken[0].sequential:
+                upstream = taken[0]
+        if not worker.inputs.missing and not worker.blocked and not worker.placed:
+            consider(worker)
+        if upstream is None or not upstream.held:
+            return
+        upstream.held = False
+        if trace is not None:
+            trace(TokenProcessed(time, upstream.label))
+        worker = upstream.source
+        outputs = worker.outputs
+        outputs.missing -= 1
+        if outputs.missing:
+            return
 
 
 def take_from_reader(worker: Worker) -> Token[Any]:

@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 from hfg.engine import outside, relays
 from hfg.engine.code import answer
+from hfg.engine.consumers import Listener
 from hfg.engine.engine import Engine
 from hfg.engine.interrupt import CtrlC
 from hfg.engine.report import Report, edge_reports, node_reports
@@ -155,9 +156,19 @@ class Run:
         finally:
             remove()
 
-    def trace(self, consumer: Callable[[TraceEvent], None]) -> Callable[[], None]:
-        """Let a consumer see every event of the run from now on (R7); gives back what removes it."""
-        return self._engine.add_consumer(consumer)
+    def trace(self, consumer: Any, *, size: int | None = None) -> Listener:
+        """Let a consumer see every event of the run from now on (R7); gives back what removes it.
+
+        Args:
+          consumer: a function that takes an event, called at once and on the loop, so let it be quick; or a list.
+            One that raises is logged and removed, and the run goes on.
+          size: the events that a buffer of its own holds; the function is then called on a thread of its own. An async
+            function has a task and a buffer in any case. Whoever is too slow loses the oldest, counted as `lost`.
+
+        Raises:
+          UsageError: it cannot take events.
+        """
+        return self._engine.consumers.add(consumer, size)
 
     def set(self, parameter: Any, value: Any) -> None:
         """Set a parameter of a node between its firings (P8).

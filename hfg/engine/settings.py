@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from hfg.engine.consumers import check_consumer
 from hfg.errors import UsageError
 from hfg.trace import TraceEvent
 
@@ -34,8 +35,8 @@ class Settings:
             raise UsageError(f"until_s must be seconds from 0 on, or None for no end, got {until_s!r}")
         if not _seconds(block_warning_s):
             raise UsageError(f"block_warning_s must be seconds, or 0 for never, got {block_warning_s!r}")
-        if trace is not None and not callable(trace):
-            raise UsageError(f"trace must be a function that takes each event of the run, got {trace!r}")
+        if trace is not None:
+            check_consumer(trace)
         if seed is not None and type(seed) is not int:
             raise UsageError(f"seed must be a whole number, got {seed!r}")
         self.debug = debug

@@ -14,11 +14,11 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
-from hfg.engine import ending, errors, firing
+from hfg.engine import ending, errors, firing, watched
 from hfg.engine.agenda import block, consider, freed
-from hfg.engine.core import PENDING
+from hfg.engine.core import OF_ITS_OWN_KIND, PENDING
 from hfg.engine.modifiers import derive_scopes, touch
-from hfg.engine.releasing import outputs_free, release
+from hfg.engine.releasing import outputs_done, release
 from hfg.engine.sending import flush_automatic, trigger
 from hfg.engine.worker import CALLS_BLOCKED, FULL, RunningEvent, Worker
 from hfg.errors import EndOfStream
@@ -28,9 +28,6 @@ from hfg.token import Token
 __all__ = ["choose", "emitter"]
 
 Step = Callable[[Worker], None]
-
-_OF_ITS_OWN_KIND = frozenset({type(None), Token, CoroutineType})
-"""Types of results that do not simply leave: silence, a token passed on, code that is still to be awaited."""
 
 
 def choose(worker: Worker) -> None:
@@ -42,12 +39,13 @@ def choose(worker: Worker) -> None:
     worker.step = firing.step
     if worker.iteration is None and core.inside is not None:
         worker.step = core.inside.step
-    if not core.fast or core.trace is not None or core.debug or worker.options is None or worker.group.threaded:
+    if not core.fast or core.debug or worker.options is None or worker.group.threaded:
         return
     if worker.gates_over or worker.iteration is not None or worker.ready_hook is not None or worker.observed:
         return
     if worker.on_idle is not None:
         return
+    traced = core.trace is not None
     options = worker.options
     if (
         options.max_rate_hz
@@ -58,7 +56,8 @@ def choose(worker: Worker) -> None:
     ):
         return
     if worker.slot_edges and not worker.in_edges and not worker.is_source:
-        worker.step = _calls_step(worker)
+        if not traced:
+            worker.step = _calls_step(worker)
         return
     if worker.slot_edges or "processed" in worker.events:
         return
@@ -71,7 +70,7 @@ def choose(worker: Worker) -> None:
         return
     if worker.is_source:
         if worker.type.process_kind == "generator" and len(outs) == 1 and worker.process is not None:
-            worker.step = _generator_step(worker, outs[0])
+            worker.step = watched.generator_step(worker, outs[0]) if traced else _generator_step(worker, outs[0])
         return
     if (
         len(worker.in_edges) == 1
@@ -86,8 +85,12 @@ def choose(worker: Worker) -> None:
             and edge.mandatory
             and worker.type.process_kind in ("function", "async")
         ):
-            make = _async_step if worker.is_async else _through_step
-            worker.step = make(worker, edge, outs[0] if outs else None)
+            given = outs[0] if outs else None
+            if not worker.is_async:
+                make = watched.through_step if traced or worker.meter is not None else _through_step
+                worker.step = make(worker, edge, given)
+            elif not traced:
+                worker.step = _async_step(worker, edge, given)
 
 
 def _leave_lying(worker: Worker) -> None:
@@ -118,7 +121,7 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
     target_outputs: Any = target.outputs if given is not None else None
     carries = given is not None and given.active
     only = (taken,)
-    of_its_own_kind = _OF_ITS_OWN_KIND
+    of_its_own_kind = OF_ITS_OWN_KIND
 
     def step(worker: Worker) -> None:
         if worker.special or not worker.placed or inputs.missing or worker.busy:
@@ -139,7 +142,7 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
         try:
             result = process(token.value)
         except Exception as error:
-            _failed(worker, token.stamp, only, error)
+            errors.fail_taken(worker, token.stamp, only, error)
             return
         if not silent_code:
             if worker.written is not None or worker.right:
@@ -158,7 +161,7 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
             taken.held = False
             producer_outputs.missing = missing = producer_outputs.missing - 1
             if not missing:
-                _outputs_done(producer)
+                outputs_done(producer)
             return
         if type(result) in of_its_own_kind:
             worker.busy = "firing"
@@ -192,14 +195,6 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
     return step
 
 
-def _failed(worker: Worker, stamp: float, taken: tuple[SyncEdge, ...], error: BaseException) -> None:
-    """The function of a short step raised: the firing is one like any other from here (X1)."""
-    worker.busy = "firing"
-    worker.stamp = stamp
-    worker.taken = taken
-    errors.fail(worker, f"firing {worker.firings}", error, answer=True)
-
-
 def _async_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step:
     """The same for an async function: it starts at once, and what it gives back leaves by the same short way.
 
@@ -223,7 +218,7 @@ def _async_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step
             return
         if (
             given is None
-            or type(result) in _OF_ITS_OWN_KIND
+            or type(result) in OF_ITS_OWN_KIND
             or worker.step is not step  # somebody has begun to watch, or the wiring has changed
             or worker.written is not None
             or worker.right
@@ -280,30 +275,6 @@ def _async_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step
     return step
 
 
-def _outputs_done(worker: Worker) -> None:
-    """All its tokens are processed: the short form of `sending.release`, up a chain and without recursion."""
-    while True:
-        if worker.outputs.waiters is not None or worker.pending_end or len(worker.taken) > 1:
-            release(outputs_free(worker))
-            return
-        upstream: Any = None
-        if worker.held:
-            worker.held = False
-            taken = worker.taken
-            if taken and taken[0].sequential:
-                upstream = taken[0]
-        if not worker.inputs.missing and not worker.blocked and not worker.placed:
-            consider(worker)
-        if upstream is None or not upstream.held:
-            return
-        upstream.held = False
-        worker = upstream.source
-        outputs = worker.outputs
-        outputs.missing -= 1
-        if outputs.missing:
-            return
-
-
 def _generator_step(worker: Worker, given: SyncEdge) -> Step:
     """A generator with one output edge."""
     core = worker.core
@@ -315,7 +286,7 @@ def _generator_step(worker: Worker, given: SyncEdge) -> Step:
     general = firing.step
     now = core.now
     carries = given.active
-    of_its_own_kind = _OF_ITS_OWN_KIND
+    of_its_own_kind = OF_ITS_OWN_KIND
 
     def step(worker: Worker) -> None:
         if not worker.placed or worker.special or worker.busy or (worker.active and carries):

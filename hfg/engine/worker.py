@@ -133,6 +133,7 @@ class Worker:
         "limit_timer",
         "live_inputs",
         "mandatory_ports",
+        "meter",
         "next_start",
         "node",
         "observed",
@@ -233,6 +234,7 @@ class Worker:
         self.ready_hook: Callable[[], Any] | None = None
         self.has_hooks = False
         self.iteration: Any = None
+        self.meter: Any = None  # measures its code while somebody wants statistics
 
         # state of the run
         self.active = False
