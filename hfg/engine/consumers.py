@@ -87,7 +87,7 @@ class Listener:
     def failed(self, error: Exception) -> None:
         """It raised: it is logged and removed, and the run goes on (R7)."""
         self.error = error
-        _LOGGER.error("consumer %r of the trace failed and was removed", self.consumer, exc_info=error)
+        _LOGGER.error("a consumer of the trace failed and was removed", exc_info=error)
         self.remove()
 
     async def end(self) -> None:
