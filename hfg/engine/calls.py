@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import CoroutineType
 from typing import Any
 
 from hfg.engine import builtin_slots
@@ -13,7 +14,7 @@ from hfg.engine.worker import Worker
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.trace import CallEnded, CallStarted, ParameterSet, TokenTaken
 
-__all__ = ["await_call", "call", "finish_call", "set_parameter"]
+__all__ = ["await_call", "call", "finish_call", "refuse_coroutine", "set_parameter"]
 
 
 def call(worker: Worker) -> None:
@@ -56,9 +57,14 @@ def call(worker: Worker) -> None:
         return
     ticket = worker.ticket
 
-    def done(_result: Any, error: BaseException | None) -> None:
+    def done(result: Any, error: BaseException | None) -> None:
         if worker.ticket != ticket:
             return
+        if type(result) is CoroutineType:
+            if not worker.group.threaded:
+                await_call(worker, name, result)
+                return
+            error = refuse_coroutine(worker, result)
         if error is None:
             finish_call(worker, "done")
         else:
@@ -77,6 +83,15 @@ def await_call(worker: Worker, name: str, coroutine: Any) -> None:
             worker.core.upstairs.fail_call(worker, name, error)
 
     worker.core.host.drive(worker, coroutine, done)
+
+
+def refuse_coroutine(worker: Worker, coroutine: Any) -> TypeError:
+    """Close what came from a thread, where nothing can await it, and say what to do."""
+    coroutine.close()
+    return TypeError(
+        f'it gave back a coroutine, but its group "{worker.group.name}" is a thread and async code runs on the loop; '
+        "write `async def` and leave out group="
+    )
 
 
 def finish_call(worker: Worker, outcome: Any) -> None:

@@ -69,6 +69,8 @@ def drain_left(edge: Any) -> None:
 def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     core = worker.core
     worker.busy = "firing"
+    if error is None and result is not None:
+        error = TypeError(f"end() gave back {result!r:.80}, but it writes with send(): self.out.send(...)")
     if error is not None:
         worker.written = None
         worker.core.upstairs.fail(worker, "end()", error, answer=False)

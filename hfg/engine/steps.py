@@ -121,9 +121,10 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
     target_outputs: Any = target.outputs if given is not None else None
     carries = given is not None and given.active
     only = (taken,)
-    of_its_own_kind = OF_ITS_OWN_KIND
+    plain: Any = None  # the type of the last result that simply left
 
     def step(worker: Worker) -> None:
+        nonlocal plain
         if worker.special or not worker.placed or inputs.missing or worker.busy:
             general(worker)
             return
@@ -163,12 +164,14 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
             if not missing:
                 outputs_done(producer)
             return
-        if type(result) in of_its_own_kind:
-            worker.busy = "firing"
-            worker.stamp = token.stamp
-            worker.taken = only
-            firing.complete_firing(worker, result)
-            return
+        if type(result) is not plain:  # one look for all results of the same type
+            if type(result) in OF_ITS_OWN_KIND:
+                worker.busy = "firing"
+                worker.stamp = token.stamp
+                worker.taken = only
+                firing.complete_firing(worker, result)
+                return
+            plain = type(result)
         given.sent = number = given.sent + 1
         if carries and worker.active:
             worker.active = node._active = False
