@@ -265,6 +265,7 @@ class _Edges:
                 what="a gate names a node that is not beside it",
                 why="a gate does not reach into or out of a subgraph that iterates (rules A11, G4)",
                 remedy="gate nodes on the same side",
+                check="gate-border",
             )
         )
 
@@ -282,6 +283,7 @@ class _Edges:
                 what=f"what comes over {edge.label} goes round through ports of subgraphs for ever",
                 why="no node lies on the way that would take it (rule G1)",
                 remedy="remove one of the edges between the subgraphs' ports, or put a node on the way",
+                check="relay-ring",
             )
         )
 
@@ -293,5 +295,6 @@ class _Edges:
                 what=f'an edge to or from "{port.path}" crosses the border of a subgraph that iterates',
                 why="only inputs, outputs and parameters do (rule G4)",
                 remedy="take the edge out, or iterate_over",
+                check="iteration-border",
             )
         )

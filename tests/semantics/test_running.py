@@ -113,7 +113,7 @@ def test_async_code_in_a_thread_group_is_refused_with_the_remedy() -> None:
     graph = hfg.Graph()
     graph.group("work", threads=1)
     graph.connect(graph.add(numbers()).out, graph.add(forward_later(), group="work").value)
-    with pytest.raises(hfg.errors.GraphError, match=r'"forward_later" is async, but its group "work" is a thread'):
+    with pytest.raises(hfg.errors.GraphError, match=r'"forward_later": it is async, but its group "work" is a thread'):
         run(graph)
 
 
