@@ -265,13 +265,11 @@ class Firing(RunningCode):
         index = station.leaf.index
         if not flight.void and (outcome != "ended" or flight.writes):
             self.send(index, self.shipments(flight, silent=outcome not in ("done", "ended")), flight)
-        self.flush_changes(station)
         if outcome == "done":
-            self.trigger(index, "processed")
-            self.flush_changes(station)
+            station.changes.append((self.next_tick(), "processed", None))
         if failure is not None:
-            self.trigger(index, "failed", failure)
-            self.flush_changes(station)
+            station.changes.append((self.next_tick(), "failed", failure))
+        self.flush_changes(station)
         if flight.void and outcome == "done":
             outcome = "abandoned"
         self.observe(FiringEnded(self.now, station.path, flight.number, outcome))

@@ -565,7 +565,7 @@ class ReferenceMachine(Calling):
             if station.active:
                 station.active = station.node._active = False
                 station.active_since = None
-                station.changes.append((self.next_tick(), "deactivated"))
+                station.changes.append((self.next_tick(), "deactivated", None))
                 self.observe(ActivityChanged(self.now, station.path, False, "reset"))
         self.settle()
         self.trigger(ROOT, "start", activity=1)

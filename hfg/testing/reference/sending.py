@@ -174,7 +174,8 @@ class Sending(State):
         station.active = station.node._active = active
         station.active_since = self.now if active else None
         self.observe(ActivityChanged(self.now, station.path, active, cause))
-        station.changes.append((self.next_tick(), "activated" if active else "deactivated"))
+        station.changes.append((self.next_tick(), "activated" if active else "deactivated", None))
+        self.note_places(gated=True)  # a gate that opens gives a place at once
         hook = station.node._hook("on_activated" if active else "on_deactivated")
         if hook is not None:
             self.run_hook(station, hook)
@@ -197,7 +198,8 @@ class Sending(State):
     def flush_changes(self, station: Station) -> None:
         """Send the automatic events that arose, each a sending of its own: +1 only if the node is active right then."""
         while station.changes:
-            self.trigger(station.leaf.index, station.changes.pop(0)[1])
+            _, name, value = station.changes.pop(0)
+            self.trigger(station.leaf.index, name, value)
 
     # --- discarding
 
@@ -312,8 +314,9 @@ class Sending(State):
         """Automatic events of changes outside a firing or call; then those of subgraphs (G2)."""
         waiting = [station for station in self.stations if station.changes and station.flight is None]
         if waiting:
-            first = min(waiting, key=lambda station: station.changes[0])
-            self.trigger(first.leaf.index, first.changes.pop(0)[1])
+            first = min(waiting, key=lambda station: station.changes[0][0])
+            _, name, value = first.changes.pop(0)
+            self.trigger(first.leaf.index, name, value)
             return True
         for box in self.structure.boxes:
             active = self.is_active(-2 - box.index)
@@ -332,9 +335,16 @@ class Sending(State):
         """Whether a source works for ended nodes only (R5)."""
         raise NotImplementedError
 
-    def note_places(self) -> None:
-        """Give a place to each node that has become enabled for a firing, and take it from those that are not (F9)."""
+    def note_places(self, *, gated: bool = False) -> None:
+        """Give a place to each node that has become enabled for a firing, and take it from those that are not (F9).
+
+        Args:
+          gated: look only at those that a gate is set on.
+        """
+        behind = {index for gate in self.structure.gates for index in gate.targets}
         for station in self.stations:
+            if gated and station.leaf.index not in behind:
+                continue
             if not self.may_fire(station.leaf.index):
                 station.place = None
             elif station.place is None:

@@ -99,7 +99,7 @@ class Station:
     resting_until: float | None = None  # the back-off of a restart
     restarts: int = 0
     iterator: Any = None
-    changes: list[tuple[int, str]] = field(default_factory=list)  # automatic events that arose, when, and were not sent
+    changes: list[tuple[int, str, Any]] = field(default_factory=list)  # automatic events that arose: when, which, value
     active_since: float | None = None  # None: not active, or its time-out is over
     drained_modifiers: list[int] = field(default_factory=list)  # wait until the own END is sent (F12)
     stamp: float = 0.0  # of the firing in which it ended
