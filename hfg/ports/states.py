@@ -18,7 +18,16 @@ class State(Generic[T]):
 
     Args:
       default: its value at the start of every run; a copy each time, so that a list is no trap.
-      factory: makes that value instead.
+      factory: makes that value instead. Written with what it holds, `hfg.State(factory=list[int])`, the field needs no
+        annotation; a bare `list` does not tell a type checker that.
+
+    Example:
+      >>> import hfg
+      >>> class Seen(hfg.Node):
+      ...     names = hfg.State(factory=dict[str, int])
+      ...     total = hfg.State(0)
+      >>> Seen().names
+      {}
     """
 
     @overload
@@ -30,7 +39,7 @@ class State(Generic[T]):
             default += (named.pop("default"),)
         if named or len(default) + (factory is not None) != 1:
             raise DeclarationError(
-                "hfg.State takes either one default or factory=: write hfg.State(0) or hfg.State(factory=list)"
+                "hfg.State takes either one default or factory=: write hfg.State(0) or hfg.State(factory=list[int])"
             )
         self.default = default
         self.factory = factory

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import AsyncIterator, Iterator
 from typing import Annotated, Any, NamedTuple, TypeVar, assert_type
 
@@ -101,6 +102,9 @@ class MapLookup(hfg.Node):
     mode = hfg.Parameter("fast", choices=("fast", "good"))
     total = hfg.State(0)
     seen = hfg.State[list[int]](factory=list)
+    names_seen = hfg.State(factory=dict[str, int])
+    newest = hfg.State(factory=lambda: deque[int](maxlen=3))
+    last = hfg.State[int | None](None)
 
     def setup(self) -> None:
         self.total += 1
@@ -139,6 +143,9 @@ assert_type(lookup.names, tuple[str, ...])
 assert_type(lookup.mode, str)
 assert_type(lookup.total, int)
 assert_type(lookup.seen, list[int])
+assert_type(lookup.names_seen, dict[str, int])
+assert_type(lookup.newest, deque[int])
+assert_type(lookup.last, int | None)
 assert_type(lookup.forget, SlotPort[int])
 assert_type(lookup.look, SlotPort[str])
 assert_type(lookup.wake, SlotPort[object])
