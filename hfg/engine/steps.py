@@ -16,6 +16,7 @@ from typing import Any
 
 from hfg.engine import ending, errors, firing, watched
 from hfg.engine.agenda import block, consider, freed
+from hfg.engine.calls import await_call
 from hfg.engine.core import OF_ITS_OWN_KIND, PENDING
 from hfg.engine.modifiers import derive_scopes, touch
 from hfg.engine.releasing import outputs_done, release
@@ -384,7 +385,7 @@ def _call_step(worker: Worker, edge: EventEdge) -> Step:
             return
         if result is not None and type(result) is CoroutineType:
             _call_taken(worker, edge)
-            calls.await_call(worker, edge.port_name, result)
+            await_call(worker, edge.port_name, result)
             return
         worker.stamp = None
         worker.right = False

@@ -226,3 +226,37 @@ def test_the_time_limit_of_a_firing_goes_before_limits_inside_it(fast: bool) -> 
     report = run(graph, fast)
     assert sink.values == ["2 slept"]
     assert report.nodes["with_timeout"].failed == 2
+
+
+class Delegates(hfg.Node):
+    """A plain handler that gives back the coroutine of an async one."""
+
+    heard = hfg.State(factory=list[int])
+
+    @hfg.slot
+    def hear(self, value: int) -> Any:
+        return self._hear(value)
+
+    async def _hear(self, value: int) -> None:
+        await asyncio.sleep(0.1)
+        self.heard.append(value)
+
+
+class Speaks(hfg.Node):
+    """Tells at once."""
+
+    said = hfg.Event(int)
+
+    def process(self, value: int) -> None:
+        self.said.trigger(value)
+
+
+@pytest.mark.rule("F9", "R1")
+def test_a_handler_that_gives_back_a_coroutine_is_awaited_before_the_next_call(fast: bool) -> None:
+    graph = hfg.Graph()
+    speaks, node = graph.add(Speaks()), graph.add(Delegates())
+    graph.connect(graph.add(numbers(count=3)).out, speaks.value)
+    graph.connect(speaks.said, node.hear)
+    report = run(graph, fast)
+    assert node.heard == [1, 2, 3]
+    assert report.duration_s == pytest.approx(0.3)
