@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import sys
+import traceback
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hfg.cli import show
 from hfg.cli.target import load_graph
+from hfg.errors import HfgError, TargetError
+from hfg.graph import Graph
+from hfg.graph.refusals import keep_refusals, problem_of
+from hfg.problem import SEVERITIES, Problem
 
 __all__ = ["check"]
 
@@ -20,17 +26,46 @@ def check(
 ) -> int:
     """Look for mistakes in a graph without running it; exit code 1 if there are errors."""
     show.set_debug(debug)
-    graph = load_graph(target)
-    problems = graph.check()
-    errors = sum(problem.severity == "error" for problem in problems)
+    graph: Graph | None = None
+    with keep_refusals() as problems:
+        try:
+            graph = load_graph(target)
+        except TargetError as error:
+            if not isinstance(error.__cause__, Exception):
+                raise  # there is no such target: nothing was looked at
+            show.user_traceback(error.__cause__)
+            problems.append(_unbuilt(target, error, error.__cause__))
+    if graph is not None:
+        refused = {problem.path.rpartition(" -> ")[2] for problem in problems}  # what follows from that is no news
+        found = graph.check()
+        problems += [one for one in found if not (one.check == "unconnected-input" and one.path in refused)]
+    counts = {severity: sum(problem.severity == severity for problem in problems) for severity in SEVERITIES}
     if json:
         show.json(problems)
     else:
         for problem in problems:
-            sys.stdout.write(f"{problem}\n")
-        warnings = len(problems) - errors
-        sys.stdout.write(f'graph "{graph.name}": {_count(errors, "error")}, {_count(warnings, "warning")}\n')
-    return 1 if errors else 0
+            sys.stdout.write(f"{problem} [{problem.check}]\n")
+        name = target if graph is None else f'graph "{graph.name}"'
+        sys.stdout.write(f"{name}: {_count(counts['error'], 'error')}, {_count(counts['warning'], 'warning')}")
+        sys.stdout.write(f", {_count(counts['hint'], 'hint')}\n" if counts["hint"] else "\n")
+    return 1 if counts["error"] else 0
+
+
+def _unbuilt(target: str, error: TargetError, cause: Exception) -> Problem:
+    """The code that builds the graph failed: what can be said of it."""
+    why = "so the graph is not there to be checked"
+    if isinstance(cause, HfgError):
+        return problem_of(cause, target, why)
+    frames = [frame for frame in traceback.extract_tb(cause.__traceback__) if Path(frame.filename).exists()]
+    where = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
+    return Problem(
+        path=target,
+        severity="error",
+        what=str(error),
+        why=why,
+        remedy=f"mend the code that builds it{where}",
+        check="not-built",
+    )
 
 
 def _count(number: int, what: str) -> str:

@@ -7,9 +7,10 @@
     naming      names and paths
     boundary    the ports of the whole graph
     flat        one graph without subgraphs, as a runner and the checks see it
-    checks      what only the whole shows
+    checks      what only the whole shows: of edges, flow, nodes
     order       rings in directed graphs
     members     what `add` refuses      gates, promotions     the same for theirs
+    refusals    kept instead of raised, so that a check tells all
 
 Stands on node types and ports.
 """

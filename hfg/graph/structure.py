@@ -22,6 +22,7 @@ from hfg.graph.members import iterated_inputs, need_new, need_subgraph_options, 
 from hfg.graph.naming import default_name, find, need_name, path_of
 from hfg.graph.options import (
     DEFAULT_CAPACITY,
+    EdgeOptions,
     GroupSpec,
     NodeOptions,
     OnError,
@@ -34,6 +35,7 @@ from hfg.graph.options import (
     node_options,
 )
 from hfg.graph.promotions import refuse_promotion
+from hfg.graph.refusals import Refusable
 from hfg.nodetype import Node, Place
 from hfg.ports import ParameterPort, Port, Source, Target
 from hfg.problem import Problem
@@ -176,7 +178,9 @@ class Graph:
             "enabled": enabled,
             "iterate_over": iterated_inputs(node, path, iterate_over),
         }
-        options = node_options(f'node "{path}"', given)
+        options = NodeOptions()
+        with Refusable(path):
+            options = node_options(f'node "{path}"', given)
         node._place, node._options = Place(self, name, path), options
         self.nodes[name] = node
         if is_box(node):
@@ -238,6 +242,21 @@ class Graph:
         Raises:
           ConnectionError: the edge cannot be; nothing was changed.
         """
+        with Refusable(source, target):
+            return self._draw(source, target, active, capacity, overflow, capacity_limit, through, initial)
+        return Edge(source, target, EdgeOptions())
+
+    def _draw(
+        self,
+        source: Any,
+        target: Any,
+        active: bool,
+        capacity: int,
+        overflow: Overflow,
+        capacity_limit: int | None,
+        through: Iterable[Any],
+        initial: Iterable[Any],
+    ) -> Edge:
         self._need_rest("connecting")
         if source is self.start and self._is_around(target):
             # `graph.start.activates(...)` inside a subgraph: the edge belongs where its node is (rule A10).
@@ -309,15 +328,18 @@ class Graph:
           GraphError: a value is out of its range, or the group is declared otherwise already.
         """
         self._need_rest("declaring a group")
-        spec = group_spec(name, (0 if name == "loop" else 1) if threads is None else threads, policy, seed)
         root = self._root
-        if name in root._declared_groups and root._groups[name] != spec:
-            raise GraphError(
-                f'group "{name}" is declared already, as {root._groups[name]}; declare it once, or choose another name'
-            )
-        root._declared_groups.add(name)
-        root._groups[name] = spec
-        return spec
+        with Refusable(name):
+            spec = group_spec(name, (0 if name == "loop" else 1) if threads is None else threads, policy, seed)
+            if name in root._declared_groups and root._groups[name] != spec:
+                raise GraphError(
+                    f'group "{name}" is declared already, as {root._groups[name]}; '
+                    "declare it once, or choose another name"
+                )
+            root._declared_groups.add(name)
+            root._groups[name] = spec
+            return spec
+        return root._groups.setdefault(str(name), GroupSpec(str(name)))
 
     def move(self, node: Node, *, group: str | None) -> None:
         """Let a node run in another group; with a subgraph go all inside that have no group of their own.
@@ -345,10 +367,11 @@ class Graph:
           GraphError: one of the two is not in this graph, or `target` has a gate already; nothing was changed.
         """
         self._need_rest("gating")
-        refuse_gate(self, target, by, idle_rate_hz)
         gate = Gate(target, by, idle_rate_hz)
-        self.gates.append(gate)
-        self._root._gated.add(target)
+        with Refusable(target):
+            refuse_gate(self, target, by, idle_rate_hz)
+            self.gates.append(gate)
+            self._root._gated.add(target)
         return gate
 
     # --- ports of the whole ---
@@ -384,14 +407,15 @@ class Graph:
           GraphError: the two cannot be one; nothing was changed.
         """
         self._need_rest("promoting a parameter")
-        refuse_promotion(self, outer, inner)
-        try:
-            inner.value = outer.value
-        except ValueError as error:
-            raise GraphError(
-                f'"{outer.path}" cannot stand for "{inner.path}": {error}; change its default or the limits'
-            ) from error
-        self._promoted.setdefault(outer.name, []).append(inner)
+        with Refusable(outer):
+            refuse_promotion(self, outer, inner)
+            try:
+                inner.value = outer.value
+            except ValueError as error:
+                raise GraphError(
+                    f'"{outer.path}" cannot stand for "{inner.path}": {error}; change its default or the limits'
+                ) from error
+            self._promoted.setdefault(outer.name, []).append(inner)
 
     # --- finding and checking ---
 

@@ -210,9 +210,84 @@ def test_an_edge_that_is_refused_shows_the_line_that_draws_it(hfg: Command) -> N
     with Path("halves.py").open("a", encoding="utf-8") as file:
         file.write("\ngraph.connect(source.out, graph.start)\n")
     shown = hfg("check", TARGET)
-    assert shown.code == 2
-    assert "graph.connect(source.out, graph.start)" in shown.err
-    assert "hfg/graph" not in shown.err
+    assert shown.code == 1
+    assert "the graph refused it at halves.py, line" in shown.out
+    assert "graph.connect(source.out, graph.start)" in shown.out
+
+
+def test_check_tells_at_once_all_that_a_graph_refuses_and_what_else_is_wrong(hfg: Command) -> None:
+    with Path("halves.py").open("a", encoding="utf-8") as file:
+        file.write(
+            "def wrong() -> hfg.Graph:\n"
+            "    graph = hfg.Graph('wrong')\n"
+            "    graph.group('work', policy='best')\n"
+            "    first, both = graph.add(half(), max_rate_hz=-1), graph.add(pair(), group='work')\n"
+            "    graph.connect(first.out, graph.abort)\n"
+            "    graph.connect(both.left, first.out)\n"
+            "    graph.connect(first, both.left)\n"
+            "    graph.gate(first, by=half())\n"
+            "    return graph\n"
+        )
+    shown = hfg("check", "halves.py:wrong", "--json")
+    assert shown.code == 1
+    problems = json.loads(shown.out)
+    assert all(problem[part] for problem in problems for part in ("path", "what", "why", "remedy", "check"))
+    assert [problem["path"] for problem in problems if problem["check"] == "refused"] == [
+        "work",
+        "half",
+        "pair.left -> half.out",
+        "half -> pair.left",
+        "half",
+    ]
+    unconnected = [problem["path"] for problem in problems if problem["check"] == "unconnected-input"]
+    assert unconnected == ["half.number", "pair.right"]  # pair.left would have been connected
+
+
+@pytest.mark.parametrize(
+    ("code", "found"),
+    [
+        ("{}['key']", "failed() failed: KeyError: 'key'"),
+        ("return 3", "gave back an int, not a Graph"),
+        ("graph.add(3)", "graph.add takes a node, got 3"),
+        ("graph.add(half(), name='a/b')", 'cannot be named "a/b"'),
+    ],
+)
+def test_a_graph_that_cannot_be_built_is_told_after_what_was_refused_before(
+    hfg: Command, code: str, found: str
+) -> None:
+    with Path("halves.py").open("a", encoding="utf-8") as file:
+        file.write(
+            "def failed() -> hfg.Graph:\n"
+            "    graph = hfg.Graph('failed')\n"
+            "    graph.connect(graph.add(half()).out, graph.add(pair()))\n"
+            f"    {code}\n"
+            "    return graph\n"
+        )
+    shown = hfg("check", "halves.py:failed")
+    if code == "return 3":
+        assert (shown.code, found in shown.err) == (2, True)  # what is named is no graph: wrong use
+        return
+    assert shown.code == 1
+    first, second, count = shown.out.splitlines()
+    assert "got the node" in first
+    assert found in second
+    assert count == "halves.py:failed: 2 errors, no warnings"
+    assert "line 4" in second or "KeyError" not in second
+
+
+def test_check_counts_hints_apart(hfg: Command) -> None:
+    with Path("halves.py").open("a", encoding="utf-8") as file:
+        file.write(
+            "def hinted() -> hfg.Graph:\n"
+            "    graph = hfg.Graph('hinted')\n"
+            "    graph.group('loop', policy='deadline')\n"
+            "    graph.add(numbers())\n"
+            "    return graph\n"
+        )
+    shown = hfg("check", "halves.py:hinted")
+    assert shown.code == 0
+    assert "[unused-scheduling]" in shown.out
+    assert shown.out.splitlines()[-1] == 'graph "hinted": no errors, no warnings, 1 hint'
 
 
 def test_check_finds_nothing_in_a_sound_graph(hfg: Command) -> None:

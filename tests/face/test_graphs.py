@@ -94,7 +94,8 @@ def test_graph_of_the_face_does_what_its_lines_say() -> None:
     graph.connect(explore.done, deliver.begin, active=True)
     assert list(graph.nodes) == ["camera", "map_lookup", "drive", "explore", "wait", "deliver"]
     assert [edge.active for edge in graph.edges] == [False, True, True, True, False, True]
-    assert graph.check() == []
+    # What a reader of these lines may see too: nothing leads activity to the lookup, and "vision" has no priorities.
+    assert [(found.severity, found.path) for found in graph.check()] == [("warning", "map_lookup"), ("hint", "vision")]
     report = hfg.run(graph, clock="virtual")
     assert report.outcome == "stopped"
     assert drive.goals == [(0.0, False)]
