@@ -75,8 +75,12 @@ def is_feed(end: object) -> bool:
 
 
 def is_single(target: Any) -> bool:
-    """Whether at most one edge may lead into it (rule P2): inputs, parameters, and outputs seen from inside."""
-    return target.kind in ("input", "parameter", "output")
+    """Whether at most one edge may lead into it (rule P2): inputs and parameters.
+
+    A subgraph's output seen from inside is a relay, at which streams may converge on their way into a slot (rule G1);
+    that no input gets two edges so is seen by the check. What iterates makes one list of each output (rule G4).
+    """
+    return target.kind in ("input", "parameter") or (target.kind == "output" and bool(iterated(target.node)))
 
 
 def refuse(graph: Any, source: Any, target: Any, options: EdgeOptions) -> None:

@@ -25,7 +25,7 @@ def refuse_gate(graph: Any, target: Any, by: Any, idle_rate_hz: Any) -> None:
     """Raise if the gate cannot be; changes nothing.
 
     Raises:
-      GraphError: what is given is no node of this graph, is gated already, or is its own gate; or the rate is none.
+      GraphError: what is given is no node of this graph, or is gated already; or the rate is none.
     """
     for node in (target, by):
         if not isinstance(node, Node):
@@ -37,10 +37,6 @@ def refuse_gate(graph: Any, target: Any, by: Any, idle_rate_hz: Any) -> None:
                 f'a gate couples nodes of one graph, but "{path_of(node)}" is not in {graph._title}; add it first'
             )
     name = path_of(target)
-    if target is by:
-        raise GraphError(
-            f'"{name}" cannot be its own gate, for once inactive it would rest for ever; gate it by another node'
-        )
     if target in graph._root._gated:
         raise GraphError(f'"{name}" has a gate already; put what both gates mean into one state node or subgraph')
     is_number = isinstance(idle_rate_hz, int | float) and type(idle_rate_hz) is not bool

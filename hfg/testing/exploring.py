@@ -108,22 +108,55 @@ def explore(
     checks = list(of_graph(build()) if invariants is None else invariants)
     measure = result or _default_result(build())
     seeds = random.Random(seed)
-    tried = [_try(build, seeds.randrange(2**31), checks, measure, until_s, conform) for _ in range(runs)]
-    failing = sorted((one for one in tried if one.wrong), key=lambda one: one.length)
-    if failing:
-        shortest = failing[0]
+    outcomes: Counter[str] = Counter()
+    first = failing = other = None  # of all traces only these are kept: a thousand do not fit into memory
+    failures = 0
+    for _ in range(runs):
+        one = _try(build, seeds.randrange(2**31), checks, measure, until_s, conform)
+        first = first or one
+        outcomes[one.outcome] += 1
+        if one.wrong:
+            failures += 1
+            failing = _shorter(failing, one)
+        elif one.result != first.result:
+            other = _shorter(other, one)
+    if failing is not None:
         raise ScheduleFailure(
-            f"{len(failing)} of {runs} schedules fail:\n  " + "\n  ".join(shortest.wrong), shortest.seed, shortest.trace
+            f"{failures} of {runs} schedules fail:\n  " + "\n  ".join(failing.wrong), failing.seed, failing.trace
         )
-    others = sorted((one for one in tried if one.result != tried[0].result), key=lambda one: one.length)
-    if others:
+    if first is not None and other is not None:
         raise ScheduleFailure(
-            f"the result depends on the schedule:\n  {tried[0].result!r} with seed {tried[0].seed}\n"
-            f"  {others[0].result!r} with seed {others[0].seed}",
-            others[0].seed,
-            others[0].trace,
+            f"the result depends on the schedule:\n{_difference(first, other)}", other.seed, other.trace
         )
-    return Exploration(runs, dict(Counter(one.outcome for one in tried)), min(runs, 1))
+    return Exploration(runs, dict(outcomes), min(runs, 1))
+
+
+def _shorter(known: _Tried | None, new: _Tried) -> _Tried:
+    return new if known is None or new.length < known.length else known
+
+
+def _difference(first: _Tried, other: _Tried) -> str:
+    where, one, two = _parting(first.result, other.result)
+    return f"  result{where} is {one!r} with seed {first.seed}\n  result{where} is {two!r} with seed {other.seed}"
+
+
+def _parting(one: Any, two: Any) -> tuple[str, Any, Any]:
+    """Go down to the first part in which two results differ; whole results may fill pages."""
+    if isinstance(one, list | tuple) and type(one) is type(two):
+        parts = [(f"[{index}]", *pair) for index, pair in enumerate(zip(one, two, strict=False))]
+        rest = min(len(one), len(two))
+        parts.append((f"[{rest}:]", one[rest:], two[rest:]))
+    elif isinstance(one, dict) and isinstance(two, dict) and one.keys() == two.keys():
+        parts = [(f"[{key!r}]", one[key], two[key]) for key in one]
+    else:
+        return "", one, two
+    for where, left, right in parts:
+        if left != right:
+            if where.endswith(":]"):
+                return where, left, right
+            inside, *pair = _parting(left, right)
+            return where + inside, *pair
+    return "", one, two
 
 
 def _try(

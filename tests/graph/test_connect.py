@@ -266,12 +266,14 @@ def test_subgraph_sends_by_events_what_is_asynchronous_inside_and_by_outputs_the
     box.graph.connect(box.camera.count, box.result.inner)
     box.graph.connect(box.camera.seen, box.done.inner)
     box.graph.connect(box.begin.inner, box.done.inner)
-    refused(
-        box.graph,
-        '"box.result.inner" takes one edge',
-        source=box.goal.inner,
-        target=box.result.inner,
-    )
+    box.graph.connect(box.goal.inner, box.result.inner)  # they converge here, on their way into a slot
+
+
+@pytest.mark.rule("P2", "G4")
+def test_output_of_what_iterates_takes_one_edge_inside(graph: Graph) -> None:
+    box = graph.add(Box(), iterate_over=("goal",))
+    box.graph.connect(box.camera.count, box.result.inner)
+    refused(box.graph, '"box.result.inner" takes one edge', source=box.goal.inner, target=box.result.inner)
 
 
 # --- options ---

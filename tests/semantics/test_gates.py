@@ -7,6 +7,7 @@ import asyncio
 import pytest
 
 import hfg
+from hfg.testing import explore
 from tests.semantics.nodes import (
     Clock,
     Ear,
@@ -99,6 +100,41 @@ def test_a_throttled_node_runs_always_while_the_state_is_active(fast: bool) -> N
     graph.gate(node, by=state, idle_rate_hz=0.1)
     run(graph, fast)
     assert sink.values == [1, 3, 4]
+
+
+@pytest.mark.rule("A11")
+def test_a_node_that_is_its_own_gate_works_while_it_is_active(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node, sink = graph.add(slow_numbers(count=6, pause_s=1)), graph.add(forward()), graph.add(Keep())
+    graph.connect(source.out, node.value)
+    graph.connect(node.out, sink.value)
+    graph.connect(graph.add(slow_numbers(count=1, pause_s=2.5)).out, node.activate)
+    graph.connect(graph.add(slow_numbers(count=1, pause_s=4.5)).out, node.deactivate)
+    graph.gate(node, by=node)
+    run(graph, fast)
+    assert sink.values == [3, 4]
+
+
+@pytest.mark.rule("A11", "A6")
+@pytest.mark.parametrize("boxed", [True, False])
+def test_what_comes_together_with_the_activity_finds_the_gate_closed_as_the_firing_starts(boxed: bool) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        send, box = graph.add(Send(modifier=1)), graph.add(Kept())
+        graph.connect(graph.add(numbers(count=3)).out, send.value)
+        graph.connect(send.out, box.value, active=True)
+        graph.gate(box, by=box if boxed else box.graph["keep"])
+        return graph
+
+    assert firings(traced(build()), "kept/keep") == ["silent", "process", "process", "end"]
+    explore(build, runs=3, conform=True)
+
+
+class Kept(hfg.Subgraph):
+    value = hfg.Input(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.connect(self.value.inner, graph.add(Keep()).value, active=True)
 
 
 @pytest.mark.rule("A11")

@@ -24,6 +24,37 @@ from tests.semantics.nodes import (
 # --- G1 ---
 
 
+class Several(hfg.Subgraph):
+    """Streams that meet at one output."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        for factor in (2, 3):
+            times = graph.add(scale(factor=factor))
+            graph.connect(self.value.inner, times.value)
+            graph.connect(times.out, self.out.inner)
+
+
+@pytest.mark.rule("G1", "P2")
+def test_streams_converge_at_the_output_of_a_box_on_their_way_into_a_slot(fast: bool) -> None:
+    graph = hfg.Graph()
+    box, ear = graph.add(Several()), graph.add(Ear())
+    graph.connect(graph.add(numbers(count=2)).out, box.value)
+    graph.connect(box.out, ear.hear)
+    run(graph, fast)
+    assert sorted(ear.heard) == [2, 3, 4, 6]
+
+
+@pytest.mark.rule("G1", "P2")
+def test_streams_that_converge_in_a_box_do_not_reach_an_input() -> None:
+    graph = hfg.Graph()
+    box, sink = graph.add(Several()), graph.add(Keep())
+    graph.connect(box.out, sink.value)
+    assert "has an edge already" in graph.check()[0].what
+
+
 class Work(hfg.Subgraph):
     """All four kinds of port as relays."""
 
