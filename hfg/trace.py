@@ -2,7 +2,8 @@
 
 One stream for recorders, taps, statistics, monitors and the studio. Every event has `time`, in seconds on the run's
 clock. Nodes are named by their path ("fetch/go_to"; the graph's own boundary is ""), ports by "path.port", edges by
-"source -> target" as the plan names them after subgraphs are dissolved. Stands on `token`; knows nobody who emits or
+"source -> target" as the plan names them after subgraphs are dissolved. In the JSON of `hfg run --trace` a token that
+holds a marker has "marker" in place of "value". Stands on `token`; knows nobody who emits or
 listens.
 """
 

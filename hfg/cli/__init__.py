@@ -7,7 +7,8 @@
     target      finds what TARGET names
     settings    --param path=value
     interrupt   Ctrl-C
-    show        sentences, tracebacks, tables, JSON
+    show        sentences, tracebacks, tables
+    encoding    JSON
 
 Exit codes: 0 success; 1 a run or check that failed, also by `abort`, a stall or Ctrl-C; 2 wrong use. A verb reports to
 standard output, everything else goes to standard error. `import hfg` does not import any of this.

@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import typer
 
 from hfg.cli import show
+from hfg.cli.encoding import encode
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
@@ -125,7 +126,7 @@ def _writing(file: Path | None, interrupt: Interrupt) -> Iterator[Callable[[Trac
 
 
 def _write(write: Callable[[bytes], object], event: TraceEvent) -> None:
-    write(show.encode(event) + b"\n")
+    write(encode(event) + b"\n")
 
 
 def _log_to_stderr(verbosity: int, debug: bool) -> None:

@@ -1,6 +1,6 @@
 """How things look on a terminal: one-sentence errors, tracebacks that begin in the user's code, tables, JSON.
 
-Stands on rich and msgspec; knows reports and problems, no verbs.
+Stands on rich and `encoding`; knows reports and problems, no verbs.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from hfg.cli.encoding import encode
 from hfg.engine.report import Report
 from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
 
-__all__ = ["encode", "failure", "json", "plain", "report", "sentence", "set_debug", "table", "user_traceback"]
+__all__ = ["failure", "json", "report", "sentence", "set_debug", "table", "user_traceback"]
 
 _OURS = str(Path(__file__).resolve().parent.parent)
 _MACHINERY = (
@@ -32,7 +32,6 @@ _MACHINERY = (
     "threading.py",
     "typer",
 )
-_LONGEST_VALUE = 200
 _WIDTH_OF_A_FILE = 200
 _debug = False
 
@@ -83,27 +82,9 @@ def _is_machinery(file: str) -> bool:
     return file.startswith(_OURS) or ((inside != file or file.startswith("<")) and inside.startswith(_MACHINERY))
 
 
-def encode(value: Any) -> bytes:
-    """Write JSON; a value that JSON does not know is written as text, arrays by their shape."""
-    return _ENCODER.encode(value)
-
-
 def json(value: Any) -> None:
     """Write JSON to standard output, indented for people."""
     sys.stdout.write(msgspec.json.format(encode(value), indent=2).decode() + "\n")
-
-
-def plain(value: Any) -> Any:
-    """Describe a value that JSON does not know."""
-    if isinstance(value, np.ndarray):
-        return f"array {'x'.join(map(str, value.shape))} {value.dtype}"
-    if isinstance(value, np.generic):
-        return value.item()
-    text = str(value) if isinstance(value, BaseException) else repr(value)
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + "…"
-
-
-_ENCODER = msgspec.json.Encoder(enc_hook=plain)
 
 
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]], *, to_stderr: bool = False) -> None:

@@ -145,6 +145,46 @@ def test_trace_holds_every_event_as_a_line(hfg: Command) -> None:
     assert {"RunStarted", "FiringStarted", "TokenSent", "RunEnded"} <= {event["type"] for event in events}
 
 
+def test_trace_tells_markers_from_texts(hfg: Command) -> None:
+    with Path("halves.py").open("a", encoding="utf-8") as file:
+        file.write(ODD_VALUES)
+    assert hfg("run", "halves.py:says_end", *VIRTUAL, "--trace", "run.jsonl").code == 0
+    events = [json.loads(line) for line in Path("run.jsonl").read_text(encoding="utf-8").splitlines()]
+    tokens = [event["token"] for event in events if event["type"] == "TokenSent"]
+    assert tokens[0] == {"value": "END", "activity": 0, "stamp": 0.0, "sequence": 1}
+    assert tokens[-1] == {"marker": "END", "activity": 0, "stamp": 0.0, "sequence": len(tokens)}
+    assert [token["value"] for token in tokens[1:-1]] == [
+        "\\ud800",
+        ["\\ud800", 1],
+        {"1": "<Shy, whose text cannot be made: RuntimeError>"},
+        {"(1, 2)": 3},
+        "array 2x3 uint8",
+        1.5,
+        [[["[[...]]"]]],
+    ]
+
+
+ODD_VALUES = """
+import numpy as np
+
+class Shy:
+    def __repr__(self): raise RuntimeError
+
+@hfg.node
+def odd() -> Iterator[object]:
+    endless = []
+    endless.append(endless)
+    yield from ("END", "\\ud800", ["\\ud800", 1], {1: Shy()}, {(1, 2): 3})
+    yield from (np.zeros((2, 3), np.uint8), np.float32(1.5), endless)
+
+@hfg.node
+def hear(value: object) -> None: ...
+
+says_end = hfg.Graph()
+says_end.add(odd()) >> says_end.add(hear())
+"""
+
+
 def test_trace_that_cannot_be_written(hfg: Command) -> None:
     shown = hfg("run", TARGET, *VIRTUAL, "--trace", "no/such/folder.jsonl")
     assert (shown.code, shown.err.count("\n")) == (2, 1)
