@@ -6,12 +6,12 @@ The general way; `steps` has shorter ones for the common shapes, which fall back
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import CoroutineType
 from typing import Any
 
 from hfg.engine.agenda import SAME_MOMENT_S, cancel_limit, consider, freed, idle_again, unplace
-from hfg.engine.calls import call, set_parameter
+from hfg.engine.calls import call, refuse_coroutine, set_parameter
 from hfg.engine.ending import end, source_ended
 from hfg.engine.modifiers import automatic, derive_scopes, receive, touch
 from hfg.engine.releasing import release
@@ -226,6 +226,11 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
         if worker.generator is None:
             worker.generator = call(*arguments)
         call, arguments = (next if kind == "generator" else anext), (worker.generator,)
+    worker.core.host.execute(worker, call, arguments, _done(worker))
+
+
+def _done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
+    """What follows when the process function is over."""
     ticket = worker.ticket
 
     def done(result: Any, error: BaseException | None) -> None:
@@ -238,15 +243,18 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
         else:
             worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
 
-    worker.core.host.execute(worker, call, arguments, done)
+    return done
 
 
 def complete_firing(worker: Worker, result: Any) -> None:
     """The process function ran to its end: its outputs leave together (F3)."""
-    if type(result) is CoroutineType:
-        _await_result(worker, result)
+    if type(result) is CoroutineType and not worker.group.threaded:
+        # a plain function has called an async one, or a generator has yielded a call of one
+        worker.core.host.drive(worker, result, _done(worker))
         return
     try:
+        if type(result) is CoroutineType:
+            raise refuse_coroutine(worker, result)
         written = merge(worker, result)
     except Exception as error:
         worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
@@ -255,34 +263,6 @@ def complete_firing(worker: Worker, result: Any) -> None:
     if "processed" in worker.events:
         automatic(worker, "processed")
     finish_firing(worker, "done")
-
-
-def _await_result(worker: Worker, coroutine: Any) -> None:
-    """A plain function has called an async one and given back what is to be awaited: then that is part of it."""
-    what = f"firing {worker.firings}"
-    if worker.group.threaded:
-        worker.core.upstairs.fail(worker, what, _no_coroutine(worker, coroutine), answer=True)
-        return
-    ticket = worker.ticket
-
-    def done(result: Any, error: BaseException | None) -> None:
-        if worker.ticket != ticket:
-            return  # X2: it came too late, its firing was given up
-        if error is None:
-            complete_firing(worker, result)
-        else:
-            worker.core.upstairs.fail(worker, what, error, answer=True)
-
-    worker.core.host.drive(worker, coroutine, done)
-
-
-def _no_coroutine(worker: Worker, coroutine: Any) -> TypeError:
-    """Close what code in a thread cannot await, and say what to do."""
-    coroutine.close()
-    return TypeError(
-        f'it gave back a coroutine, but its group "{worker.group.name}" is a thread and async code runs on the loop; '
-        "write `async def` and leave out group="
-    )
 
 
 def merge(worker: Worker, result: Any) -> list[Any] | None:
