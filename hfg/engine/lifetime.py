@@ -56,7 +56,7 @@ class Lifetime:
             core.trace(RunStarted(engine.now()))
         core.started = True
         assert core.boundary is not None
-        start = core.boundary.events.get("start")
+        start = engine_ports.bind_start(core.boundary, engine.flat.graph.start)
         if start is not None:
             trigger(start, explicit=1)
         self._open_sources(core)

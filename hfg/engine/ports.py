@@ -17,7 +17,7 @@ from hfg.ports.events import EventPort
 from hfg.token import Token
 from hfg.types import accepts, describe
 
-__all__ = ["bind", "bind_automatic", "bind_event", "release_ports"]
+__all__ = ["bind", "bind_automatic", "bind_event", "bind_start", "release_ports"]
 
 
 def bind(worker: Worker) -> None:
@@ -111,12 +111,22 @@ def _from_thread(worker: Worker, event: RunningEvent, value: Any, activity: int 
         worker.group.signal(partial(trigger, event, value, activity, stamp))  # type: ignore[attr-defined]
 
 
+def bind_start(boundary: Worker, port: EventPort[None]) -> RunningEvent | None:
+    """Let the graph's `start` reach its edges and subscribers; None if it has neither (A10)."""
+    event = boundary.events.get("start")
+    if event is None and port._observers:
+        event = boundary.events["start"] = RunningEvent(boundary, "start", port)
+    if event is not None:
+        host: Any = boundary.core.host
+        host.adopt_event(port)
+    return event
+
+
 def release_ports(worker: Worker) -> None:
     """The run is over: what the ports led to is gone, their subscribers are told."""
     node = worker.node
-    if node is None:
-        return
-    node._active = False
+    if node is not None:
+        node._active = False
     for event in worker.events.values():
         port = event.port
         if port is not None:
@@ -125,7 +135,7 @@ def release_ports(worker: Worker) -> None:
             port._emit_wait = port._refuse_wait
             port._scheduler = port._thread = None
             port._complete()
-    if not worker.silent_code:
+    if node is not None and not worker.silent_code:
         for name in worker.type.outputs:
             port = node.ports.outputs[name]
             port._emit = port._refuse

@@ -192,9 +192,15 @@ class Run:
 
         Raises:
           NotRunning: the run ended without one.
+          UsageError: it is no event of a node in this graph, or the graph's `start`, which is over by now.
         """
         if not isinstance(event, EventPort):
             raise UsageError(f"run.wait_for waits for an event of a node, got {event!r}; look at others with run.tap")
+        if event is self.graph.start:
+            raise UsageError(
+                '"start" was triggered as the run began, so waiting for it would never end: leave the line out, or '
+                "write `await run.wait_quiet()` to wait for what it began"
+            )
         waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
         from hfg.engine.ports import bind_event
 
@@ -331,10 +337,12 @@ class Run:
         )
 
     def _adopt(self, event: Any) -> None:
-        """Somebody has subscribed to an automatic event; asked by the event."""
-        from hfg.engine.ports import bind_event
+        """Somebody has subscribed to an automatic event, or to `start`; asked by the event."""
+        from hfg.engine.ports import bind_event, bind_start
 
-        if event.node is not self.graph:
+        if event is self.graph.start:
+            bind_start(self._worker(self.graph), event)
+        else:
             bind_event(self._worker(event.node), event.name)
 
     def _hold(self) -> None:

@@ -266,6 +266,17 @@ def test_a_node_of_another_graph_is_refused(fast: bool) -> None:
     drive(main)
 
 
+def test_waiting_for_start_in_a_run_says_that_it_is_over(fast: bool) -> None:
+    async def main() -> None:
+        graph = hfg.Graph()
+        graph.connect(graph.start, graph.add(Ear()).poke)
+        async with hfg.running(graph, fast=fast) as run:
+            with pytest.raises(hfg.errors.UsageError, match='^"start" was triggered as the run began, .* leave the'):
+                await run.wait_for(graph.start)
+
+    drive(main)
+
+
 def test_waiting_for_an_event_that_never_comes_ends_with_the_run(fast: bool) -> None:
     async def main() -> None:
         graph = hfg.Graph()

@@ -248,3 +248,26 @@ def test_an_observable_of_time_feeds_on_the_clock_of_the_run(fast: bool) -> None
     graph.connect(reactivex.interval(0.5), sink.value, through=[operators.take(3)])
     assert run(graph, fast).outcome == "done"
     assert sink.seen == [(0, 0.5), (1, 1.0), (2, 1.5)]
+
+
+@pytest.mark.rule("A10", "A14")
+@pytest.mark.parametrize("edge", [True, False])
+def test_who_subscribes_to_start_hears_of_it_with_or_without_an_edge(edge: bool, fast: bool) -> None:
+    async def main() -> list[str]:
+        graph = hfg.Graph()
+        ear = graph.add(Ear())
+        if edge:
+            graph.connect(graph.start, ear.begin)
+        story: list[str] = []
+        graph.start.subscribe(
+            lambda token: story.append(f"early {token.activity}"), on_completed=lambda: story.append("end")
+        )
+        async with hfg.running(graph, fast=fast) as run:
+            graph.start.subscribe(lambda _: story.append("late"))
+            run.reset_activity()
+            await run.wait_quiet()
+        async with hfg.running(graph, fast=fast):
+            pass
+        return story
+
+    assert drive(main) == ["early 1", "early 1", "late", "end"]
