@@ -3,6 +3,7 @@
     app         the command itself: verbs, options of all, what an error looks like
     run         hfg run TARGET      run a graph to its end
     check       hfg check TARGET    look for mistakes without running
+    draw        hfg draw TARGET     show what a graph looks like
     nodes       hfg nodes [MODULE]  which node types there are
     target      finds what TARGET names
     settings    --param path=value

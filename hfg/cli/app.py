@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hfg.cli import check, nodes, run, show
+from hfg.cli import check, draw, nodes, run, show
 from hfg.cli.interrupt import Interrupt
 from hfg.errors import HfgError, TargetError
 
@@ -29,6 +29,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("check")(check.check)
+app.command("draw")(draw.draw)
 app.command("nodes")(nodes.nodes)
 
 

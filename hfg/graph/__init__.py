@@ -9,6 +9,7 @@
     flat        one graph without subgraphs, as a runner and the checks see it
     checks      what only the whole shows: of edges, flow, nodes
     order       rings in directed graphs
+    picture     what is to be seen of a graph       drawing     the same as Mermaid or DOT
     members     what `add` refuses      gates, promotions     the same for theirs
     refusals    kept instead of raised, so that a check tells all
 

@@ -6,6 +6,7 @@ Everything is checked when it is said: what is refused changes nothing. What onl
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar, overload
 
@@ -432,6 +433,26 @@ class Graph:
         from hfg.graph.checks import check
 
         return check(self)
+
+    def draw(self, path: str | os.PathLike[str] | None = None) -> str:
+        """Draw it and give the text of the drawing; in a notebook a graph is shown by itself.
+
+        Double or thick lines are active edges, dashed ones begin at events; nodes that are active in a run have a thick
+        border.
+
+        Args:
+          path: a file that ends in ".mmd" (Mermaid) or ".dot" (Graphviz); without it nothing is written and the text is
+            Mermaid.
+
+        Raises:
+          UsageError: the file has another ending, or cannot be written.
+        """
+        from hfg.graph.drawing import draw
+
+        return draw(self, path)
+
+    def _repr_markdown_(self) -> str:
+        return f"```mermaid\n{self.draw()}```\n"
 
     @property
     def path(self) -> str:

@@ -358,3 +358,17 @@ def test_every_verb_explains_itself(hfg: Command, arguments: tuple[str, ...]) ->
     shown = hfg(*arguments)
     assert shown.code == 0
     assert "Usage" in shown.out
+
+
+def test_draw_writes_a_file_or_standard_output(hfg: Command, tmp_path: Path) -> None:
+    shown = hfg("draw", TARGET)
+    assert (shown.code, shown.out.splitlines()[0], shown.err) == (0, "flowchart LR", "")
+    assert hfg("draw", TARGET, "halves.mmd").code == 0
+    assert (tmp_path / "halves.mmd").read_text(encoding="utf-8") == shown.out
+    assert hfg("draw", TARGET, "--format", "dot").out.startswith('digraph "halves"')
+
+
+def test_draw_says_which_endings_work(hfg: Command) -> None:
+    shown = hfg("draw", TARGET, "halves.svg")
+    assert (shown.code, shown.out) == (2, "")
+    assert "a drawing ends in .mmd or .dot" in shown.err
