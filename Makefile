@@ -5,15 +5,19 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/ready
+PEERS  := .venv-peers
+RESULTS := benchmarks/results
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench soak setup clean
+# bench targets write one line of JSON per case into $(RESULTS); bench-docs makes the tables of docs/speed.md from them.
+.PHONY: help demo test lint bench bench-peers bench-docs soak setup clean
 
 help:
 	@echo "make demo    search, measure and report on real photographs, with a gate"
 	@echo "make test    run all tests (without the long ones)"
 	@echo "make lint    ruff and mypy"
-	@echo "make bench   run the benchmarks"
+	@echo "make bench   run the benchmarks (5 minutes); make bench-peers: beside other libraries, and the profile (4 minutes)"
+	@echo "make bench-docs  make the tables of docs/speed.md from what they measured"
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything tools have left"
 
@@ -29,7 +33,19 @@ lint: $(READY)
 	$(BIN)/mypy
 
 bench: $(READY)
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks --json $(RESULTS)
+
+# The others have an environment of their own: nothing of hfg needs them. One that cannot be installed is named, and skipped.
+bench-peers: $(READY)
+	@test -x $(PEERS)/bin/python || "$(PYTHON)" -m venv $(PEERS)
+	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable .
+	@grep -v '^#' benchmarks/peers/requirements.txt | while read -r peer; do \
+	  $(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$peer" || echo "skipped: $$peer" >&2; done
+	$(PEERS)/bin/python -m benchmarks bench_peers --json $(RESULTS)
+	$(PEERS)/bin/python -m benchmarks.profile_hop --json $(RESULTS)
+
+bench-docs: $(READY)
+	$(BIN)/python -m benchmarks.page $(RESULTS)
 
 soak: $(READY)
 	$(BIN)/python -m pytest -m soak --timeout 3600
@@ -37,7 +53,7 @@ soak: $(READY)
 setup: $(READY)
 
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(PEERS) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Made once, and made anew when pyproject.toml is newer. The old one goes first: an interrupted set-up never looks like a finished one.

@@ -1,8 +1,8 @@
-"""Run the benchmarks: `python -m benchmarks [bench_hop ...] [--runs 5] [--json FILE]`.
+"""Run the benchmarks: `python -m benchmarks [SUITE ...] [--runs N] [--json FOLDER]`.
 
-Every case runs in a fresh process, `--runs` times, the cases in turn (A B C A B C ...) so that a drift of the
-machine meets all of them. The table shows the median and the spread, (max - min) / median; `--json` writes one line
-per case with every single figure, the machine and the versions.
+Every case runs in a fresh process, several times, the cases in turn. The table shows the median and the spread,
+(max - min) / median; `--json` writes one line per case with every single figure, the machine and the versions.
+`python -m benchmarks.page` makes the tables of docs/speed.md from those lines.
 """
 
 from __future__ import annotations
@@ -11,78 +11,50 @@ import argparse
 import importlib
 import json
 import os
-import platform
-import statistics
-import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
-MODULES = ("bench_hop", "bench_shape", "bench_threads", "bench_virtual_day")
+from benchmarks.measure import Record, here, machine, measure, write
+
+SUITES = ("bench_kinds", "bench_shape", "bench_threads", "bench_virtual_day")
 
 
 def main() -> int:
-    """Run what was asked for and print the table."""
+    """Run what was asked for and print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("modules", nargs="*", default=MODULES, help="which, by module name; all by default")
-    parser.add_argument("--runs", type=int, default=5, help="fresh processes per case")
-    parser.add_argument("--json", type=Path, help="write one line per case")
+    parser.add_argument("suites", nargs="*", default=SUITES, help="by module name; all of ours by default")
+    parser.add_argument("--runs", type=int, help="fresh processes per case; each suite has its own default, mostly 5")
+    parser.add_argument("--json", type=Path, metavar="FOLDER", help="write one line per case, a file per suite")
     parser.add_argument("--case", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.case:
-        module, case = arguments.case.split(":", 1)
-        print(json.dumps(importlib.import_module(f"benchmarks.{module}").CASES[case]()))
+        print(json.dumps(here(*arguments.case.split(":", 1))))
         return 0
     print(machine())
-    for name in arguments.modules:
-        module = importlib.import_module(f"benchmarks.{name}")
-        print(f"\n{name}: {(module.__doc__ or '').splitlines()[0]}")
-        figures: dict[str, list[float]] = {case: [] for case in module.CASES}
-        for _ in range(arguments.runs):
-            for case in module.CASES:
-                figures[case].append(one(name, case))
-        unit = getattr(module, "UNIT", "us")
-        for case, values in figures.items():
-            print(row(case, values, unit))
-        for line in getattr(module, "ratios", lambda _: [])(
-            {case: statistics.median(values) for case, values in figures.items()}
-        ):
-            print("  " + line)
+    for name in arguments.suites:
+        suite = importlib.import_module(f"benchmarks.{name}")
+        print(f"\n{name}: {(suite.__doc__ or '').splitlines()[0]}  (load {os.getloadavg()[0]:.2f})", flush=True)
+        for line in getattr(suite, "MISSING", ()):
+            print(f"  skipped: {line}")
+        records = measure(name, arguments.runs or getattr(suite, "RUNS", 5), progress)
+        progress("")
+        for record in records:
+            print(row(record))
         if arguments.json:
-            with arguments.json.open("a") as lines:
-                for case, values in figures.items():
-                    record: dict[str, Any] = {
-                        "bench": name,
-                        "case": case,
-                        "unit": unit,
-                        "values": values,
-                        "machine": machine(),
-                    }
-                    lines.write(json.dumps(record) + "\n")
+            write(arguments.json, records)
     return 0
 
 
-def one(module: str, case: str) -> float:
-    """One case in a fresh process."""
-    command = [sys.executable, "-m", "benchmarks", "--case", f"{module}:{case}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"{module}: {case} failed:\n{done.stderr}")
-    return float(done.stdout.strip().splitlines()[-1])
+def progress(text: str) -> None:
+    """Say on a terminal what is going on."""
+    if sys.stderr.isatty():
+        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
-def row(case: str, values: list[float], unit: str) -> str:
+def row(record: Record) -> str:
     """Median, spread and the single figures."""
-    median = statistics.median(values)
-    spread = (max(values) - min(values)) / median * 100
-    singles = " ".join(f"{value:.3g}" for value in values)
-    return f"  {case:48} {median:9.3f} {unit:3}  spread {spread:4.0f} %   [{singles}]"
-
-
-def machine() -> str:
-    """What the figures were measured on."""
-    load = ", ".join(f"{value:.2f}" for value in os.getloadavg())
-    return f"Python {platform.python_version()}, {platform.machine()}, {os.cpu_count()} cores, load {load}"
+    singles = " ".join(f"{value:.3g}" for value in record.values)
+    return f"  {record.case:52} {record.median:9.3f} {record.unit:3}  spread {record.spread:5.0%}   [{singles}]"
 
 
 if __name__ == "__main__":

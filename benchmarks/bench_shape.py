@@ -1,9 +1,8 @@
 """From 1 to 10,000 nodes: building and checking, the cost of a hop, memory per node.
 
-Measured: `build` is the wall time to make, add, connect and check a chain of 10,000 functions; `hop` the time per
-  edge of a run of few tokens through it
-(beside a chain of 10 in the same process kind); `memory` what the process grows by per node with one edge, built and
-running. Values are small integers.
+Measured: `build and check` is the wall time to make, add, connect and check a chain of functions; `hop` the time an
+  edge takes in the steady state of a run through such a chain; `memory` what the process grows by per node with one
+  edge, built and running.
 """
 
 from __future__ import annotations
@@ -11,62 +10,55 @@ from __future__ import annotations
 import asyncio
 import gc
 import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import hfg
-from benchmarks.bench_hop import chain, through, timed
+from benchmarks.measure import Case
+from benchmarks.meters import Arrivals
+from benchmarks.nodes import through
+from benchmarks.ours import Kind
 
-NODES = 10_000
-UNIT = ""
+DISTRIBUTIONS = ("hfg",)
+LENGTHS = (1, 10, 100, 1_000, 10_000)
+HOPS = 200_000
+LARGEST = LENGTHS[-1]
+FUNCTION = Kind("function", through)
 
 
-def build() -> float:
+def chain(length: int) -> hfg.Graph:
+    """A chain that is run with one token or not at all."""
+    return FUNCTION.chain_graph(length, 1, Arrivals(1))
+
+
+def build(length: int) -> float:
     """Seconds to build and check."""
     began = time.perf_counter()
-    graph = chain(through, NODES, 1)
-    graph.check()
+    chain(length).check()
     return time.perf_counter() - began
 
 
-def hop(length: int, tokens: int) -> Callable[[], float]:
-    """Microseconds per hop."""
-    return lambda: timed(chain(through, length, tokens), length + 1, tokens)
-
-
 def resident() -> int:
-    """Bytes of this process in memory."""
+    """Bytes of this process in memory, where the system tells it in this way."""
     gc.collect()
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
-def memory() -> float:
+def memory(length: int) -> float:
     """Kilobytes per node with one edge, while its graph runs."""
 
     async def main() -> float:
-        async with hfg.running(chain(through, 10, 1)) as run:
+        async with hfg.running(chain(10)) as run:
             await run.wait_finished()
         before = resident()
-        async with hfg.running(chain(through, NODES, 1)) as run:
+        async with hfg.running(chain(length)) as run:
             await run.wait_quiet()
-            return (resident() - before) / NODES / 1000
+            return (resident() - before) / length / 1000
 
     return asyncio.run(main())
 
 
-CASES: dict[str, Callable[[], float]] = {
-    "build and check 10,000 nodes, s": build,
-    "hop in a chain of 10, us": hop(10, 18_000),
-    "hop in a chain of 100, us": hop(100, 2_000),
-    "hop in a chain of 1,000, us": hop(1_000, 1_000),
-    "hop in a chain of 10,000, us": hop(NODES, 200),
-    "memory per node with one edge, kB": memory,
-}
-
-
-def ratios(medians: dict[str, float]) -> list[str]:
-    """The ratio that holds on any machine."""
-    return [
-        f"hop at 10,000 nodes / at 10: "
-        f"{medians['hop in a chain of 10,000, us'] / medians['hop in a chain of 10, us']:.2f}"
-    ]
+CASES = {f"hop | {length}": Case(partial(FUNCTION.chain, length), max(20, HOPS // length)) for length in LENGTHS}
+CASES |= {f"build and check | {length}": Case(build, length, "s") for length in LENGTHS[2:]}
+if Path("/proc/self/statm").exists():
+    CASES[f"memory of a node | {LARGEST}"] = Case(memory, LARGEST, "kB")

@@ -8,15 +8,17 @@ Measured: wall seconds for 60 pictures of 1280 x 960 through a fork into two bra
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import cv2
 import numpy as np
 
 import hfg
+from benchmarks.measure import Case
 
-UNIT = "s"
+DISTRIBUTIONS = ("hfg", "opencv-python-headless")
 PICTURES = 60
 
 
@@ -42,13 +44,13 @@ def join(left: int, right: int) -> None:
     """Wait for both."""
 
 
-def seconds(groups: int) -> float:
+def seconds(groups: int, count: int) -> float:
     """Run it once."""
     cv2.setNumThreads(1)
     graph = hfg.Graph("threads")
     graph.group("left", threads=1)
     graph.group("right", threads=1)
-    source = graph.add(pictures(count=PICTURES))
+    source = graph.add(pictures(count=count))
     left = graph.add(work(), name="left", group="left")
     right = graph.add(work(), name="right", group="right" if groups == 2 else "left")
     both = graph.add(join())
@@ -60,12 +62,7 @@ def seconds(groups: int) -> float:
     return time.perf_counter() - began
 
 
-CASES: dict[str, Callable[[], float]] = {
-    "one thread group": lambda: seconds(1),
-    "two thread groups": lambda: seconds(2),
+CASES = {
+    "one thread group": Case(partial(seconds, 1), PICTURES, "s"),
+    "two thread groups": Case(partial(seconds, 2), PICTURES, "s"),
 }
-
-
-def ratios(medians: dict[str, float]) -> list[str]:
-    """How much faster two are."""
-    return [f"two groups are {medians['one thread group'] / medians['two thread groups']:.2f} times as fast as one"]

@@ -1,0 +1,198 @@
+"""Make the tables of docs/speed.md from the lines that the benchmarks wrote: `python -m benchmarks.page [FOLDER]`.
+
+The lines of the suites found in the folder replace those in docs/speed.jsonl, which stands beside the page as its
+source; then everything between `<!-- NAME -->` and `<!-- end -->` is written anew. Prose is left alone, so it names no
+figure of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import statistics
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from benchmarks.measure import Record, read
+from benchmarks.works import WORKS
+
+__all__ = ["PAGE", "SOURCE", "TABLES", "render"]
+
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "benchmarks" / "results"
+PAGE = ROOT / "docs" / "speed.md"
+SOURCE = ROOT / "docs" / "speed.jsonl"
+BLOCK = re.compile(r"(?P<begin><!-- (?P<name>[a-z]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
+OURS = "hfg, functions"
+
+Records = Mapping[str, Record]
+
+
+def figure(value: float) -> str:
+    """Three digits, as one writes them by hand."""
+    if abs(value) >= 100:
+        return f"{value:,.0f}"
+    return f"{value:.1f}" if abs(value) >= 10 else f"{value:.2f}" if abs(value) >= 0.1 else f"{value:.3f}"
+
+
+def cell(record: Record) -> str:
+    """Median, in rounds also the 99th percentile, and the spread."""
+    text = figure(record.median)
+    if "p99" in record.figures:
+        text += f" / {figure(statistics.median(record.figures['p99']))}"
+    return f"{text} ({record.spread:.0%})"
+
+
+def caption(records: Records) -> str:
+    """What the figures were measured on, and how far to trust them."""
+    several = list(records.values())
+    first = several[0]
+    spreads = sorted(record.spread for record in several)
+    packages = ", ".join(f"{name} {version}" for name, version in first.versions.items())
+    disturbed = [
+        record.median / statistics.median(record.figures["cpu"]) for record in several if "cpu" in record.figures
+    ]
+    clock = f"; the clock ran {statistics.median(disturbed):.2f} times the processor time" if disturbed else ""
+    return (
+        f"*{first.machine}; {packages}; load {first.load[0]:.1f} before and {first.load[1]:.1f} after{clock}; "
+        f"{len(first.values)} fresh processes a case; spread {statistics.median(spreads):.0%} in the median, "
+        f"{spreads[-1]:.0%} at worst.*"
+    )
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table; all columns but the first are figures."""
+    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def matrix(records: Records, write: Callable[[Record], str] = cell) -> str:
+    """Rows and columns from the names of the cases."""
+    names = [case.split(" | ") for case in records]
+    rows = list(dict.fromkeys(row for row, _ in names))
+    columns = [work for work in WORKS if any(column == work for _, column in names)]
+    body = [
+        [row, *(write(records[case]) if (case := f"{row} | {work}") in records else "" for work in columns)]
+        for row in rows
+    ]
+    return table(["", *(WORKS[work].title for work in columns)], body)
+
+
+def kinds(records: Records) -> str:
+    """Each kind of node and edge."""
+    return f"{matrix(records)}\n\n{caption(records)}"
+
+
+def peers(records: Records) -> str:
+    """All participants at the works they can do."""
+    return f"{matrix(records)}\n\n{caption(records)}"
+
+
+def ratios(records: Records) -> str:
+    """The others' times divided by those of hfg's functions, or of its states, in the same run."""
+    own = {case.split(" | ")[1]: record.median for case, record in records.items() if case.startswith("hfg")}
+    own |= {work: records[case].median for work in WORKS if (case := f"{OURS} | {work}") in records}
+    others = {case: record for case, record in records.items() if case.split(" | ")[0] != OURS}
+    return matrix(others, lambda record: figure(record.median / own[record.case.split(" | ")[1]]))
+
+
+def shape(records: Records) -> str:
+    """From one node to many."""
+    names = [case.split(" | ") for case in records]
+    lengths = list(dict.fromkeys(length for _, length in names))
+    rows = [
+        [
+            f"{what}, {records[f'{what} | {first}'].unit.replace('us', 'µs')}",
+            *(cell(found) if (found := records.get(f"{what} | {length}")) else "" for length in lengths),
+        ]
+        for what, first in dict(reversed(names)).items()
+    ]
+    return f"{table(['nodes', *(f'{int(length):,}' for length in lengths)], rows[::-1])}\n\n{caption(records)}"
+
+
+def threads(records: Records) -> str:
+    """One thread group against two."""
+    one, two = records.values()
+    rows = [[name, cell(record)] for name, record in records.items()]
+    rows.append(["how many times as fast", figure(one.median / two.median)])
+    return f"{table(['', 's'], rows)}\n\n{caption(records)}"
+
+
+def day(records: Records) -> str:
+    """A day of virtual time."""
+    return f"{table(['', 's'], [[name, cell(record)] for name, record in records.items()])}\n\n{caption(records)}"
+
+
+def profile(records: Records) -> str:
+    """Shares, what they are of the hop, and the parts that can be measured alone."""
+    parts = [record for record in records.values() if record.unit == "%"]
+    times = [record for record in records.values() if record.unit != "%"]
+    hop = times[0].median
+    rows = [
+        [
+            part.case,
+            f"{part.median:.1f} %",
+            f"{min(part.values):.1f} to {max(part.values):.1f}",
+            figure(part.median / 100 * hop),
+        ]
+        for part in sorted(parts, key=lambda part: -part.median)
+    ]
+    alone = table(["measured beside it", "µs"], [[record.case, cell(record)] for record in times])
+    shares = table(["part", "share", "in all runs", "µs a hop"], rows)
+    return f"{shares}\n\n{alone}\n\n{profile_caption(parts, times[0])}"
+
+
+def profile_caption(parts: list[Record], hop: Record) -> str:
+    """As `caption`, but a spread means nothing for a share that is nearly none."""
+    packages = ", ".join(f"{name} {version}" for name, version in hop.versions.items())
+    return (
+        f"*{hop.machine}; {packages}; load {hop.load[0]:.1f} before and {hop.load[1]:.1f} after; "
+        f"{len(hop.values)} fresh processes of about {parts[0].size:,} samples.*"
+    )
+
+
+TABLES: dict[str, tuple[str, Callable[[Records], str]]] = {
+    "kinds": ("bench_kinds", kinds),
+    "peers": ("bench_peers", peers),
+    "ratios": ("bench_peers", ratios),
+    "shape": ("bench_shape", shape),
+    "threads": ("bench_threads", threads),
+    "day": ("bench_virtual_day", day),
+    "profile": ("profile_hop", profile),
+}
+"""What may stand in `<!-- NAME -->`: the suite it needs, and who writes it."""
+
+
+def render(page: str, suites: Mapping[str, Records]) -> str:
+    """The page with its tables made anew; one whose suite was not measured stays as it is."""
+
+    def block(match: re.Match[str]) -> str:
+        suite, write = TABLES[match["name"]]
+        if suite not in suites:
+            return match[0]
+        return f"{match['begin']}\n{write(suites[suite])}\n\n{match['end']}"
+
+    return BLOCK.sub(block, page)
+
+
+def main() -> int:
+    """Take over what was measured and write the page."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.page", description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=RESULTS, help="where --json wrote; benchmarks/results")
+    folder = parser.parse_args().folder
+    found = sorted(folder.glob("*.jsonl"))
+    if not found:
+        parser.error(f'there is no .jsonl in "{folder}": run `make bench` first')
+    fresh = [line for file in found for line in file.read_text(encoding="utf-8").splitlines()]
+    replaced = {json.loads(line)["suite"] for line in fresh}
+    before = SOURCE.read_text(encoding="utf-8").splitlines() if SOURCE.exists() else []
+    kept = [line for line in before if json.loads(line)["suite"] not in replaced]
+    SOURCE.write_text("".join(f"{line}\n" for line in kept + fresh), encoding="utf-8")
+    PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), read(kept + fresh)), encoding="utf-8")
+    print(f"{PAGE.relative_to(ROOT)}: {', '.join(sorted(replaced))} made anew")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,123 @@
+"""The benchmarks run, at sizes that say nothing about time; what they write becomes the page's tables."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from benchmarks import bench_peers, page, profile_hop
+from benchmarks.__main__ import SUITES
+from benchmarks.measure import Record, one, read, write
+from benchmarks.meters import Arrivals, Laps
+from benchmarks.works import WORKS
+
+MODULES = {name: importlib.import_module(f"benchmarks.{name}") for name in (*SUITES, "bench_peers")}
+LONGEST = 1_000  # ten thousand nodes take a second to build and run
+TOKENS = 12
+
+
+def cases() -> Iterator[tuple[str, str]]:
+    """Name every case that is small enough."""
+    for name, suite in MODULES.items():
+        for case in suite.CASES:
+            length = case.rpartition(" | ")[2]
+            if not (length.isdigit() and int(length) > LONGEST and case.startswith("hop")):
+                yield name, case
+
+
+@pytest.mark.parametrize(("suite", "case"), list(cases()))
+def test_every_case_runs_at_a_tiny_size(suite: str, case: str) -> None:
+    figures = MODULES[suite].CASES[case].run(TOKENS if suite != "bench_threads" else 2)
+    values = list(figures.values()) if isinstance(figures, dict) else [figures]
+    assert values
+    assert all(math.isfinite(value) for value in values)
+
+
+def test_all_works_are_done_by_somebody() -> None:
+    done = {case.rpartition(" | ")[2] for suite in ("bench_kinds", "bench_peers") for case in MODULES[suite].CASES}
+    assert done == set(WORKS)
+
+
+def test_every_peer_takes_part_or_is_named_as_missing() -> None:
+    rows = {case.partition(" | ")[0] for case in bench_peers.CASES}
+    for peer in {"csp", "aiostream", "streamz", "ezmsg", "transitions", "py_trees"}:
+        assert (peer in rows) != (f"{peer} is not installed" in bench_peers.MISSING), peer
+
+
+def test_a_case_is_measured_by_a_process_of_its_own() -> None:
+    figures = one("bench_shape", "build and check | 100")
+    assert figures["value"] > 0
+
+
+def test_a_case_that_fails_says_which_and_why() -> None:
+    with pytest.raises(RuntimeError, match=r"(?s)bench_nothing: a case failed:.*ModuleNotFoundError"):
+        one("bench_nothing", "a case")
+
+
+def test_nobody_is_fast_by_losing_tokens() -> None:
+    meter = Arrivals(3)
+    meter.take(0)
+    with pytest.raises(RuntimeError, match="1 of 3 tokens have arrived"):
+        meter.figures()
+    laps = Laps(3)
+    laps.lap()
+    with pytest.raises(RuntimeError, match="0 of 3 rounds"):
+        laps.figures(1)
+
+
+RECORD = Record("suite", "case", "us", 10, {"median": [2.0, 4.0, 3.0], "p99": [5.0, 5.0, 5.0]}, "m", {}, (0.0, 1.0))
+
+
+def test_lines_come_back_as_they_were_written(tmp_path: Path) -> None:
+    write(tmp_path, [RECORD])
+    again = read((tmp_path / "suite.jsonl").read_text().splitlines())["suite"]["case"]
+    assert again == RECORD
+    assert (again.median, again.spread) == (3.0, pytest.approx(2 / 3))
+
+
+def test_a_cell_shows_median_and_spread() -> None:
+    assert page.cell(RECORD) == "3.00 / 5.00 (67%)"
+
+
+def test_the_page_is_made_from_the_lines_beside_it() -> None:
+    text = page.PAGE.read_text(encoding="utf-8")
+    lines = page.SOURCE.read_text(encoding="utf-8").splitlines()
+    assert page.render(text, read(lines)) == text, "run python -m benchmarks.page, or make bench-docs"
+
+
+def test_the_page_has_every_table_once() -> None:
+    names = [match["name"] for match in page.BLOCK.finditer(page.PAGE.read_text(encoding="utf-8"))]
+    assert sorted(names) == sorted(page.TABLES)
+    suites = {json.loads(line)["suite"] for line in page.SOURCE.read_text(encoding="utf-8").splitlines()}
+    assert suites == {suite for suite, _ in page.TABLES.values()}
+
+
+def test_samples_are_sorted_into_parts_by_their_innermost_line(tmp_path: Path) -> None:
+    steps = tmp_path / "steps.py"
+    steps.write_text("given.token = Token(result)\nsomething.new()\n")
+    outer = "<module> (bench.py:1);Engine._drain (engine/engine.py:1)"
+    found = profile_hop.shares(
+        [
+            f"{outer};_through_step.<locals>.step ({steps}:1) 3",
+            f"{outer};_through_step.<locals>.step ({steps}:2) 2",
+            f"{outer} 1",
+            f"{outer};_through_step.<locals>.step ({steps}:1);through (benchmarks/nodes.py:1) 4",
+            "<module> (bench.py:1) 100",
+        ]
+    )
+    assert {name: share for name, share in found.items() if share} == {
+        "your function: its call and its return": 40.0,
+        "the token: making it, onto its edge and off it": 30.0,
+        "the run queue: in, out, and the step's call": 10.0,
+        "the rest of the engine": 20.0,
+    }
+
+
+def test_a_profile_that_met_nothing_is_an_error() -> None:
+    with pytest.raises(RuntimeError, match=r"Engine\._drain"):
+        profile_hop.shares(["<module> (bench.py:1) 100"])
