@@ -29,6 +29,8 @@ __all__ = [
     "ParameterSet",
     "QueueGrown",
     "RunEnded",
+    "RunPaused",
+    "RunResumed",
     "RunStarted",
     "StructureChanged",
     "TokenDrained",
@@ -54,6 +56,16 @@ class RunEnded(TraceEvent, frozen=True):
     """Nothing moves any more; `outcome` as in the run's report."""
 
     outcome: str
+
+
+class RunPaused(TraceEvent, frozen=True):
+    """From now on no firing and no slot call starts (R3); `why`: "pause", or the path of a breakpoint."""
+
+    why: str
+
+
+class RunResumed(TraceEvent, frozen=True):
+    """The run goes on after a pause (R3)."""
 
 
 class FiringStarted(TraceEvent, frozen=True):

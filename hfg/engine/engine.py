@@ -22,6 +22,7 @@ from hfg.engine.consumers import Consumers
 from hfg.engine.core import Core
 from hfg.engine.groups import Dispatching, Group, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.lifetime import Lifetime
+from hfg.engine.pausing import Halt, Pausing
 from hfg.engine.policies import make_policy
 from hfg.engine.settings import Settings
 from hfg.engine.upstairs import Deciders
@@ -124,6 +125,7 @@ class Engine:
         self.start = self.lifetime.start
         self.close = self.lifetime.close
         self.groups = self._make_groups()
+        self.pausing = Pausing(self)
         self._loop_group = self.groups["loop"]
         self.started_at = 0.0
         self.hurried = asyncio.Event()
@@ -217,11 +219,15 @@ class Engine:
         core = self.core
         if core.over or not core.started:
             return
+        if self._rests():
+            return
         policy: Any = self._loop_group.policy
         core.pumping = True
         core.plain = core.trace is None
         try:
             self._drain(policy, self._loop_group.take, self._ready_groups)
+        except Halt:
+            pass
         except Exception as error:
             self.internal_fault(error)
         except (asyncio.CancelledError, GeneratorExit) as error:
@@ -231,10 +237,20 @@ class Engine:
             core.current = None
         if self.ended_how is not None:
             return
+        if self._rests():
+            return
         if policy or self._ready_groups:
             self.kick()
         else:
             self._settle()
+
+    def _rests(self) -> bool:
+        """R3: paused, so nothing new starts: it is quiet when nothing is under way, but does not end by that."""
+        if self.pausing.paused:
+            if not self.core.in_flight:
+                self._answer_quiet()
+            self.pausing.rest()
+        return self.pausing.paused
 
     def internal_fault(self, error: BaseException) -> None:
         """A fault of ours must end the run, not hang it."""
@@ -408,6 +424,7 @@ class Engine:
                 for waiter in worker.room_waiters:
                     waiter()
         self._answer_quiet()
+        self.pausing.rest()
         self.ending.set()
 
     @property

@@ -33,6 +33,7 @@ class Group:
     """
 
     threaded = False
+    held = False  # the run is paused: nobody of it moves
 
     def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
         self.name = name
@@ -102,7 +103,7 @@ class SideGroup(LoopGroup):
         self._stands = False
         try:
             for _ in range(_DISPATCH_STEPS):
-                if not len(self.policy):
+                if self.held or not len(self.policy):
                     return
                 worker = self.take()
                 worker.step(worker)
@@ -173,6 +174,8 @@ class ThreadGroup(Group):
         """Let nodes start until the thread is busy; on the loop."""
         policy = self.policy
         for _ in range(_DISPATCH_STEPS):
+            if self.held:
+                break
             if self.running or not len(policy):
                 return
             worker = self.take()

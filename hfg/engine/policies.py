@@ -10,7 +10,7 @@ import heapq
 import itertools
 import random
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any, Protocol
 
@@ -41,6 +41,12 @@ class Policy(Protocol):
     def pop(self) -> Worker:
         """Give out the next one."""
 
+    def remove(self, worker: Worker) -> None:
+        """Take out one that stands in it."""
+
+    def __iter__(self) -> Iterator[Worker]:
+        """Go through those that stand in it, the next ones first as far as that is known."""
+
     def __len__(self) -> int: ...
 
 
@@ -64,6 +70,14 @@ class _Ranked:
     def pop(self) -> Worker:
         """See `Policy`."""
         return heapq.heappop(self._heap)[2]
+
+    def remove(self, worker: Worker) -> None:
+        """See `Policy`."""
+        self._heap = [entry for entry in self._heap if entry[2] is not worker]
+        heapq.heapify(self._heap)
+
+    def __iter__(self) -> Iterator[Worker]:
+        return iter([worker for _, _, worker in sorted(self._heap, key=lambda entry: entry[:2])])
 
     def __len__(self) -> int:
         return len(self._heap)
@@ -149,6 +163,13 @@ class SeededRandom:
         position = self._random.randrange(len(workers))
         workers[position], workers[-1] = workers[-1], workers[position]
         return workers.pop()
+
+    def remove(self, worker: Worker) -> None:
+        """See `Policy`."""
+        self._workers.remove(worker)
+
+    def __iter__(self) -> Iterator[Worker]:
+        return iter(self._workers)
 
     def __len__(self) -> int:
         return len(self._workers)

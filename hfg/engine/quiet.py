@@ -26,6 +26,7 @@ __all__ = [
     "only_futile_in_flight",
     "only_waiting_for_room",
     "stall",
+    "waits_for",
 ]
 
 
@@ -178,9 +179,9 @@ def stall(core: Core) -> Stalled | None:
     for target, *edges in stuck.values():
         lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
         who = "" if target.is_boundary_output else f'"{target.path}" '
-        reasons.append(f"{who}{_waits_for(target)}, while tokens lie on {lies}")
+        reasons.append(f"{who}{waits_for(target)}, while tokens lie on {lies}")
     reasons.extend(
-        f'source "{source.path}" has not ended and {_waits_for(source)}'
+        f'source "{source.path}" has not ended and {waits_for(source)}'
         for source in core.sources
         if not source.blocked & (ENDED | DISABLED | RESTING | FUTILE)
     )
@@ -194,7 +195,8 @@ def stall(core: Core) -> Stalled | None:
     )
 
 
-def _waits_for(worker: Worker) -> str:
+def waits_for(worker: Worker) -> str:
+    """Say what keeps a node from moving, as the end of a sentence about it."""
     if worker.is_boundary_output:
         return f'graph output "{worker.port_name}" is not read (`async for value in run.read(...)` would)'
     blocked = worker.blocked

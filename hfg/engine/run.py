@@ -21,6 +21,7 @@ from hfg.engine.engine import Engine
 from hfg.engine.interrupt import CtrlC
 from hfg.engine.report import Report, edge_reports, node_reports
 from hfg.engine.settings import Settings
+from hfg.engine.steering import Steering
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import Worker
 from hfg.errors import CheckFailed, GraphError, HfgError, NotRunning, RunError, UsageError
@@ -38,7 +39,7 @@ __all__ = ["Run", "run", "run_async", "running"]
 Clock = Literal["real", "virtual"]
 
 
-class Run:
+class Run(Steering):
     """A graph that runs; made by `running`."""
 
     def __init__(self, graph: Graph, engine: Engine) -> None:

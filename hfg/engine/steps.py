@@ -32,7 +32,13 @@ Step = Callable[[Worker], None]
 
 
 def choose(worker: Worker) -> None:
-    """Give the worker the shortest step that is right for its present shape."""
+    """Give the worker the shortest step that is right for its present shape, behind its breakpoint if it has one."""
+    _choose(worker)
+    if worker.halt is not None:
+        worker.step = worker.halt(worker.step)
+
+
+def _choose(worker: Worker) -> None:
     core = worker.core
     if worker.is_boundary_output:
         worker.step = worker.process or _leave_lying

@@ -117,6 +117,7 @@ class Worker:
         "gates_over",
         "generator",
         "group",
+        "halt",
         "handlers",
         "has_hooks",
         "held",
@@ -226,6 +227,7 @@ class Worker:
         self.gates_over: tuple[Gate, ...] = ()  # it works only while their states are active
         self.gates: list[Any] = []  # that look at its activity
         self.active_for_s: float | None = None
+        self.halt: Callable[[Callable[[Worker], None]], Callable[[Worker], None]] | None = None  # R3: its breakpoint
         self.observed = False  # somebody waits at its barriers: no short ways
         self.watched = False  # activity changes have consequences beyond the flag
         self.is_source = False

@@ -28,6 +28,8 @@ from hfg.trace import (
     ParameterSet,
     QueueGrown,
     RunEnded,
+    RunPaused,
+    RunResumed,
     RunStarted,
     StructureChanged,
     TokenDrained,
@@ -137,6 +139,7 @@ class Replay:
     def __init__(self, graph: Any, *, until_s: float | None = None, held_open: bool = False) -> None:
         self.machine = ReferenceMachine(graph, until_s=until_s, held_open=held_open)
         self.seen: list[TraceEvent] = []
+        self._paused = False  # time may go on although nodes are enabled (R3)
         self.expected: list[TraceEvent] = []
         self._connected = {
             self.machine.event_path(line.edge.source.owner, line.edge.source.name)
@@ -152,6 +155,8 @@ class Replay:
         Raises:
           Divergence: the rules do not explain it.
         """
+        if isinstance(event, RunPaused | RunResumed):
+            self._paused = isinstance(event, RunPaused)
         if self._is_idle(event):
             return
         if event.time > self.machine.now + _SAME_TIME:
@@ -209,7 +214,7 @@ class Replay:
             return event.event not in self._connected
         if isinstance(event, TokenProcessed):  # a delay ends the wave: nobody waits, so nobody need be told when
             return event.edge in self._delays
-        return isinstance(event, StructureChanged)
+        return isinstance(event, StructureChanged | RunPaused | RunResumed)
 
     def is_inside(self, event: TraceEvent) -> bool:
         """Whether an event happened inside an iterating subgraph."""
@@ -364,6 +369,8 @@ class Replay:
                 raise Divergence("time went on before all of the last decision was done", event, self)
             moves = self.machine.moves()
             steps = [move for move in moves if move.kind in ("wait", "finish", "complete")]
+            if self._paused and not any(move.kind == "wait" for move in steps):
+                steps = [Move("wait", time=event.time)]
             wait = min(steps, key=lambda move: (move.kind == "finish", move.time), default=None)
             if wait is None:
                 raise Divergence("time went on although the rules permit moves now", event, self)
