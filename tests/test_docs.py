@@ -17,7 +17,7 @@ import sys
 import types
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -27,6 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 FENCE = re.compile(r"^(?P<indent> *)```(?P<info>[^\n`]*)\n(?P<code>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL)
 MOST_FRAGMENTS_A_PAGE = 3
+FLAWED = {"wrong", "loop", "flawed"}  # graphs that show what a check finds
 
 
 class Block(NamedTuple):
@@ -82,6 +83,14 @@ class Page:
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_page_runs_as_written(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    graphs: list[hfg.Graph] = []
+    make = hfg.Graph.__init__
+
+    def remembered(graph: hfg.Graph, *arguments: Any, **options: Any) -> None:
+        make(graph, *arguments, **options)
+        graphs.append(graph)
+
+    monkeypatch.setattr(hfg.Graph, "__init__", remembered)
     live, printed = Page(page), ""
     try:
         for block in blocks(page):
@@ -89,6 +98,9 @@ def test_page_runs_as_written(page: Path, tmp_path: Path, monkeypatch: pytest.Mo
                 printed = live.run(block)
             elif block.info == "output":
                 assert printed.rstrip() == block.code, f"{page_id(page)}:{block.line} promises another output"
+        whole = [graph for graph in graphs if not graph.path and graph.name not in FLAWED]
+        alarms = [str(problem) for graph in whole for problem in graph.check() if problem.severity != "hint"]
+        assert not alarms, "\n".join(alarms)  # sound as they are, a check must not frighten their readers
     finally:
         live.close()
 
