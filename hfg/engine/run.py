@@ -26,7 +26,8 @@ from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import Worker
 from hfg.errors import CheckFailed, GraphError, HfgError, NotRunning, RunError, UsageError
 from hfg.graph import Graph
-from hfg.graph.checks import check_flat, runs_for_ever
+from hfg.graph.checks import check_flat
+from hfg.graph.endless import endless
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.nodetype import Node
 from hfg.ports import EventPort, ParameterPort, SlotPort
@@ -409,15 +410,15 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
 
 
 def _refuse_endless(flat: FlatGraph) -> None:
-    """R6: under a virtual clock a source that never ends and waits for nothing would hold time still for ever."""
-    for node in flat.nodes:
-        gated = any(gate.target == node.index for gate in flat.gates)
-        if runs_for_ever(node.node) and not node.options.max_rate_hz and not gated:
-            raise GraphError(
-                f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time '
-                f"would stand still "
-                f"for ever: give it max_rate_hz=, or let it raise hfg.EndOfStream"
-            )
+    """R6: under a virtual clock a source that never ends and waits for nothing would hold time still for ever.
+
+    Only where that is certain; else the engine notices that time has stood still for millions of firings.
+    """
+    for node in endless(flat, virtual=True):
+        raise GraphError(
+            f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time would stand still '
+            "for ever: give it max_rate_hz=, or let it raise hfg.EndOfStream"
+        )
 
 
 async def _run_to_end(graph: Graph, clock: Clock, settings: Settings, ctrl_c: CtrlC | None = None) -> Report:

@@ -13,7 +13,6 @@ from hfg.graph.checks_edges import borders, joined_edges, promotions
 from hfg.graph.checks_flow import (
     endless_sources,
     filling_rings,
-    runs_for_ever,
     signal_rings,
     silent_events,
     synchronous_rings,
@@ -25,7 +24,7 @@ from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure import Graph
 from hfg.problem import SEVERITIES, Problem
 
-__all__ = ["Check", "also", "check", "check_flat", "runs_for_ever"]
+__all__ = ["Check", "also", "check", "check_flat"]
 
 Check: TypeAlias = Callable[[FlatGraph], Iterable[Problem]]
 

@@ -5,22 +5,18 @@ Stands on `flat` and `order`.
 
 from __future__ import annotations
 
-import builtins
-import inspect
-import types
 from collections import deque
 from collections.abc import Iterable, Iterator
 
+from hfg.graph.endless import endless
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, scope_end
 from hfg.graph.order import rings, shortest_ring
-from hfg.nodetype import Node
 from hfg.problem import Problem
 
 __all__ = [
     "endless_sources",
     "filling_rings",
     "never_fires",
-    "runs_for_ever",
     "signal_rings",
     "silent_events",
     "synchronous_rings",
@@ -268,37 +264,15 @@ def _slots(names: list[str]) -> str:
 
 def endless_sources(flat: FlatGraph) -> Iterator[Problem]:
     """Sources that keep the loop busy for ever; only those of which it is certain (rule F2)."""
-    held = {edge.target.node for edge in flat.edges if edge.target.kind == "parameter"}
-    for node in flat.nodes:
-        if node.options.max_rate_hz is None and node.index not in held and runs_for_ever(node.node):
-            yield Problem(
-                path=node.path,
-                severity="warning",
-                what="a source without a rate that never ends and waits for nothing",
-                why="it fires as often as the machine can (rule F2)",
-                remedy="add it with max_rate_hz=, raise hfg.EndOfStream, or write a generator",
-                check="endless-source",
-            )
-
-
-def runs_for_ever(node: Node) -> bool:
-    """Say whether a source certainly never ends and never waits: a plain function that calls nothing which could.
-
-    Only what its code shows counts; when in doubt the answer is no.
-    """
-    kind = node._type
-    if not kind.is_source or kind.process_kind != "function" or "ready" in kind.hooks:
-        return False
-    function = getattr(kind.origin, "function", None)
-    if not isinstance(function, types.FunctionType):
-        return False
-    names = inspect.getclosurevars(function)
-    used = {**names.globals, **names.nonlocals}
-    if names.unbound - set(dir(builtins)) and any(isinstance(one, types.ModuleType) for one in used.values()):
-        return False  # a call of something in a module may wait or raise
-    return not any(
-        callable(one) or isinstance(one, types.ModuleType) or hasattr(type(one), "__dict__") for one in used.values()
-    )
+    for node in endless(flat):
+        yield Problem(
+            path=node.path,
+            severity="warning",
+            what="a source without a rate that never ends and waits for nothing",
+            why="it fires as often as the machine can (rule F2)",
+            remedy="add it with max_rate_hz=, or raise hfg.EndOfStream",
+            check="endless-source",
+        )
 
 
 def _successors(flat: FlatGraph, edges: Iterable[FlatEdge]) -> list[list[int]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import random
 import time
 import tracemalloc
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ import pytest
 
 import hfg
 from hfg.graph import Graph, Subgraph
-from hfg.graph.checks import check, runs_for_ever
+from hfg.graph.checks import check
 from hfg.graph.flat import flatten
 from hfg.problem import Problem
 
@@ -375,16 +374,6 @@ def test_source_that_certainly_runs_for_ever_is_a_warning(graph: Graph) -> None:
     graph.add(seven(), max_rate_hz=10)
     graph.add(numbers())
     assert [problem.path for problem in found(graph, "warning")] == ["seven"]
-
-
-@pytest.mark.rule("F2")
-def test_source_that_may_end_or_wait_is_left_alone() -> None:
-    assert runs_for_ever(seven())
-    assert not runs_for_ever(clock())  # calls into a module
-    assert not runs_for_ever(twice())  # calls other code
-    assert not runs_for_ever(hfg.node(random.random, inputs={}, outputs=float)())
-    assert not runs_for_ever(numbers())
-    assert not runs_for_ever(Unit())
 
 
 def test_types_that_cannot_be_found_by_name_are_told_once(graph: Graph) -> None:
