@@ -7,9 +7,11 @@ drives never disagrees, the lamp shows the state, and nothing is tried for ever.
 from __future__ import annotations
 
 import asyncio
+import re
 from collections import Counter
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -308,3 +310,11 @@ def test_the_story_is_told_in_virtual_seconds(capsys: pytest.CaptureFixture[str]
     ]
     assert "cube 2 is delivered" in told[-5]
     assert told[-1].endswith("go_home")
+
+
+def test_the_page_about_it_shows_lines_that_are_in_it() -> None:
+    root = Path(__file__).parents[2]
+    source = {line.strip() for line in (root / "examples/mission.py").read_text(encoding="utf-8").splitlines()}
+    page = (root / "docs/mission.md").read_text(encoding="utf-8")
+    for fragment in re.findall(r"```python no-run\n(.*?)```", page, re.DOTALL):
+        assert set(filter(None, fragment.splitlines())) <= source

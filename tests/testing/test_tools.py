@@ -154,6 +154,15 @@ def test_a_result_that_depends_on_the_schedule_is_reported_with_its_seed() -> No
     assert order(again) == order(caught.value.trace)
 
 
+def test_of_long_results_the_part_is_told_in_which_they_differ() -> None:
+    def order(trace: Recorder) -> dict[str, object]:
+        told = [event.edge for event in trace.of(TokenTaken) if event.edge.endswith("tally.note")]
+        return {"outcome": trace.outcome, "order": ("tally.note", told)}
+
+    with pytest.raises(ScheduleFailure, match=r"result\['order'\]\[1\]\[0\] is '(left|right)\.pulse -> tally\.note'"):
+        explore(racing, runs=20, result=order)
+
+
 def test_the_shortest_failing_schedule_is_reported() -> None:
     def left_first(events: list[TraceEvent]) -> list[str]:
         taken = [event.edge for event in events if isinstance(event, TokenTaken) and event.edge.endswith("tally.note")]
