@@ -5,19 +5,19 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/ready
-PEERS  := .venv-peers
+
+# The bench targets write a line of JSON per case into RESULTS; bench-docs makes the tables of docs/speed.md from them.
 RESULTS := benchmarks/results
+PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-# bench targets write one line of JSON per case into $(RESULTS); bench-docs makes the tables of docs/speed.md from them.
 .PHONY: help demo test lint bench bench-peers bench-docs soak setup clean
 
 help:
 	@echo "make demo    search, measure and report on real photographs, with a gate"
 	@echo "make test    run all tests (without the long ones)"
 	@echo "make lint    ruff and mypy"
-	@echo "make bench   run the benchmarks (5 minutes); make bench-peers: beside other libraries, and the profile (4 minutes)"
-	@echo "make bench-docs  make the tables of docs/speed.md from what they measured"
+	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md)"
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything tools have left"
 

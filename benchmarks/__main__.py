@@ -17,12 +17,15 @@ from pathlib import Path
 from benchmarks.measure import Record, here, machine, measure, write
 
 SUITES = ("bench_kinds", "bench_shape", "bench_threads", "bench_virtual_day")
+OTHERS = ("bench_peers",)
 
 
 def main() -> int:
     """Run what was asked for and print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("suites", nargs="*", default=SUITES, help="by module name; all of ours by default")
+    parser.add_argument(
+        "suites", nargs="*", default=SUITES, help=f"of {', '.join(SUITES + OTHERS)}; all but the last by default"
+    )
     parser.add_argument("--runs", type=int, help="fresh processes per case; each suite has its own default, mostly 5")
     parser.add_argument("--json", type=Path, metavar="FOLDER", help="write one line per case, a file per suite")
     parser.add_argument("--case", help=argparse.SUPPRESS)
@@ -30,6 +33,9 @@ def main() -> int:
     if arguments.case:
         print(json.dumps(here(*arguments.case.split(":", 1))))
         return 0
+    unknown = [name for name in arguments.suites if name not in SUITES + OTHERS]
+    if unknown:
+        parser.error(f"there is no suite {', '.join(unknown)}: there are {', '.join(SUITES + OTHERS)}")
     print(machine())
     for name in arguments.suites:
         suite = importlib.import_module(f"benchmarks.{name}")
@@ -58,4 +64,9 @@ def row(record: Record) -> str:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    try:
+        raise SystemExit(main())
+    except RuntimeError as error:
+        raise SystemExit(f"{error}") from None
+    except KeyboardInterrupt:
+        raise SystemExit(130) from None

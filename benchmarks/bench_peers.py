@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-from benchmarks.ours import KINDS, States
+from benchmarks.ours import KINDS, Machine, States
 from benchmarks.works import Participant, cases
 
 HOPS = 60_000
@@ -66,6 +66,7 @@ CASES = cases(
         Row("hfg, functions", KINDS[0], *FLOW),
         Row("hfg, async functions", KINDS[2], *FLOW),
         Row("hfg, activity round ten nodes", States(), "step"),
+        Row("hfg, a StateMachine of ten states", Machine(), "step"),
         peer("plain calls", "plain", *FLOW),
         peer("await in place", "plain", "chain"),
         peer("asyncio.Queue(1)", "queues", *FLOW),

@@ -1,6 +1,6 @@
 """Two thread groups with OpenCV work against one.
 
-Measured: wall seconds for 60 pictures of 1280 x 960 through a fork into two branches of blurs, once with both
+Measured: wall seconds for 40 pictures of 1280 x 960 through a fork into two branches of blurs, once with both
   branches in one thread group and once in two;
 `cv2.setNumThreads(1)` in both, so that the groups alone give the parallelism.
 """
@@ -19,7 +19,7 @@ import hfg
 from benchmarks.measure import Case
 
 DISTRIBUTIONS = ("hfg", "opencv-python-headless")
-PICTURES = 60
+PICTURES = 40
 
 
 @hfg.node

@@ -16,12 +16,14 @@ import statistics
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-__all__ = ["Case", "Record", "machine", "measure", "one", "read", "write"]
+__all__ = ["ROOT", "Case", "Record", "here", "machine", "measure", "one", "read", "versions", "write"]
 
 Figures = float | dict[str, float]
+ROOT = Path(__file__).resolve().parent.parent
 
 
 class Case(NamedTuple):
@@ -72,7 +74,6 @@ def measure(name: str, runs: int, say: Callable[[str], None]) -> list[Record]:
             say(f"{name}: run {number + 1} of {runs}, case {position + 1} of {len(suite.CASES)}")
             found[case].append(one(name, case))
     loads = (round(load, 2), round(os.getloadavg()[0], 2))
-    versions = {package: importlib.metadata.version(package) for package in getattr(suite, "DISTRIBUTIONS", ())}
     return [
         Record(
             suite=name,
@@ -81,7 +82,7 @@ def measure(name: str, runs: int, say: Callable[[str], None]) -> list[Record]:
             size=suite.CASES[case].size,
             figures={key: [round(figures[key], 5) for figures in several] for key in several[0]},
             machine=machine(),
-            versions=versions,
+            versions=versions(*getattr(suite, "DISTRIBUTIONS", ())),
             load=loads,
         )
         for case, several in found.items()
@@ -95,7 +96,7 @@ def one(suite: str, case: str) -> dict[str, float]:
       RuntimeError: the case failed; with what it said.
     """
     command = [sys.executable, "-m", "benchmarks", "--case", f"{suite}:{case}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, cwd=ROOT)
     if done.returncode:
         raise RuntimeError(f"{suite}: {case} failed:\n{done.stdout}{done.stderr}")
     return dict(json.loads(done.stdout.strip().splitlines()[-1]))
@@ -112,6 +113,15 @@ def machine() -> str:
     """What the figures were measured on."""
     cores = os.cpu_count()
     return f"{platform.system()} {platform.machine()}, {processor()}, {cores} cores, Python {platform.python_version()}"
+
+
+def versions(*packages: str) -> dict[str, str]:
+    """What the packages are at; one that runs from its sources has no version here."""
+    found = {}
+    for package in packages:
+        with suppress(importlib.metadata.PackageNotFoundError):
+            found[package] = importlib.metadata.version(package)
+    return found
 
 
 def processor() -> str:

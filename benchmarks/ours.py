@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import hfg
@@ -26,7 +26,7 @@ from benchmarks.nodes import (
 )
 from benchmarks.works import Participant
 
-__all__ = ["KINDS", "Fan", "Kind", "Outside", "States"]
+__all__ = ["KINDS", "Fan", "Kind", "Machine", "Outside", "States"]
 
 STATES = 10
 
@@ -48,14 +48,9 @@ def end(meter: Arrivals | None = None) -> End:
     return node
 
 
-def run(graph: hfg.Graph, **options: Any) -> None:
+def run(graph: hfg.Graph) -> hfg.Report:
     """Run it to its end; nobody observes."""
-
-    async def main() -> None:
-        async with hfg.running(graph, **options) as run:
-            await run.wait_finished()
-
-    asyncio.run(main())
+    return hfg.run(graph)
 
 
 class Kind(Participant):
@@ -199,6 +194,32 @@ class States(Participant):
             node.done.activates(after.begin)
         graph.start.activates(nodes[0].begin)
         run(graph)
+        return meter.figures()
+
+
+class Machine(Participant):
+    """The same ring as a machine's translation (A13): letters come from a source, and every state hears each."""
+
+    name = "hfg, a StateMachine of ten states"
+
+    def step(self, tokens: int) -> dict[str, float]:
+        """E: microseconds a letter: ten slots are called, one of them hands the activity on."""
+        meter = Arrivals(tokens)
+        names = [f"s{number}" for number in range(STATES)]
+        ring = zip(names, [*names[1:], names[0]], strict=True)
+        machine = hfg.StateMachine(names, [("step", state, after) for state, after in ring], initial=names[0])
+
+        def letters() -> Iterator[str]:
+            for number in range(tokens):
+                yield "step"
+                meter.take(number)  # asked for the next one: this one has been read by all
+
+        graph = hfg.Graph("machine")
+        machine.build(graph, letters=graph.add(hfg.node(letters)()).out)
+        report = run(graph)
+        active = [path for path, node in report.nodes.items() if node.active]
+        if active != [names[tokens % STATES]]:
+            raise RuntimeError(f"after {tokens} letters {active} are active")
         return meter.figures()
 
 

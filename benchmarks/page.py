@@ -14,12 +14,11 @@ import statistics
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from benchmarks.measure import Record, read
+from benchmarks.measure import ROOT, Record, read
 from benchmarks.works import WORKS
 
 __all__ = ["PAGE", "SOURCE", "TABLES", "render"]
 
-ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
 PAGE = ROOT / "docs" / "speed.md"
 SOURCE = ROOT / "docs" / "speed.jsonl"
@@ -91,8 +90,11 @@ def peers(records: Records) -> str:
 
 def ratios(records: Records) -> str:
     """The others' times divided by those of hfg's functions, or of its states, in the same run."""
-    own = {case.split(" | ")[1]: record.median for case, record in records.items() if case.startswith("hfg")}
-    own |= {work: records[case].median for work in WORKS if (case := f"{OURS} | {work}") in records}
+    own: dict[str, float] = {}
+    for case, record in records.items():  # the first of hfg's rows that does the work
+        row, work = case.split(" | ")
+        if row.startswith("hfg"):
+            own.setdefault(work, record.median)
     others = {case: record for case, record in records.items() if case.split(" | ")[0] != OURS}
     return matrix(others, lambda record: figure(record.median / own[record.case.split(" | ")[1]]))
 

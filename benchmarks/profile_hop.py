@@ -12,7 +12,6 @@ the hop with and without the sampler.
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
 import linecache
 import os
 import re
@@ -27,7 +26,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
-from benchmarks.measure import Record, machine, one, write
+from benchmarks.measure import ROOT, Record, machine, one, versions, write
 from benchmarks.meters import Arrivals
 from benchmarks.nodes import through
 from benchmarks.ours import Kind, run
@@ -132,7 +131,7 @@ def sampled(sampler: str, seconds: float) -> tuple[dict[str, float], float]:
         raw = Path(folder) / "raw.txt"
         watch = [sampler, "record", "--rate", str(RATE_HZ), "--format", "raw", "--full-filenames", "--output", str(raw)]
         command = [sys.executable, "-m", "benchmarks.profile_hop", "--work", str(seconds)]
-        done = subprocess.run([*watch, "--", *command], capture_output=True, text=True, check=False)
+        done = subprocess.run([*watch, "--", *command], capture_output=True, text=True, check=False, cwd=ROOT)
         if done.returncode or not raw.exists():
             raise RuntimeError(f"py-spy could not watch the run:\n{done.stdout}{done.stderr}")
         hop = next(float(line) for line in done.stdout.splitlines() if re.fullmatch(r"\d+\.\d+", line.strip()))
@@ -180,7 +179,7 @@ def gather(sampler: str, runs: int, seconds: float) -> list[Record]:
         suite="profile_hop",
         size=int(seconds * RATE_HZ),
         machine=machine(),
-        versions={name: importlib.metadata.version(name) for name in ("hfg", "py-spy")},
+        versions=versions("hfg", "py-spy"),
         load=(round(load, 2), round(os.getloadavg()[0], 2)),
     )
     return [record(case=name, unit=unit, figures={"value": values}) for (unit, name), values in found.items()]
