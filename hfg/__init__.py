@@ -9,11 +9,14 @@ Which floor stands on which; imports go down only, and asyncio begins on floor 5
     3  graph
     2  nodetype, functions  <-  declaration  <-  signature  <-  hints, description     registry
     1  ports                                       transport
-    0  errors   problem   token   types   clock   trace
+    0  errors   problem   token   types   clock   trace   starting
 
 A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
 """
 
+from hfg import starting as starting  # before all that takes its time to import
+
+# isort: split
 from hfg import errors
 from hfg.activity import StateMachine
 from hfg.clock import now

@@ -21,6 +21,7 @@ FLOORS = {
     "hfg.types": 0,
     "hfg.clock": 0,
     "hfg.trace": 0,
+    "hfg.starting": 0,
     "hfg.ports": 1,
     "hfg.transport": 1,
     "hfg.declaration": 2,

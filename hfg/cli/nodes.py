@@ -17,6 +17,7 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.target import load_module
+from hfg.errors import TargetError
 from hfg.functions import FunctionNode, NodeFunction
 from hfg.graph import Subgraph
 from hfg.nodetype import Node, NodeType
@@ -35,8 +36,7 @@ def nodes(
 ) -> int:
     """List the node types of a module, or of the standard library and what other packages have installed."""
     show.set_debug(debug)
-    places = [module] if module is not None else list(_installed())
-    found = [kind for place in places for kind in _node_types(load_module(place))]
+    found = [kind for loaded in _modules(module) for kind in _node_types(loaded)]
     if json:
         show.json([_described(kind) for kind in found])
     elif found:
@@ -51,9 +51,23 @@ def nodes(
             for kind in found
         ]
         show.table("", ("node type", "inputs, slots()", "outputs, events()", "parameters", "what it does"), rows)
+    elif module is None:
+        sys.stdout.write("no node types are installed; name a module or a file: hfg nodes robot.py\n")
     else:
-        sys.stdout.write(f"no node types in {', '.join(places) or 'what is installed'}\n")
+        sys.stdout.write(f"no node types in {module}\n")
     return 0
+
+
+def _modules(named: str | None) -> Iterator[ModuleType]:
+    """What is named, else all that is installed; what fails of that is told and left out."""
+    if named is not None:
+        yield load_module(named)
+        return
+    for place in _installed():
+        try:
+            yield load_module(place)
+        except TargetError as error:
+            show.sentence(str(error))
 
 
 def _installed() -> Iterator[str]:

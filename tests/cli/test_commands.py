@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from hfg.cli import main
+from hfg.cli import main, nodes
 
 GRAPH = '''
 """A graph for tests of the command line."""
@@ -58,11 +59,13 @@ def aborting() -> hfg.Graph:
 '''
 
 
+@dataclass
 class Shown:
     """What a command left behind."""
 
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
+    code: int
+    out: str
+    err: str
 
 
 class Command:
@@ -351,6 +354,23 @@ def test_nodes_of_a_file(hfg: Command) -> None:
     assert kinds["numbers"]["source"]
     assert [port["name"] for port in kinds["half"]["inputs"]] == ["number"]
     assert kinds["half"]["parameters"][0]["default"] == 2
+
+
+def test_nodes_without_a_module_say_what_is_installed_or_what_to_write(
+    hfg: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(nodes, "_installed", lambda: iter(()))
+    assert hfg("nodes") == Shown(0, "no node types are installed; name a module or a file: hfg nodes robot.py\n", "")
+    monkeypatch.setattr(nodes, "_installed", lambda: iter(("nowhere", "halves")))
+    shown = hfg("nodes")
+    assert shown.code == 0
+    assert "halves:numbers" in shown.out
+    assert shown.err == 'hfg: there is no module "nowhere" here or installed\n'
+
+
+def test_nodes_of_a_module_without_any_say_so(hfg: Command) -> None:
+    Path("empty.py").write_text("", encoding="utf-8")
+    assert hfg("nodes", "empty.py") == Shown(0, "no node types in empty.py\n", "")
 
 
 @pytest.mark.parametrize("arguments", [("--help",), ("run", "--help"), ("check", "--help"), ("nodes", "--help"), ()])

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from hfg.starting import is_command
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 
@@ -128,12 +132,54 @@ def test_second_interrupt_ends_at_once(process: Process) -> None:
     assert "twice" in err
 
 
+WAITS = "import threading\nprint('begun', flush=True)\nthreading.Event().wait()\n"
+
+
 def test_interrupt_while_the_target_is_imported(process: Process) -> None:
-    process.run("import time\nprint('begun', flush=True)\ntime.sleep(60)\n")
+    process.run(WAITS)
     process.interrupt()
     code, seconds, err = process.end()
     assert (code, err) == (1, "hfg: interrupted\n")
     assert seconds < PROMISED_S + SLACK_S
+
+
+def test_interrupt_while_the_graph_is_built(process: Process) -> None:
+    process.run("import hfg\n\n\ndef build() -> hfg.Graph:\n" + textwrap.indent(WAITS, "    "))
+    process.interrupt()
+    code, _, err = process.end()
+    assert (code, err) == (1, "hfg: interrupted\n")
+
+
+def test_interrupt_while_hfg_itself_is_imported(
+    process: Process, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "reactivex.py").write_text(WAITS, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
+    process.run("")
+    process.interrupt()
+    code, _, err = process.end()
+    assert (code, err) == (1, "hfg: interrupted\n")
+
+
+@pytest.mark.parametrize(
+    ("argv", "given", "is_ours"),
+    [
+        (["-m"], ["python", "-m", "hfg", "run"], True),
+        (["-m"], ["python", "-X", "dev", "-m", "hfg"], True),
+        (["/usr/bin/hfg", "run"], ["python", "/usr/bin/hfg", "run"], True),
+        (["-m"], ["python", "-m", "pytest"], False),
+        (["-m"], ["python", "-m"], False),
+        (["robot.py"], ["python", "robot.py"], False),
+        ([""], ["python"], False),
+        ([], ["python"], False),
+    ],
+)
+def test_only_the_command_takes_the_signal_while_it_is_imported(
+    argv: list[str], given: list[str], is_ours: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", argv)
+    monkeypatch.setattr(sys, "orig_argv", given)
+    assert is_command() is is_ours
 
 
 def test_the_trace_is_whole_after_an_interrupt(process: Process, tmp_path: Path) -> None:
