@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-EXAMPLES = sorted(file for file in (ROOT / "examples").rglob("*.py") if not file.name.startswith("_"))
+EXAMPLES = sorted(file for file in (ROOT / "examples").glob("*.py") if not file.name.startswith("_"))
 
 
 def hfg(*arguments: str) -> subprocess.CompletedProcess[str]:
