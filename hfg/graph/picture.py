@@ -224,7 +224,9 @@ def _box_label(name: str, options: Any) -> str:
 def _ports_label(edge: Edge) -> str:
     """Name the ports, unless there is only one that it could be, or the port is drawn by itself."""
     source, target = _source_name(edge.source), _target_name(edge.target)
-    return f"{source} → {target}" if source and target else f"→ {target}" if target else source
+    if source == target or not target:
+        return source
+    return f"{source} → {target}" if source else f"→ {target}"
 
 
 def _source_name(end: Any) -> str:
