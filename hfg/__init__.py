@@ -23,7 +23,7 @@ from hfg.clock import now
 from hfg.engine import Report, Run, VirtualTimeLoop, run, run_async, running
 from hfg.errors import EndOfStream
 from hfg.functions import node
-from hfg.graph import Graph, Subgraph
+from hfg.graph import Graph, Subgraph, commands
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 from hfg.token import END, NO_MESSAGE, Token
@@ -45,6 +45,7 @@ __all__ = [
     "Subgraph",
     "Token",
     "VirtualTimeLoop",
+    "commands",
     "errors",
     "node",
     "now",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
+from types import ModuleType
 from typing import Any, TypeVar, overload
 
 from reactivex import Observable
@@ -17,6 +18,7 @@ from hfg import errors
 from hfg.errors import GraphError, UsageError
 from hfg.graph.boundary import GraphInput, GraphOutput, lifecycle_ports
 from hfg.graph.boxes import is_box
+from hfg.graph.commands import Command
 from hfg.graph.edges import Edge, end_path, is_single, refuse
 from hfg.graph.gates import Gate, refuse_gate
 from hfg.graph.members import iterated_inputs, need_new, need_subgraph_options, refuse_move
@@ -51,7 +53,7 @@ T = TypeVar("T")
 class Graph:
     """An activity flow graph; inside a subgraph, the part of it that lies there.
 
-    While it runs its structure stays as it is: whatever would change it raises `UsageError`.
+    While it runs its structure is changed by commands alone (`run.edit`): whatever else would raises `UsageError`.
 
     Attributes:
       name: for people; not part of any path.
@@ -101,6 +103,9 @@ class Graph:
             str, list[ParameterPort[Any]]
         ] = {}  # the parameters inside that one of the subgraph stands for
         self._run: Any = None  # the run it has; written by the engine
+        self._edited = False  # commands are being carried out, which a run follows
+        self._revision = 0  # how often it was changed by hand
+        self._history: Any = None  # what was edited by commands; written by `editing`
 
     @classmethod
     def _inside(cls, owner: Node, around: Graph) -> Graph:
@@ -418,6 +423,58 @@ class Graph:
                 ) from error
             self._promoted.setdefault(outer.name, []).append(inner)
 
+    # --- editing by commands ---
+
+    def edit(self, *commands: Command) -> None:
+        """Carry commands out, all of them or, when one is refused, none; a graph that runs is edited by `run.edit`.
+
+        Raises:
+          GraphError: one cannot be; the message says which and why.
+          UsageError: the graph runs, or is the inside of a subgraph.
+
+        Example:
+          >>> from hfg import commands
+          >>> graph = Graph()
+          >>> graph.edit(commands.Add("hfg.testing.nodes:double", "double", options={"max_rate_hz": 5}))
+          >>> graph.undo()
+          >>> graph.nodes
+          {}
+        """
+        from hfg.graph.editing import edit
+
+        edit(self, commands)
+
+    def undo(self) -> None:
+        """Take the last edit back: everything is exactly as before it.
+
+        Raises:
+          UsageError: there is none, or the graph was changed by hand since, or runs.
+        """
+        from hfg.graph.editing import undo
+
+        undo(self)
+
+    def redo(self) -> None:
+        """Carry the edit out again that was undone last.
+
+        Raises:
+          UsageError: there is none, or the graph was changed since, or runs.
+        """
+        from hfg.graph.editing import redo
+
+        redo(self)
+
+    def reload(self, module: str | ModuleType) -> None:
+        """Run a changed module again; its node types replace those of its nodes, parameters are kept.
+
+        Raises:
+          GraphError: the module fails, or a new type does not fit the edges; nothing was changed.
+          UsageError: the graph runs: `run.reload` is for that.
+        """
+        from hfg.graph.editing import reload
+
+        reload(self, module)
+
     # --- finding and checking ---
 
     def __getitem__(self, path: str) -> Any:
@@ -470,11 +527,16 @@ class Graph:
     # --- inside ---
 
     def _need_rest(self, doing: str) -> None:
-        """Refuse to change the structure under a run, which would not hear of it."""
-        if self._root._run is not None:
+        """Refuse to change the structure under a run, which would not hear of it; and note that it was by hand."""
+        root = self._root
+        if root._edited:
+            return
+        if root._run is not None:
             raise UsageError(
-                f"{self._title} runs, so {doing} is refused: build the graph before the run, or stop the run first"
+                f"{self._title} runs, so {doing} by hand is refused: use commands, which the run follows, as in "
+                "await run.edit(hfg.commands.Connect(...)), or stop the run first"
             )
+        root._revision += 1
 
     @property
     def _title(self) -> str:

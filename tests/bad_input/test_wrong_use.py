@@ -68,8 +68,8 @@ def test_a_graph_that_runs_is_not_edited_and_goes_on(inside: bool, fast: bool) -
                 with pytest.raises(hfg.errors.UsageError) as refused:
                     edit()
                 assert str(refused.value) == (
-                    f"{title} runs, so {doing.strip()} is refused: build the graph before the run, or stop the run "
-                    "first"
+                    f"{title} runs, so {doing.strip()} by hand is refused: use commands, which the run follows, as in "
+                    "await run.edit(hfg.commands.Connect(...)), or stop the run first"
                 )
             ear.activated.subscribe(print)  # automatic ports are made when they are asked for, also now
             await run.trigger(ear.disable)

@@ -1,0 +1,402 @@
+"""Carries commands out on a drawn graph: each is checked as if it were written by hand, and noted as changes.
+
+All of a transaction or nothing: what is refused leaves the graph as it was. Stands on `commands`, `changes` and
+`enclosing`; a graph that runs is edited the same way, and the run follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import msgspec
+
+from hfg import registry
+from hfg.errors import ConnectionError as EdgeRefused
+from hfg.errors import GraphError, HfgError
+from hfg.graph import commands as c
+from hfg.graph.boxes import is_box
+from hfg.graph.changes import (
+    Change,
+    EdgeChange,
+    EdgeSwap,
+    GateChange,
+    NodeChange,
+    NodeSwap,
+    OptionsChange,
+    ParameterChange,
+    PromotionChange,
+    Renaming,
+    nodes_within,
+    undo_all,
+)
+from hfg.graph.copying import copy_of
+from hfg.graph.edges import Edge, refuse
+from hfg.graph.enclosing import dissolve, enclose
+from hfg.graph.gates import Gate
+from hfg.graph.naming import need_name
+from hfg.graph.options import edge_options
+from hfg.graph.pointing import graph_and_name, node_at, parameter_at, source_at, target_at
+from hfg.graph.structure import Graph
+from hfg.nodetype import Node
+from hfg.ports import InnerSource, InnerTarget
+
+__all__ = ["perform"]
+
+
+def perform(graph: Graph, commands: Sequence[c.Command]) -> list[Change]:
+    """Carry commands out, one after the other; all of them or, when one is refused, none.
+
+    Raises:
+      GraphError: one cannot be; the message says which, and why.
+    """
+    hand = _Hand(graph)
+    root = graph._root
+    before, root._edited = root._edited, True
+    try:
+        for command in commands:
+            hand.carry_out(command)
+    except BaseException:
+        undo_all(hand.changes)
+        raise
+    finally:
+        root._edited = before
+    return hand.changes
+
+
+class _Hand:
+    """Does what commands say and notes each step."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self.changes: list[Change] = []
+
+    def carry_out(self, command: c.Command) -> None:
+        """Do what one command says.
+
+        Raises:
+          GraphError: it cannot be; nothing of this command was done that is not noted.
+        """
+        method: Callable[[Any], None] | None = getattr(self, f"_{type(command).__name__.lower()}", None)
+        if method is None or not isinstance(command, c.Command):
+            raise GraphError(
+                f"an edit takes commands, got {command!r}; write one, as in hfg.commands.Connect('a.out', 'b.value')"
+            )
+        method(command)
+
+    def do(self, change: Change) -> None:
+        """Take a step and note it."""
+        change.do()
+        self.changes.append(change)
+
+    # --- nodes ---
+
+    def _add(self, command: c.Add) -> None:
+        around, name = graph_and_name(self.graph, command.path)
+        node = _made(command.type, command.parameters, command.path)
+        try:
+            around.add(node, name=name, **command.options)
+        except TypeError as error:
+            raise GraphError(f'node "{command.path}": {error}; options are those of graph.add') from error
+        self.changes.append(NodeChange.of(node, added=True))
+
+    def _remove(self, command: c.Remove) -> None:
+        self.take_out(node_at(self.graph, command.path))
+
+    def take_out(self, node: Any) -> None:
+        """Remove a node with all that refers to it."""
+        around: Graph = node.place.graph
+        gone = set(nodes_within(node))
+        for edge in [edge for edge in around.edges if _touches(edge, node)]:
+            self.do(EdgeChange.of(around, edge, added=False))
+        for level in _levels(self.graph):
+            for gate in [gate for gate in level.gates if gate.target in gone or gate.by in gone]:
+                self.do(GateChange(level, gate, level.gates.index(gate), added=False))
+        promoted = {name: [port for port in ports if port.node is not node] for name, ports in around._promoted.items()}
+        self.promote(around, promoted)
+        self.do(NodeChange.of(node, added=False))
+
+    def promote(self, around: Graph, promoted: dict[str, Any]) -> None:
+        """Let other parameters stand for those inside, if that changes anything."""
+        before = {name: list(ports) for name, ports in around._promoted.items()}
+        after = {name: ports for name, ports in promoted.items() if ports}
+        if before != after:
+            self.do(PromotionChange(around, before, after))
+
+    def _copy(self, command: c.Copy) -> None:
+        node = node_at(self.graph, command.path)
+        around, name = graph_and_name(self.graph, command.to)
+        _need_free(around, name, command.to)
+        copy, inside = copy_of(node, around)
+        self.do(NodeChange(around, name, copy, node._options, len(around.nodes), inside, added=True))
+
+    def _rename(self, command: c.Rename) -> None:
+        node = node_at(self.graph, command.path)
+        where = node.place
+        if command.name == where.name:
+            return
+        _need_free(where.graph, command.name, command.path)
+        self.do(Renaming(node, where.name, command.name))
+
+    def _replace(self, command: c.Replace) -> None:
+        old = node_at(self.graph, command.path)
+        new = _made(command.type, _kept(old, command), command.path)
+        if is_box(old) or is_box(new):
+            self._replace_box(old, new)
+            return
+        around: Graph = old.place.graph
+        edges = [edge for edge in around.edges if _touches(edge, old)]
+        for edge in edges:
+            _counterpart(edge.source, old, new)
+            _counterpart(edge.target, old, new)
+        self.do(NodeSwap(old, new))
+        for edge in edges:
+            source, target = _counterpart(edge.source, old, new), _counterpart(edge.target, old, new)
+            refuse(around, source, target, edge.options)
+            self.do(EdgeSwap(around, edge, Edge(source, target, edge.options)))
+        self._hand_over(around, old, new)
+
+    def _replace_box(self, old: Any, new: Any) -> None:
+        """A subgraph is built afresh, so its inside is another."""
+        around: Graph = old.place.graph
+        name, options = old.place.name, old._options
+        position = list(around.nodes).index(name)
+        edges = [(around.edges.index(edge), edge) for edge in around.edges if _touches(edge, old)]
+        for _, edge in edges:
+            _counterpart(edge.source, old, new)
+            _counterpart(edge.target, old, new)
+        gates = [
+            (level, gate) for level in _levels(self.graph) for gate in level.gates if old in (gate.target, gate.by)
+        ]
+        promoted = {key: list(ports) for key, ports in around._promoted.items()}
+        self.take_out(old)
+        around.add(new, name=name, **msgspec.structs.asdict(options))
+        added = NodeChange.of(new, added=True)
+        self.changes.append(added)
+        moved = NodeChange(around, name, new, added.options, position, added.inside, added=True)
+        self.do(added.inverse())
+        self.do(moved)
+        for at, edge in edges:
+            source, target = _counterpart(edge.source, old, new), _counterpart(edge.target, old, new)
+            refuse(around, source, target, edge.options)
+            self.do(EdgeChange(around, Edge(source, target, edge.options), at, added=True))
+        for level, gate in gates:
+            self.do(GateChange(level, _gate_of(gate, old, new), len(level.gates), added=True))
+        self.promote(around, _promoted_by(promoted, old, new))
+
+    def _hand_over(self, around: Graph, old: Node, new: Node) -> None:
+        """Gates and promotions go on with the new node."""
+        for level in _levels(self.graph):
+            for gate in [gate for gate in level.gates if old in (gate.target, gate.by)]:
+                position = level.gates.index(gate)
+                self.do(GateChange(level, gate, position, added=False))
+                self.do(GateChange(level, _gate_of(gate, old, new), position, added=True))
+        self.promote(around, _promoted_by(around._promoted, old, new))
+
+    # --- options and parameters ---
+
+    def _move(self, command: c.Move) -> None:
+        node = node_at(self.graph, command.path)
+        before = node._options
+        self.graph.move(node, group=command.group)
+        self._note_options(node, before)
+
+    def _enable(self, command: c.Enable) -> None:
+        self._set_enabled(command.path, True)
+
+    def _disable(self, command: c.Disable) -> None:
+        self._set_enabled(command.path, False)
+
+    def _set_enabled(self, path: str, enabled: bool) -> None:
+        node = node_at(self.graph, path)
+        before = node._options
+        node._options = msgspec.structs.replace(before, enabled=enabled)
+        self._note_options(node, before)
+
+    def _note_options(self, node: Node, before: Any) -> None:
+        self.changes.append(OptionsChange(node, before, node._options))
+
+    def _setparameter(self, command: c.SetParameter) -> None:
+        port = parameter_at(self.graph, command.path)
+        reached = list(_stands_for(port))
+        before = [(one.node, one.name, one.value) for one in reached]
+        try:
+            port.node._set_parameter(port.name, _fitting(port.spec, command.value))
+        except ValueError as error:
+            raise GraphError(str(error)) from error
+        self.changes += [ParameterChange(node, name, value, node._parameters[name]) for node, name, value in before]
+
+    # --- edges ---
+
+    def _connect(self, command: c.Connect) -> None:
+        source, target = source_at(self.graph, command.source), target_at(self.graph, command.target)
+        around = _level_of(self.graph, source, target)
+        edge = around.connect(
+            source,
+            target,
+            active=command.active,
+            capacity=command.capacity,
+            overflow=command.overflow,
+            capacity_limit=command.capacity_limit,
+            initial=command.initial,
+        )
+        home = around if around.edges and around.edges[-1] is edge else target.graph
+        self.changes.append(EdgeChange(home, edge, len(home.edges) - 1, added=True))
+
+    def _disconnect(self, command: c.Disconnect) -> None:
+        around, edge = self._edge(command.source, command.target)
+        self.do(EdgeChange.of(around, edge, added=False))
+
+    def _makeactive(self, command: c.MakeActive) -> None:
+        around, edge = self._edge(command.source, command.target)
+        if edge.active == command.active:
+            return
+        said = msgspec.structs.asdict(edge.options) | {"active": command.active}
+        options = edge_options(lambda: f'"{command.source}" -> "{command.target}"', **said)
+        refuse(around, edge.source, edge.target, options)
+        self.do(EdgeSwap(around, edge, Edge(edge.source, edge.target, options)))
+
+    def _edge(self, source_path: str, target_path: str) -> tuple[Graph, Edge]:
+        source, target = source_at(self.graph, source_path), target_at(self.graph, target_path)
+        levels: tuple[Graph, ...] = (_level_of(self.graph, source, target), self.graph)
+        for around in levels:
+            for edge in around.edges:
+                if edge.source is source and edge.target is target:
+                    return around, edge
+        raise EdgeRefused(
+            f'there is no edge "{source_path}" -> "{target_path}"; graph.edges lists those that there are'
+        )
+
+    # --- subgraphs ---
+
+    def _enclose(self, command: c.Enclose) -> None:
+        paths: object = command.paths
+        if isinstance(paths, str):
+            raise GraphError(f'Enclose takes several paths, got {paths!r}; write Enclose(("{paths}",), "box")')
+        members = [node_at(self.graph, path) for path in dict.fromkeys(command.paths)]
+        enclose(self.do, members, command.name)
+
+    def _dissolve(self, command: c.Dissolve) -> None:
+        dissolve(self.do, node_at(self.graph, command.path), _levels(self.graph))
+
+
+def _touches(edge: Edge, node: Node) -> bool:
+    """Whether an edge begins or ends at a port of a node, as seen from outside."""
+    return node in (_owner(edge.source), _owner(edge.target))
+
+
+def _owner(end: Any) -> Any:
+    return None if isinstance(end, InnerSource | InnerTarget) else getattr(end, "node", None)
+
+
+def _levels(graph: Graph) -> list[Graph]:
+    """The whole graph and all inside it."""
+    found = [graph]
+    for level in found:
+        found += [node._graph for node in level.nodes.values() if is_box(node)]
+    return found
+
+
+def _level_of(graph: Graph, source: Any, target: Any) -> Graph:
+    """The graph in which an edge between two ends is drawn: where the nodes are; the root's own ports are anywhere."""
+    for end in (target, source):
+        home: Any = getattr(end, "graph", None)
+        if isinstance(home, Graph) and getattr(end, "node", None) is not graph:
+            return home
+    return graph
+
+
+def _made(reference: str, parameters: dict[str, Any], path: str) -> Any:
+    """Make a node of a type that is found by name.
+
+    Raises:
+      GraphError: there is no such type, or a parameter is refused.
+    """
+    if not isinstance(reference, str):
+        raise GraphError(
+            f'node "{path}": a command names a node type by reference, "module:name", got {reference!r}; '
+            "hfg.registry.reference_of gives it"
+        )
+    try:
+        kind: Any = registry.find(reference)
+    except HfgError as error:
+        raise GraphError(f'node "{path}": {error}') from error
+    specs = kind._type.parameters
+    fitting = {name: _fitting(specs[name], value) if name in specs else value for name, value in parameters.items()}
+    try:
+        return kind(**fitting)
+    except (TypeError, ValueError) as error:
+        raise GraphError(f'node "{path}": {error}') from error
+
+
+def _fitting(spec: Any, value: Any) -> Any:
+    """What came over a wire may have lost its type: a list stands for a tuple, a text for an enum's member."""
+    if spec.check(value) is None:
+        return value
+    try:
+        converted = msgspec.convert(value, spec.type)
+    except Exception:
+        return value  # the parameter says what is wrong with it
+    return value if spec.check(converted) is not None else converted
+
+
+def _kept(old: Node, command: c.Replace) -> dict[str, Any]:
+    """The parameters of the new node: those that are given, and of the old one what the new one takes."""
+    try:
+        specs: Any = registry.find(command.type)._type.parameters
+    except HfgError as error:
+        raise GraphError(f'node "{command.path}": {error}') from error
+    kept = {
+        name: value
+        for name, value in old._parameters.items()
+        if name in specs and not specs[name].trigger and specs[name].check(value) is None
+    }
+    return kept | command.parameters
+
+
+def _counterpart(end: Any, old: Node, new: Node) -> Any:
+    """The port of the new node that stands for one of the old.
+
+    Raises:
+      GraphError: there is none.
+    """
+    if _owner(end) is not old:
+        return end
+    try:
+        return getattr(new.ports, f"{end.kind}s")[end.name]
+    except HfgError as error:
+        where = old._place or new._place
+        raise GraphError(
+            f'"{where.path if where else old._type.name}" cannot be replaced by {new._type.qualname}, which has no '
+            f'{end.kind} "{end.name}" while the node has an edge there; remove the edge first, or take a type with '
+            "this port"
+        ) from error
+
+
+def _gate_of(gate: Gate, old: Node, new: Node) -> Gate:
+    target, by = (new if one is old else one for one in (gate.target, gate.by))
+    return Gate(target, by, gate.idle_rate_hz)
+
+
+def _promoted_by(promoted: dict[str, Any], old: Node, new: Node) -> dict[str, Any]:
+    parameters = new.ports.parameters
+    return {
+        name: [parameters[port.name] if port.node is old and port.name in parameters else port for port in ports]
+        for name, ports in promoted.items()
+    }
+
+
+def _need_free(around: Graph, name: str, path: str) -> None:
+    if need_name("a node", name) in around.nodes:
+        raise GraphError(f'"{path}": {around._title} has a node "{name}" already; choose another name')
+
+
+def _stands_for(port: Any) -> Iterable[Any]:
+    """A parameter and all those inside that it stands for."""
+    waiting = [port]
+    while waiting:
+        one = waiting.pop()
+        yield one
+        inside = getattr(one.node, "_graph", None)
+        if inside is not None:
+            waiting += inside._promoted.get(one.name, ())

@@ -1,0 +1,162 @@
+"""Random commands, and what a drawn graph is made of, for tests of edits (rule R4).
+
+Commands are mostly ones that are carried out; some are refused, as those of people are. Stands on `making`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hfg.graph import Graph
+from hfg.graph import commands as c
+from hfg.testing.making import Chooser
+
+__all__ = ["drawn", "random_command", "random_edit"]
+
+_TYPES = ("double", "add", "some", "sink", "Passing", "Merge", "Latch", "Counter", "Pulse", "Tally", "Sieve", "Scaled")
+
+
+def drawn(graph: Graph, *, identity: bool = True) -> dict[str, Any]:
+    """Give all that a drawn graph is made of, in order, as data that can be compared.
+
+    Args:
+      graph: the whole graph, or the inside of a subgraph.
+      identity: whether the nodes and ports themselves must be the same, or only what they are called.
+    """
+    return {
+        "nodes": {
+            name: {
+                "node": id(node) if identity else node._type.reference,
+                "path": node.place.path,
+                "options": node._options,
+                "parameters": dict(node._parameters),
+                "inside": drawn(node._graph, identity=identity) if hasattr(node, "_graph") else None,
+            }
+            for name, node in graph.nodes.items()
+        },
+        "order": list(graph.nodes),
+        "edges": [
+            (edge.label, edge.options, *((id(edge.source), id(edge.target)) if identity else ()))
+            for edge in graph.edges
+        ],
+        "into": sorted(f"{target.path} <- {edge.label}" for target, edge in graph._into.items()),
+        "pairs": sorted((_path(source), _path(target)) for source, target in graph._pairs),
+        "gates": [(gate.target.place.path, gate.by.place.path, gate.idle_rate_hz) for gate in graph.gates],
+        "promoted": {name: [port.path for port in ports] for name, ports in graph._promoted.items()},
+        "gated": sorted(node.place.path for node in graph._gated if node._place is not None)
+        if graph._owner is None
+        else (),
+    }
+
+
+def _path(end: Any) -> str:
+    return str(getattr(end, "path", "observable"))
+
+
+def random_edit(graph: Graph, choose: Chooser, number: int) -> list[c.Command]:
+    """Give one command, sometimes two as one transaction."""
+    commands = [random_command(graph, choose, f"e{number}")]
+    if choose.chance(15):
+        commands.append(random_command(graph, choose, f"f{number}"))
+    return commands
+
+
+def random_command(graph: Graph, choose: Chooser, name: str) -> c.Command:
+    """Give one command about what there is.
+
+    Args:
+      graph: as it is now.
+      choose: whoever chooses.
+      name: of what is new.
+    """
+    nodes = [node.place.path for node in _all_nodes(graph)]
+    if not nodes or choose.chance(12):
+        return _add(graph, choose, name)
+    node = choose.one_of(nodes)
+    what = choose.number(0, 99)
+    if what < 30:
+        return _connect(graph, choose)
+    if what < 45:
+        return _about_an_edge(graph, choose) or _connect(graph, choose)
+    if what < 53:
+        return c.Remove(node)
+    if what < 59:
+        return c.Disable(node) if choose.chance(50) else c.Enable(node)
+    if what < 65:
+        return c.Copy(node, f"{node.rpartition('/')[0]}/{name}".lstrip("/"))
+    if what < 71:
+        return c.Rename(node, name)
+    if what < 77:
+        return _set_parameter(graph, choose) or c.Rename(node, name)
+    if what < 85:
+        beside = [one for one in nodes if one.rpartition("/")[0] == node.rpartition("/")[0]]
+        return c.Enclose(
+            tuple(dict.fromkeys([node, *(choose.one_of(beside) for _ in range(choose.number(0, 2)))])), name
+        )
+    if what < 92:
+        boxes = [one.place.path for one in _all_nodes(graph) if hasattr(one, "_graph")]
+        return c.Dissolve(choose.one_of(boxes)) if boxes else c.Rename(node, name)
+    if what < 97:
+        kind = graph[node]._type.reference if choose.chance(50) else None
+        return c.Replace(node, kind or f"hfg.testing.nodes:{choose.one_of(_TYPES)}")
+    return c.Move(node, choose.one_of([None, *graph.groups]))
+
+
+def _all_nodes(graph: Graph) -> list[Any]:
+    found: list[Any] = []
+    waiting = [graph]
+    while waiting:
+        for node in waiting.pop(0).nodes.values():
+            found.append(node)
+            if hasattr(node, "_graph"):
+                waiting.append(node._graph)
+    return found
+
+
+def _add(graph: Graph, choose: Chooser, name: str) -> c.Command:
+    boxes = ["", *(f"{node.place.path}/" for node in _all_nodes(graph) if hasattr(node, "_graph"))]
+    kind = choose.one_of(_TYPES)
+    options: dict[str, Any] = {"release": "pipelined"} if choose.chance(20) else {}
+    return c.Add(f"hfg.testing.nodes:{kind}", choose.one_of(boxes) + name, {}, options)
+
+
+def _connect(graph: Graph, choose: Chooser) -> c.Command:
+    around = choose.one_of([graph, *(node._graph for node in _all_nodes(graph) if hasattr(node, "_graph"))])
+    nodes = list(around.nodes.values())
+    if not nodes:
+        return c.Connect("start", "stop")
+    first, second = choose.one_of(nodes), choose.one_of(nodes)
+    if choose.chance(80) and nodes.index(first) > nodes.index(second):
+        first, second = second, first
+    free = [port.path for port in second.ports.inputs.values() if port not in around._into]
+    targets = free + [port.path for port in second.ports.slots.values()] + [f"{second.place.path}.activate"]
+    sources = [port.path for port in [*first.ports.outputs.values(), *first.ports.events.values()]]
+    sources.append("start" if choose.chance(20) else f"{first.place.path}.processed")
+    if around._owner is not None:
+        box = around._owner
+        sources += [f"{port.path}.inner" for port in [*box.ports.inputs.values(), *box.ports.slots.values()]]
+        targets += [f"{port.path}.inner" for port in [*box.ports.outputs.values(), *box.ports.events.values()]]
+    source, target = choose.one_of(sources), choose.one_of(targets)
+    return c.Connect(source, target, active=choose.chance(30))
+
+
+def _about_an_edge(graph: Graph, choose: Chooser) -> c.Command | None:
+    edges = [edge for level in _levels(graph) for edge in level.edges]
+    if not edges:
+        return None
+    edge = choose.one_of(edges)
+    source, target = _path(edge.source), _path(edge.target)
+    if choose.chance(60):
+        return c.Disconnect(source, target)
+    return c.MakeActive(source, target, not edge.active)
+
+
+def _levels(graph: Graph) -> Sequence[Graph]:
+    return [graph, *(node._graph for node in _all_nodes(graph) if hasattr(node, "_graph"))]
+
+
+def _set_parameter(graph: Graph, choose: Chooser) -> c.Command | None:
+    parameters = [port for node in _all_nodes(graph) for port in node.ports.parameters.values()]
+    numbers = [port for port in parameters if port.type in (int, float)]
+    return c.SetParameter(choose.one_of(numbers).path, choose.number(1, 4)) if numbers else None

@@ -1,0 +1,338 @@
+"""Edits as commands on a graph that does not run: data, checked, undone exactly (rule R4)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import hfg
+from hfg import commands as c
+from hfg.errors import GraphError, HfgError, UsageError
+from hfg.graph.flat import flatten
+from hfg.testing.edits import drawn, random_edit
+from hfg.testing.making import Allowed, SeededChooser, random_plan
+from hfg.testing.nodes import Counter, Tally, add, double, script, sink
+
+SEQUENCES = 100  # of 20 edits each; the other 200 run in tests/semantics/test_edits.py
+
+
+def chain() -> hfg.Graph:
+    graph = hfg.Graph("chain")
+    source = graph.add(script(values=(1, 2, 3)))
+    first, second = graph.add(double(), name="first"), graph.add(double(), name="second")
+    source >> first >> second >> graph.add(sink())
+    return graph
+
+
+def sent(graph: hfg.Graph) -> list[object]:
+    from hfg.testing import recorder
+
+    trace = recorder()
+    hfg.run(graph, clock="virtual", trace=trace)
+    return trace.values(next(edge for edge in trace.edges() if edge.endswith("sink.value")))[:-1]  # END
+
+
+def edges(graph: hfg.Graph) -> list[str]:
+    return [edge.label for edge in graph.edges]
+
+
+# --- each command ---
+
+
+@pytest.mark.rule("R4")
+def test_a_node_is_added_connected_and_taken_out_again() -> None:
+    graph = chain()
+    graph.edit(
+        c.Disconnect("first.out", "second.value"),
+        c.Add("hfg.testing.nodes:double", "third", options={"release": "pipelined"}),
+        c.Connect("first.out", "third.value"),
+        c.Connect("third.out", "second.value"),
+    )
+    assert graph["third"]._options.release == "pipelined"
+    assert sent(graph) == [8, 16, 24]
+    graph.edit(c.Remove("third"))
+    assert edges(graph) == ["script.out -> first.value", "second.out -> sink.value"]
+    graph.undo()
+    assert sent(graph) == [8, 16, 24]
+    graph.undo()
+    assert sent(graph) == [4, 8, 12]
+
+
+def test_what_is_undone_is_the_same_node_again() -> None:
+    graph = chain()
+    node = graph["first"]
+    before = drawn(graph)
+    graph.edit(c.Remove("first"))
+    assert node._place is None
+    graph.undo()
+    assert graph["first"] is node
+    assert drawn(graph) == before
+
+
+def test_a_copy_has_type_parameters_and_options_but_no_edges() -> None:
+    graph = hfg.Graph()
+    graph.add(script(values=(7,)), name="source", max_rate_hz=5.0)
+    graph.edit(c.Copy("source", "other"))
+    assert graph["other"]._parameters == {"values": (7,)}
+    assert graph["other"]._options is graph["source"]._options
+    assert not graph.edges
+
+
+def test_a_copied_subgraph_is_as_it_was_edited_not_as_it_was_built() -> None:
+    graph = chain()
+    graph.edit(c.Enclose(("first", "second"), "box"), c.Rename("box/first", "renamed"), c.Copy("box", "twin"))
+    assert list(graph["twin"].graph.nodes) == ["renamed", "second"]
+    assert graph["twin/renamed"] is not graph["box/renamed"]
+    assert [edge.label for edge in graph["twin"].graph.edges] == [
+        edge.label.replace("box", "twin") for edge in graph["box"].graph.edges
+    ]
+
+
+def test_a_renamed_subgraph_takes_all_paths_inside_along() -> None:
+    graph = chain()
+    graph.edit(c.Enclose(("first", "second"), "box"), c.Enclose(("box",), "outer"), c.Rename("outer", "shell"))
+    assert graph["shell/box/first"].place.path == "shell/box/first"
+
+
+def test_options_parameters_and_edges_change_in_place() -> None:
+    graph = hfg.Graph()
+    graph.group("fast", threads=0)
+    counter, tally = graph.add(Counter()), graph.add(Tally())
+    graph.add(script())
+    graph.connect(counter.processed, tally.activate)
+    graph.edit(
+        c.Move("tally", "fast"),
+        c.Disable("counter"),
+        c.MakeActive("counter.processed", "tally.activate"),
+        c.SetParameter("script.values", [1, 2]),
+    )
+    assert (tally._options.group, counter._options.enabled, graph.edges[0].active) == ("fast", False, True)
+    assert graph["script"]._parameters["values"] == (1, 2)  # a list over the wire stands for a tuple
+    graph.undo()
+    assert (tally._options.group, counter._options.enabled, graph.edges[0].active) == (None, True, False)
+
+
+def test_another_type_takes_the_place_of_a_node_with_its_edges_and_gates() -> None:
+    graph = chain()
+    graph.gate(graph["first"], by=graph["second"])
+    before = drawn(graph)
+    graph.edit(c.Replace("first", "hfg.testing.nodes:some"))
+    assert graph["first"]._type.name == "some"
+    assert graph.gates[0].target is graph["first"]
+    assert list(graph.nodes) == ["script", "first", "second", "sink"]
+    graph.undo()
+    assert drawn(graph) == before
+
+
+# --- G1 ---
+
+
+@pytest.mark.rule("G1", "R4")
+@pytest.mark.parametrize("seed", range(60))
+def test_grouping_and_dissolving_leave_the_flat_graph_as_it_was(seed: int) -> None:
+    graph = random_plan(seed, Allowed(feeds=True, boxes=seed % 2 == 0)).build()
+    choose = SeededChooser(seed)
+    before, wiring = drawn(graph), ends(graph)
+    for number in range(4):
+        names = [name for name in graph.nodes if choose.chance(50)] or list(graph.nodes)
+        graph.edit(c.Enclose(tuple(names), f"group{number}"))
+        assert ends(graph) == wiring
+    for number in reversed(range(4)):
+        graph.edit(c.Dissolve(f"group{number}"))
+        assert ends(graph) == wiring
+    for _ in range(8):
+        graph.undo()
+    assert drawn(graph) == before
+
+
+def ends(graph: hfg.Graph) -> dict[object, list[object]]:
+    """By port: where its edges lead, in order, and all that is said about them."""
+    found: dict[object, list[object]] = {}
+    for edge in flatten(graph).edges:
+        said = (edge.active, edge.capacity, edge.overflow, edge.capacity_limit, edge.through, edge.initial)
+        found.setdefault(edge.source.port, []).append((edge.target.port, *said))
+    return found
+
+
+# --- properties ---
+
+
+@pytest.mark.rule("R4")
+@pytest.mark.parametrize("block", range(10))
+def test_any_sequence_is_undone_redone_and_replayed_exactly(block: int) -> None:
+    for seed in range(block * SEQUENCES // 10, (block + 1) * SEQUENCES // 10):
+        walk(seed, edits=20)
+
+
+def walk(seed: int, *, edits: int) -> None:
+    """Edit at random, go back and forth; a second graph gets the same as JSON."""
+    plan, choose = random_plan(seed, Allowed(feeds=True)), SeededChooser(seed)
+    graph, replayed = plan.build(), plan.build()
+    states = [drawn(graph)]
+    for number in range(edits):
+        commands = random_edit(graph, choose, number)
+        try:
+            graph.edit(*commands)
+        except GraphError:
+            assert drawn(graph) == states[-1]  # all or nothing
+            continue
+        replayed.edit(*c.decode(c.encode(commands)))
+        states.append(drawn(graph))
+        if choose.chance(30):
+            back = choose.number(1, len(states) - 1)
+            for position in range(back):
+                graph.undo()
+                replayed.undo()
+                assert drawn(graph) == states[-2 - position]
+            forth = choose.number(0, back)
+            for _ in range(forth):
+                graph.redo()
+                replayed.redo()
+            states = states[: len(states) - back + forth]
+            assert drawn(graph) == states[-1]
+        assert drawn(graph, identity=False) == drawn(replayed, identity=False)
+
+
+# --- refusals: one clear sentence, nothing changed ---
+
+REFUSED = [
+    (c.Remove("frist"), 'there is no "frist": graph "chain" has no node "frist"; did you mean "first"?'),
+    (c.Connect("first.out", "second.value"), "are connected already; an edge is drawn once"),
+    (c.Connect("script.out", "second.value"), '"second.value" takes one edge and has one from "first.out"'),
+    (c.Connect("first.out", "join.a"), "the edit is refused, for it would break the graph"),
+    (c.Connect("first", "sink.value"), '"first" is no port; name a port of a node, as in "first.name"'),
+    (c.Connect("script.out", "text.word"), "port types do not fit"),
+    (c.Disconnect("first.out", "sink.value"), 'there is no edge "first.out" -> "sink.value"'),
+    (c.SetParameter("first.size", 1), 'there is no "first.size": "first" has no parameter "size"; there are none'),
+    (c.Rename("first", "second"), 'graph "chain" has a node "second" already; choose another name'),
+    (c.Rename("first", "a/b"), '"/" separates the parts of a path'),
+    (c.Copy("first", "sink/x"), '"sink" is no subgraph, so nothing is inside it'),
+    (c.Add("no_such_module:x", "x"), 'node "x": node type "no_such_module:x": module "no_such_module" cannot be found'),
+    (c.Add("hfg.testing.nodes:doubel", "x"), 'module "hfg.testing.nodes" has no "doubel"'),
+    (c.Add("hfg.testing.nodes:double", "x", {"size": 3}), 'node "x": double has no parameter "size"'),
+    (c.Add("hfg.testing.nodes:double", "x", {}, {"rate": 3}), "options are those of graph.add"),
+    (c.Replace("first", "hfg.testing.nodes:sink"), 'which has no output "out" while the node has an edge there'),
+    (c.Move("first", "gpu"), "which is not declared"),
+    (c.Dissolve("first"), '"first" is no subgraph, so it cannot be dissolved'),
+    (c.Enclose((), "box"), "made of at least one node"),
+    (c.Enclose(("first",), "second"), "has a node of this name already"),
+    ("remove first", "an edit takes commands"),
+]
+
+
+@hfg.node
+def text(word: str) -> None:
+    """Take words."""
+
+
+@pytest.mark.parametrize(("command", "sentence"), REFUSED, ids=lambda value: value if isinstance(value, str) else "")
+def test_what_is_refused_says_why_and_changes_nothing(command: c.Command, sentence: str) -> None:
+    graph = chain()
+    join, words = graph.add(add(), name="join"), graph.add(text(), name="text")
+    graph.edit(c.Disconnect("script.out", "first.value"), c.Connect("join.out", "first.value"))
+    assert join in graph.nodes.values()
+    assert words in graph.nodes.values()
+    before = drawn(graph)
+    with pytest.raises(GraphError) as refused:
+        graph.edit(c.Disable("sink"), command)
+    assert sentence in str(refused.value)
+    assert drawn(graph) == before
+
+
+def test_nothing_to_undo_and_changes_by_hand_are_said() -> None:
+    graph = chain()
+    with pytest.raises(UsageError, match="has nothing to undo: nothing was edited by commands yet"):
+        graph.undo()
+    graph.edit(c.Rename("first", "one"))
+    with pytest.raises(UsageError, match="has nothing to redo: nothing was undone since the last edit"):
+        graph.redo()
+    graph.add(double())
+    with pytest.raises(UsageError, match="has nothing to undo: the graph was changed by hand since, which is final"):
+        graph.undo()
+
+
+def test_the_inside_is_edited_with_the_whole_graph() -> None:
+    graph = chain()
+    graph.edit(c.Enclose(("first",), "box"))
+    with pytest.raises(UsageError, match="is edited with the whole graph"):
+        graph["box"].graph.edit(c.Remove("box/first"))
+
+
+@pytest.mark.parametrize(
+    "data", ["", "{}", '[{"do":"Explode"}]', '[{"do":"Remove"}]', '[{"do":"Remove","path":3}]', b"\xff"]
+)
+def test_what_is_no_list_of_commands_says_so(data: str) -> None:
+    with pytest.raises(GraphError, match="this is no list of commands"):
+        c.decode(data)
+
+
+def test_values_that_are_no_data_are_refused_when_written() -> None:
+    with pytest.raises(GraphError, match="commands are plain data"):
+        c.encode([c.SetParameter("a.b", object())])
+
+
+# --- hot reload ---
+
+SOURCE = """
+import hfg
+
+@hfg.node
+def grow(value: int, *, by: int = {by}) -> int:
+    return value {sign} by
+"""
+
+
+@pytest.fixture
+def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "growing", raising=False)
+    path = tmp_path / "growing.py"
+    path.write_text(SOURCE.format(by=1, sign="+"))
+    return path
+
+
+def growing() -> hfg.Graph:
+    graph = hfg.Graph()
+    graph.add(script(values=(1, 2)))
+    graph.edit(c.Add("growing:grow", "grow", {"by": 10}), c.Connect("script.out", "grow.value"))
+    graph["grow"] >> graph.add(sink())
+    return graph
+
+
+@pytest.mark.rule("R4")
+def test_a_changed_module_replaces_its_nodes_and_keeps_parameters(module: Path) -> None:
+    graph = growing()
+    assert sent(graph) == [11, 12]
+    module.write_text(SOURCE.format(by=1, sign="*"))
+    graph.reload("growing")
+    assert sent(graph) == [10, 20]
+    graph.undo()
+    assert sent(graph) == [11, 12]
+
+
+@pytest.mark.parametrize(
+    ("source", "sentence"),
+    [
+        ("def grow(:", 'module "growing" cannot be reloaded: invalid syntax in line 1 of'),
+        ("import hfg\n1 / 0", "running it failed (ZeroDivisionError: division by zero)"),
+        ("import hfg", 'module "growing" has no "grow"'),
+        ("import hfg\n@hfg.node\ndef grow(amount: int) -> int:\n    return 1\n", 'which has no input "value"'),
+    ],
+)
+def test_a_module_that_fails_leaves_graph_and_module_as_they_were(module: Path, source: str, sentence: str) -> None:
+    graph = growing()
+    before = drawn(graph)
+    module.write_text(source)
+    with pytest.raises(HfgError) as refused:
+        graph.reload("growing")
+    assert sentence in str(refused.value)
+    assert drawn(graph) == before
+    assert graph["grow"]._type.reference == "growing:grow"
+    assert sent(graph) == [11, 12]
+
+
+def test_a_module_that_was_never_imported_is_named() -> None:
+    with pytest.raises(GraphError, match='module "nowhere" cannot be reloaded: it is not imported'):
+        chain().reload("nowhere")
