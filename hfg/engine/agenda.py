@@ -152,6 +152,8 @@ def freed(edge: EventEdge) -> None:
 def idle_again(worker: Worker, *, asked: bool = False) -> None:
     """A firing, call or question is over: see what is next."""
     worker.busy = ""
+    if worker.pending_end and not worker.outputs.missing:
+        worker.core.upstairs.send_end(worker)  # its outputs became free during a slot call
     if worker.on_idle is not None:
         _let_others(worker)
         if worker.busy:

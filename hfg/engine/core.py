@@ -106,6 +106,9 @@ class Upstairs(Protocol):
     def operator_failed(self, edge: EventEdge, error: BaseException) -> None:
         """An operator on an edge raised."""
 
+    def send_end(self, worker: Worker) -> None:
+        """END is to follow, and the outputs are free (F4)."""
+
     def node_ended(self, worker: Worker) -> None:
         """A node has sent END (P9, R5)."""
 

@@ -36,6 +36,8 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
                 core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
     worker.end_firings += 1
     block(worker, ENDED)
+    for edge in worker.in_edges:  # what comes now is drained: the short ways of those before it do not look
+        core.upstairs.choose_step(edge.source)
     worker.deferred = []
     cancel_limit(worker)
     for edge in worker.in_edges:

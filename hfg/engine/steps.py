@@ -21,7 +21,7 @@ from hfg.engine.core import OF_ITS_OWN_KIND, PENDING
 from hfg.engine.modifiers import derive_scopes, touch
 from hfg.engine.releasing import outputs_done, release
 from hfg.engine.sending import flush_automatic, trigger
-from hfg.engine.worker import CALLS_BLOCKED, FULL, RunningEvent, Worker
+from hfg.engine.worker import CALLS_BLOCKED, ENDED, FULL, RunningEvent, Worker
 from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import Token
@@ -69,7 +69,10 @@ def _choose(worker: Worker) -> None:
     if worker.slot_edges or "processed" in worker.events:
         return
     outs = [edge for edges in worker.out_edges for edge in edges]
-    if any(type(edge) is not SyncEdge or edge.target_kind != "input" or edge.ended for edge in outs):
+    if any(
+        type(edge) is not SyncEdge or edge.target_kind != "input" or edge.ended or edge.target.blocked & ENDED
+        for edge in outs
+    ):
         return
     if any(edge.target.is_boundary_output and edge.target.process is None for edge in outs):
         return  # a reader waits at its barrier

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hfg.engine import activity, agenda, errors, ports, quiet, steps, wiring
+from hfg.engine import activity, agenda, errors, ports, quiet, sending, steps, wiring
 from hfg.engine.iteration import Iteration
 
 __all__ = ["Deciders"]
@@ -15,6 +15,7 @@ class Deciders:
     fail = staticmethod(errors.fail)
     fail_call = staticmethod(errors.fail_call)
     operator_failed = staticmethod(errors.operator_failed)
+    send_end = staticmethod(sending.send_end)
     node_ended = staticmethod(quiet.node_ended)
     activity_changed = staticmethod(activity.changed)
     scopes_changed = staticmethod(activity.scopes_changed)

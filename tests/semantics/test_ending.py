@@ -51,6 +51,51 @@ def test_tokens_for_an_ended_node_are_drained_without_a_firing(fast: bool) -> No
 
 
 @pytest.mark.rule("F12")
+def test_a_chain_in_front_of_an_ended_node_goes_on_for_nobody(fast: bool) -> None:
+    graph = hfg.Graph()
+    short, long, between = graph.add(numbers(count=1)), graph.add(numbers(count=5)), graph.add(forward())
+    node, other = graph.add(add()), graph.add(Keep())
+    graph.connect(short.out, node.a)
+    graph.connect(long.out, between.value)
+    graph.connect(between.out, node.b)
+    graph.connect(graph.add(numbers(count=9)).out, other.value)
+    report = run(graph, fast)
+    assert report.edges["forward.out -> add.b"].drained == 4
+    assert len(other.values) == 9
+
+
+class Hums(hfg.Node):
+    """Says something at its end, and may be called for a long time meanwhile."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        return value
+
+    def end(self) -> None:
+        self.out.send(99)
+
+    @hfg.slot
+    async def hum(self, value: int) -> None:
+        await asyncio.sleep(1.5)
+
+
+@pytest.mark.rule("F4", "F9")
+def test_end_follows_although_the_outputs_become_free_during_a_slot_call(fast: bool) -> None:
+    graph = hfg.Graph()
+    node, later, sink = graph.add(Hums()), graph.add(forward_later(), release="pipelined"), graph.add(Keep())
+    graph.connect(graph.add(numbers(count=1)).out, node.value)
+    graph.connect(graph.add(slow_numbers(count=1, pause_s=1.5)).out, node.hum)
+    graph.connect(node.out, later.value)
+    graph.connect(later.out, sink.value)
+    report = run(graph, fast)
+    assert sink.values == [1, 99]
+    assert report.outcome == "done"
+    assert report.nodes["keep"].ended
+
+
+@pytest.mark.rule("F12")
 def test_the_slots_of_an_ended_node_go_on(fast: bool) -> None:
     graph = hfg.Graph()
     source, late, node = graph.add(numbers(count=1)), graph.add(slow_numbers(count=2)), graph.add(Both())

@@ -31,6 +31,7 @@ def _random_graphs() -> ModuleType:
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("block", range(BLOCKS))
 def test_the_engine_does_what_the_oracle_permits(block: int) -> None:
     suite = _random_graphs()

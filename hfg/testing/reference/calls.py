@@ -93,7 +93,7 @@ class Calling(Firing):
             return
         self.flush_changes(station)
         self.observe(CallEnded(self.now, station.path, flight.number, "done" if error is None else "failed"))
-        station.flight = None
+        station.flight, station.unready = None, False
         line = flight.line
         if line is not None and not line.edge.is_event and line.unprocessed:
             self.process(line)
@@ -147,6 +147,7 @@ class Calling(Firing):
         station.iterator = None
         station.ending = station.ended = station.stops_itself = False
         station.resting_until = None
+        station.unready = False
         station.set_up = True
         if station.leaf.inside is None:
             station.node._reset_states()

@@ -273,7 +273,7 @@ class Firing(RunningCode):
         if flight.void and outcome == "done":
             outcome = "abandoned"
         self.observe(FiringEnded(self.now, station.path, flight.number, outcome))
-        station.flight = None
+        station.flight, station.unready = None, False
         for line in flight.taken:
             if line.edge.is_event or line.delay:
                 continue

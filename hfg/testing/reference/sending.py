@@ -350,7 +350,18 @@ class Sending(State):
             elif station.place is None:
                 station.place = self.next_tick()
                 station.timed = self.now if self.in_timers else None
+            if self.is_next(station) and not self.says_ready(station):  # asked last, and not before its turn
+                station.place, station.unready = None, True
             station.rested |= station.place is not None and self.is_moot(station.leaf.index)
+
+    def is_next(self, station: Station) -> bool:
+        """Whether a firing is the next thing that the node does (F9)."""
+        line = self.next_call(station.leaf.index)
+        return (
+            station.place is not None
+            and station.flight is None
+            and (line is None or line.queue[0].place > station.place)
+        )
 
     def make_operators(self) -> None:
         """Put the operators of P9 in front of their queues."""

@@ -99,6 +99,7 @@ class Station:
     resting_until: float | None = None  # the back-off of a restart
     restarts: int = 0
     iterator: Any = None
+    unready: bool = False  # its `ready()` said no since its last firing or call (F1)
     changes: list[tuple[int, str, Any]] = field(default_factory=list)  # automatic events that arose: when, which, value
     active_since: float | None = None  # None: not active, or its time-out is over
     drained_modifiers: list[int] = field(default_factory=list)  # wait until the own END is sent (F12)
@@ -282,7 +283,7 @@ class State:
             return False
         if self.is_suspended_source(index):
             return False
-        return "timers" in ignore or self.says_ready(station)  # asked last: until a timer is over nobody knows
+        return not station.unready
 
     def has_all_inputs(self, index: int) -> bool:
         """A source or a live input edge; a live edge at each mandatory input; a token on all that take part."""
