@@ -65,11 +65,12 @@ def names(whole: FlatGraph) -> list[Problem]:
 
 def async_in_threads(flat: FlatGraph) -> Iterator[Problem]:
     """Async code in groups that are threads (rule R1)."""
-    for node in flat.nodes:
+    threads = {name: group for name, group in flat.groups.items() if group.threads}
+    for node in flat.nodes if threads else ():
         kind = node.node._type
-        group = flat.groups.get(node.options.group or "loop")
+        group = threads.get(node.options.group or "loop")
         waits = kind.process_kind.startswith("async") or any(slot.is_async for slot in kind.slots.values())
-        if waits and group is not None and group.threads:
+        if waits and group is not None:
             yield Problem(
                 path=node.path,
                 severity="error",
