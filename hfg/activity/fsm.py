@@ -259,7 +259,7 @@ def findings(
 
 def error(path: str, what: str, why: str, remedy: str) -> Problem:
     """Make a finding for which there is no machine."""
-    return Problem(path=path, severity="error", what=what, why=why, remedy=remedy)
+    return Problem(path=path, severity="error", what=what, why=why, remedy=remedy, check="state-machine")
 
 
 def shape(path: str, expected: str, found: Any, example: str) -> Problem:
@@ -339,6 +339,7 @@ def _unreachable(states: Iterable[str], transitions: Iterable[Transition], initi
                 what="no word leads to this state",
                 why=f'no way from "{initial}" arrives there, so it and its transitions never matter',
                 remedy="add a transition into it, or take it out",
+                check="state-machine",
             )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.target import load_graph
-from hfg.errors import HfgError, TargetError
+from hfg.errors import CheckFailed, HfgError, MachineError, TargetError
 from hfg.graph import Graph
 from hfg.graph.refusals import keep_refusals, problem_of
 from hfg.problem import SEVERITIES, Problem
@@ -34,7 +35,7 @@ def check(
             if not isinstance(error.__cause__, Exception):
                 raise  # there is no such target: nothing was looked at
             show.user_traceback(error.__cause__)
-            problems.append(_unbuilt(target, error, error.__cause__))
+            problems += _unbuilt(target, error, error.__cause__)
     if graph is not None:
         refused = {problem.path.rpartition(" -> ")[2] for problem in problems}  # what follows from that is no news
         found = graph.check()
@@ -51,21 +52,25 @@ def check(
     return 1 if counts["error"] else 0
 
 
-def _unbuilt(target: str, error: TargetError, cause: Exception) -> Problem:
+def _unbuilt(target: str, error: TargetError, cause: Exception) -> Sequence[Problem]:
     """The code that builds the graph failed: what can be said of it."""
     why = "so the graph is not there to be checked"
+    if isinstance(cause, CheckFailed | MachineError):
+        return cause.problems
     if isinstance(cause, HfgError):
-        return problem_of(cause, target, why)
+        return [problem_of(cause, target, why)]
     frames = [frame for frame in traceback.extract_tb(cause.__traceback__) if Path(frame.filename).exists()]
     where = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
-    return Problem(
-        path=target,
-        severity="error",
-        what=str(error),
-        why=why,
-        remedy=f"mend the code that builds it{where}",
-        check="not-built",
-    )
+    return [
+        Problem(
+            path=target,
+            severity="error",
+            what=str(error),
+            why=why,
+            remedy=f"mend the code that builds it{where}",
+            check="not-built",
+        )
+    ]
 
 
 def _count(number: int, what: str) -> str:

@@ -392,3 +392,14 @@ def test_draw_says_which_endings_work(hfg: Command) -> None:
     shown = hfg("draw", TARGET, "halves.svg")
     assert (shown.code, shown.out) == (2, "")
     assert "a drawing ends in .mmd or .dot" in shown.err
+
+
+def test_check_tells_everything_that_is_wrong_with_a_machine(hfg: Command, tmp_path: Path) -> None:
+    code = (
+        "import hfg\n\ndef build() -> hfg.Graph:\n"
+        '    return hfg.StateMachine(["a"], [("x", "a", "b"), ("x", "c", "a")], initial="a").graph()\n'
+    )
+    (tmp_path / "machine.py").write_text(code, encoding="utf-8")
+    shown = hfg("check", "machine.py", "--json")
+    assert shown.code == 1
+    assert [problem["path"] for problem in json.loads(shown.out)] == ["transitions[0]", "transitions[1]"]
