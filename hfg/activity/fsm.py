@@ -259,7 +259,14 @@ def findings(
 
 def error(path: str, what: str, why: str, remedy: str) -> Problem:
     """Make a finding for which there is no machine."""
-    return Problem(path=path, severity="error", what=what, why=why, remedy=remedy, check="state-machine")
+    return Problem(
+        path=path,
+        severity="error",
+        what=what,
+        why=why,
+        remedy=remedy,
+        check="state-machine",
+    )
 
 
 def shape(path: str, expected: str, found: Any, example: str) -> Problem:
