@@ -20,7 +20,7 @@ from hfg import starting as starting  # before all that takes its time to import
 from hfg import errors
 from hfg.activity import StateMachine
 from hfg.clock import now
-from hfg.engine import Report, Run, VirtualTimeLoop, run, run_async, running
+from hfg.engine import Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
 from hfg.errors import EndOfStream
 from hfg.functions import node
 from hfg.graph import Graph, Subgraph, commands
@@ -42,6 +42,7 @@ __all__ = [
     "Run",
     "State",
     "StateMachine",
+    "Statistics",
     "Subgraph",
     "Token",
     "VirtualTimeLoop",

@@ -9,6 +9,7 @@ Which module stands on which; imports go down only:
     iteration   plan  ports  rx                carrier  virtual  watchdog  report
     steps       short ways for common shapes   quiet       growing, ending, stalling
     watched     the same while somebody looks  consumers   who listens to the trace
+    statistics  numbers while it runs          meters      what measures the code of nodes
     errors      what a failure brings          activity    what a change of A(v) brings
     firing      what a node does next          builtin_slots  subgraphs  lifecycle
     wiring      which edges are live
@@ -18,6 +19,21 @@ Which module stands on which; imports go down only:
 
 from hfg.engine.report import EdgeReport, NodeReport, Report
 from hfg.engine.run import Run, run, run_async, running
+from hfg.engine.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
 from hfg.engine.virtual import VirtualTimeLoop
 
-__all__ = ["EdgeReport", "NodeReport", "Report", "Run", "VirtualTimeLoop", "run", "run_async", "running"]
+__all__ = [
+    "EdgeReport",
+    "EdgeStatistics",
+    "GroupStatistics",
+    "NodeReport",
+    "NodeStatistics",
+    "Report",
+    "Run",
+    "Statistics",
+    "Times",
+    "VirtualTimeLoop",
+    "run",
+    "run_async",
+    "running",
+]

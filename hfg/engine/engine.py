@@ -25,6 +25,7 @@ from hfg.engine.lifetime import Lifetime
 from hfg.engine.pausing import Halt, Pausing
 from hfg.engine.policies import make_policy
 from hfg.engine.settings import Settings
+from hfg.engine.statistics import Measuring
 from hfg.engine.upstairs import Deciders
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import TORN_DOWN, Worker
@@ -82,6 +83,7 @@ class Engine:
       core: the state the deciding modules work on.
       epoch: what the run's clock is ahead of the machine's monotonic one; None: it follows another.
       consumers: who listens to the trace.
+      measuring: what keeps statistics, from the first time somebody asks.
       finished: done when the run is over and torn down; its result is the outcome, its exception what went wrong.
       holds: people outside who may still bring something (R5).
       readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
@@ -99,6 +101,7 @@ class Engine:
         self.context.run(current_clock.set, self.now)
         self.core: Core = Core(self, Deciders())
         self.consumers = Consumers(self._listen, self)
+        self.measuring: Measuring | None = None
         self.core.debug = settings.debug
         self.core.fast = settings.fast
         self.flat = flat
@@ -149,14 +152,17 @@ class Engine:
 
     # --- groups -----------------------------------------------------------------------------------------------------
 
-    def all_workers(self) -> Iterator[Worker]:
-        """Those inside iterations too."""
+    def all_cores(self) -> Iterator[Core]:
+        """The run itself and those inside iterations."""
         stack = [self.core]
         while stack:
-            for worker in stack.pop().workers:
-                yield worker
-                if worker.iteration is not None:
-                    stack.append(worker.iteration.core)
+            core = stack.pop()
+            yield core
+            stack.extend(worker.iteration.core for worker in core.workers if worker.iteration is not None)
+
+    def all_workers(self) -> Iterator[Worker]:
+        """Those inside iterations too."""
+        return (worker for core in self.all_cores() for worker in core.workers)
 
     def _make_groups(self) -> dict[str, Group]:
         groups: dict[str, Group] = {}
@@ -235,6 +241,8 @@ class Engine:
         finally:
             core.pumping = core.plain = False
             core.current = None
+        if self.measuring is not None:
+            self.measuring.pumped()
         if self.ended_how is not None:
             return
         if self._rests():
@@ -423,6 +431,8 @@ class Engine:
             if worker.room_waiters is not None:
                 for waiter in worker.room_waiters:
                     waiter()
+        if self.measuring is not None:
+            self.measuring.end()
         self._answer_quiet()
         self.pausing.rest()
         self.ending.set()
@@ -438,6 +448,14 @@ class Engine:
         return None if self.ended_how is None else self.ended_how[1]
 
     # --- the trace --------------------------------------------------------------------------------------------------
+
+    def measure(self) -> Measuring:
+        """Keep statistics, from now on if nobody has asked before."""
+        if self.measuring is None:
+            self.measuring = Measuring(self)
+            if self.ended_how is not None:
+                self.measuring.end()
+        return self.measuring
 
     def _listen(self, take: Callable[[TraceEvent], None] | None) -> None:
         """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""

@@ -262,6 +262,8 @@ def prepare_slot(worker: Worker, name: str) -> EventEdge:
         worker.calls = deque()
     _handler(worker, name)
     edge.handler = worker.plain_handlers.get(name)
+    if worker.meter is not None:
+        worker.meter.measure_slots()
     core.edges.append(edge)
     core.outside[worker.index, name] = edge
     if core.started:

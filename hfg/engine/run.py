@@ -21,6 +21,7 @@ from hfg.engine.engine import Engine
 from hfg.engine.interrupt import CtrlC
 from hfg.engine.report import Report, edge_reports, node_reports
 from hfg.engine.settings import Settings
+from hfg.engine.statistics import Statistics
 from hfg.engine.steering import Steering
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import Worker
@@ -266,9 +267,13 @@ class Run(Steering):
             if worker.active and worker.scope is None and worker.node is not None
         ]
 
-    def statistics(self) -> Report:
-        """What the run has done so far."""
-        return self.report()
+    def statistics(self) -> Statistics:
+        """What the run has done so far: a frozen snapshot of counts, rates, times and depths, ready for JSON.
+
+        Counts are kept anyway. Times are measured from the first call on, so make it at the start of the block if they
+        are to cover the whole run; it costs some 0.2 us a firing.
+        """
+        return self._engine.measure().snapshot()
 
     def now(self) -> float:
         """Seconds on the run's clock."""

@@ -103,6 +103,7 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
         arrived(edge)
     else:
         edge.queue.append(token)
+        edge.deepest = max(edge.deepest, len(edge.queue))
         if len(edge.queue) > edge.delay:
             edge.held = True
             edge.source.outputs.missing += 1
@@ -259,6 +260,7 @@ def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
             edge.queue.append(token)
             return
     edge.queue.append(token)
+    edge.deepest = max(edge.deepest, len(edge.queue))
     note_full(edge)
     if into_input:
         if type(value) is Marker:

@@ -97,8 +97,13 @@ def _choose(worker: Worker) -> None:
         ):
             given = outs[0] if outs else None
             if not worker.is_async:
-                make = watched.through_step if traced or worker.meter is not None else _through_step
-                worker.step = make(worker, edge, given)
+                quick = None if traced else _through_step(worker, edge, given)
+                if quick is not None:
+                    worker.step = quick
+                if traced or worker.meter is not None:
+                    worker.step = watched.through_step(worker, edge, given, quick)
+                if quick is not None and worker.meter is not None:
+                    worker.meter.steps = (quick, worker.step)
             elif not traced:
                 worker.step = _async_step(worker, edge, given)
 
@@ -118,7 +123,7 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
     """A plain function with one input and at most one output edge: the shape of a pipeline."""
     core = worker.core
     node = worker.node
-    process: Any = worker.process
+    process: Any = worker.process if worker.meter is None else worker.meter.code
     inputs = worker.inputs
     outputs = worker.outputs
     producer: Worker = taken.source
@@ -473,7 +478,10 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
                 derive_scopes(core)
         else:
             queue.append(Token(value, 0, stamp, number))
-        if len(queue) >= edge.capacity and not edge.full:
+        depth = len(queue)
+        if depth > edge.deepest:
+            edge.deepest = depth
+        if depth >= edge.capacity and not edge.full:
             edge.full = True
             worker.full_edges += 1
             block(worker, FULL)

@@ -84,6 +84,9 @@ class _JumpingSelector(selectors.DefaultSelector):
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
     """An asyncio event loop in virtual time; `time()` begins at 0.
 
+    Attributes:
+      watchers: called with the seconds when time has passed, before anything that is due then.
+
     Example:
       >>> async def main() -> float:
       ...     await asyncio.sleep(3600)
@@ -97,6 +100,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         self._virtual_now = 0.0
         self._held: deque[Held] = deque()  # the engine's work in threads, in order of its beginning
         self._executor_jobs = 0
+        self.watchers: list[Callable[[float], None]] = []
         selector = _JumpingSelector()
         selector.loop = self
         super().__init__(selector)
@@ -159,8 +163,11 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             self._executor_jobs -= 1
 
     def _jump(self, timeout: float) -> None:
+        before = self._virtual_now
         scheduled = self._scheduled  # type: ignore[attr-defined]
         if scheduled:
             self._virtual_now = max(self._virtual_now, scheduled[0].when())
         else:
             self._virtual_now += timeout
+        for watcher in self.watchers:
+            watcher(self._virtual_now - before)

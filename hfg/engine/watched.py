@@ -26,8 +26,11 @@ __all__ = ["generator_step", "through_step"]
 Step = Callable[[Worker], None]
 
 
-def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step:
-    """A plain function with one input and at most one output edge."""
+def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None, quick: Step | None) -> Step:
+    """A plain function with one input and at most one output edge.
+
+    When enough is measured it gives way to `quick`, the step that does not look; None: the trace is to be told anyway.
+    """
     core = worker.core
     meter = worker.meter
     process: Any = worker.process if meter is None else meter.code
@@ -51,10 +54,6 @@ def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Ste
     now = core.now
     host: Any = core.host
     epoch: Any = host.epoch
-    spent: Any = None
-    delayed: Any = None
-    if meter is not None:
-        spent, delayed = meter.spent.append, meter.delays.append
 
     def step(worker: Worker) -> None:
         if worker.special or not worker.placed or inputs.missing or worker.busy:
@@ -82,16 +81,17 @@ def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Ste
         try:
             result = process(token.value)
         except Exception as error:
-            if spent is not None:
-                spent(monotonic() - began)
+            if meter is not None:
+                meter.took(monotonic() - began)
             errors.fail_taken(worker, token.stamp, only, error)
             return
         ended = monotonic()
         if trace is not None:
             at = now() if epoch is None else ended + epoch
-        if spent is not None:
-            spent(ended - began)
-            delayed((now() if epoch is None else ended + epoch) - token.stamp)
+        if meter is not None:
+            meter.took(ended - began, (now() if epoch is None else ended + epoch) - token.stamp)
+            if quick is not None and meter.left <= 0 and worker.step is step:
+                worker.step = quick
         if not silent_code:
             if worker.written is not None or worker.right:
                 firing.complete_firing(worker, result)

@@ -236,7 +236,7 @@ class Worker:
         self.ready_hook: Callable[[], Any] | None = None
         self.has_hooks = False
         self.iteration: Any = None
-        self.meter: Any = None  # measures its code while somebody wants statistics
+        self.meter: Any = None  # a Meter, while somebody wants statistics
 
         # state of the run
         self.active = False

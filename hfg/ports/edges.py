@@ -96,6 +96,11 @@ class SyncEdge(Edge):
         """1 if a token lies on it, else 0."""
         return 0 if self.token is None else 1
 
+    @property
+    def deepest(self) -> int:
+        """1 if a token ever lay on it, else 0."""
+        return 1 if self.sent > self.drained else 0
+
     def clear(self) -> list[Token[Any]]:
         """Take away what lies on it."""
         token, self.token = self.token, None
@@ -107,14 +112,19 @@ class SyncEdge(Edge):
 
 
 class _QueueEdge(Edge):
-    """What both edges with a queue share: initial tokens first, then what was sent."""
+    """What both edges with a queue share: initial tokens first, then what was sent.
 
-    __slots__ = ("initial", "queue")
+    Attributes:
+      deepest: the most tokens that ever lay on it.
+    """
+
+    __slots__ = ("deepest", "initial", "queue")
 
     def __init__(self, index: int, label: str, active: bool, initial: tuple[Any, ...]) -> None:
         super().__init__(index, label, active)
         self.queue: deque[Token[Any]] = deque()
         self.initial = initial
+        self.deepest = len(initial)
 
     @property
     def untaken(self) -> int:
