@@ -26,6 +26,7 @@ from hfg.engine.pausing import Halt, Pausing
 from hfg.engine.policies import make_policy
 from hfg.engine.settings import Settings
 from hfg.engine.statistics import Measuring
+from hfg.engine.taps import Taps
 from hfg.engine.upstairs import Deciders
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import TORN_DOWN, Worker
@@ -83,6 +84,7 @@ class Engine:
       core: the state the deciding modules work on.
       epoch: what the run's clock is ahead of the machine's monotonic one; None: it follows another.
       consumers: who listens to the trace.
+      taps: who looks at ports and edges.
       measuring: what keeps statistics, from the first time somebody asks.
       finished: done when the run is over and torn down; its result is the outcome, its exception what went wrong.
       holds: people outside who may still bring something (R5).
@@ -102,6 +104,7 @@ class Engine:
         self.core: Core = Core(self, Deciders())
         self.consumers = Consumers(self._listen, self)
         self.measuring: Measuring | None = None
+        self.taps = Taps(self)
         self.core.debug = settings.debug
         self.core.fast = settings.fast
         self.flat = flat
@@ -433,6 +436,7 @@ class Engine:
                     waiter()
         if self.measuring is not None:
             self.measuring.end()
+        self.taps.end()
         self._answer_quiet()
         self.pausing.rest()
         self.ending.set()

@@ -79,7 +79,7 @@ class Iteration:
         self.core.debug = outer.debug
         self.core.fast = False
         self.core.inside = self
-        self._over = worker.node.iterate_over
+        self._over = worker.options.iterate_over
         self._elements: list[tuple[Any, ...]] = []
         self._position = 0
         self._results: list[list[Any]] = []

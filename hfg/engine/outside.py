@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
-from collections import deque
 from collections.abc import AsyncIterator, Callable
 from functools import partial
 from types import TracebackType
@@ -191,14 +190,6 @@ def collect(engine: Engine, worker: Worker, values: list[Any]) -> None:
     worker.process = step
 
 
-class _Tapped:
-    """What a tap keeps: the newest tokens, bounded; it never slows the graph."""
-
-    def __init__(self, size: int) -> None:
-        self.tokens: deque[Token[Any]] = deque(maxlen=size)
-        self.wake = asyncio.Event()
-
-
 async def signal(
     engine: Engine, worker: Worker, slot: str, value: Any, activity: int | None, stamp: float | None
 ) -> None:
@@ -210,6 +201,7 @@ async def signal(
     edge = worker.core.outside.get((worker.index, slot))
     if edge is None:
         edge = prepare_slot(worker, slot)
+        engine.taps.adopt(edge)
     while len(edge.queue) >= edge.capacity:
         waiter: asyncio.Future[None] = engine.loop.create_future()
         outside = edge.source

@@ -23,6 +23,7 @@ from hfg.engine.report import Report, edge_reports, node_reports
 from hfg.engine.settings import Settings
 from hfg.engine.statistics import Statistics
 from hfg.engine.steering import Steering
+from hfg.engine.taps import Tap
 from hfg.engine.virtual import VirtualTimeLoop
 from hfg.engine.worker import Worker
 from hfg.errors import CheckFailed, GraphError, HfgError, NotRunning, RunError, UsageError
@@ -33,7 +34,7 @@ from hfg.graph.flat import FlatGraph, flatten
 from hfg.nodetype import Node
 from hfg.ports import EventPort, ParameterPort, SlotPort
 from hfg.token import Token
-from hfg.trace import ParameterSet, TokenSent, TraceEvent
+from hfg.trace import ParameterSet, TraceEvent
 from hfg.types import accepts, describe
 
 __all__ = ["Run", "run", "run_async", "running"]
@@ -125,39 +126,22 @@ class Run(Steering):
             f'graph output "{name}" is not connected: graph.connect(..., graph.outputs["{name}"]) before the run'
         )
 
-    async def tap(self, port: Any, *, size: int = 100) -> AsyncIterator[Token[Any]]:
-        """Look at a port or an edge: tokens as they are sent.
+    def tap(self, what: Any, *, size: int | None = None, max_rate_hz: float | None = None) -> Tap:
+        """Look at a port or an edge, given itself or by path: an async iterator over the tokens, markers too.
 
-        The oldest of more than `size` that were not looked at are skipped.
+        The graph never waits for a tap: tokens that it has no room for are skipped, oldest first, and counted.
+
+        Args:
+          what: a port or an edge of the graph, "fetch/go_to.goal", or "a.out -> b.in". An event shows its signals, an
+            output each token once whatever its fan-out, a slot what comes over all its edges and from outside.
+          size: how many tokens are kept for the reader; 100, or 1, the latest, with `max_rate_hz`.
+          max_rate_hz: give at most so many tokens a second of the run's clock.
+
+        Raises:
+          UsageError: it is in no run or has no edge.
+          GraphError: there is no such path.
         """
-        engine = self._engine
-        found = relays.labels_of(engine.flat, port)
-        if not found:
-            raise UsageError(f"{port!r} has no edge in this run, so there is nothing to look at")
-        labels = set(found if getattr(port, "kind", "") == "slot" else found[:1])  # fan-out carries the same
-        kept = outside._Tapped(size)
-
-        def look(event: TraceEvent) -> None:
-            if isinstance(event, TokenSent) and event.edge in labels:
-                kept.tokens.append(event.token)
-                kept.wake.set()
-
-        remove = self.trace(look)
-        try:
-            while True:
-                while kept.tokens:
-                    yield kept.tokens.popleft()
-                if engine.core.over:
-                    return
-                kept.wake.clear()
-                waits = [asyncio.ensure_future(kept.wake.wait()), asyncio.ensure_future(engine.ending.wait())]
-                try:
-                    await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
-                finally:
-                    for wait in waits:
-                        wait.cancel()
-        finally:
-            remove()
+        return self._engine.taps.add(what, size, max_rate_hz)
 
     def trace(self, consumer: Any, *, size: int | None = None) -> Listener:
         """Let a consumer see every event of the run from now on (R7); gives back what removes it.

@@ -81,6 +81,8 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
     core = target.core
     if core.trace is not None:
         core.trace(TokenSent(core.now(), edge.label, token))
+    if edge.tap is not None:
+        edge.tap(token)
     if edge.target_kind == "slot":
         if type(value) is Marker:  # T4: processed at once, the handler is not called
             _drain(edge, token)
@@ -207,6 +209,10 @@ def trigger(
         core.trace(EventTriggered(core.now(), event.label, Token(value, loudest, stamp)))
     if port is not None and port._observers:
         port._notify(Token(value, loudest, stamp))
+    if event.tap:
+        token = Token(value, loudest, stamp)
+        for look in event.tap:
+            look(token)
     for edge, modifier in sends:
         if edge.pipeline is not None:
             _into_operators(edge, Token(value, modifier, stamp))
@@ -245,6 +251,8 @@ def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
     core = target.core
     if core.trace is not None:
         core.trace(TokenSent(core.now(), edge.label, token))
+    if edge.tap is not None:
+        edge.tap(token)
     into_input = edge.target_kind == "input"
     if into_input and target.blocked & ENDED:
         _drain(edge, token)

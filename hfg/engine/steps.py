@@ -78,6 +78,7 @@ def _choose(worker: Worker) -> None:
         return  # a reader waits at its barrier
     if len(outs) > 1 or (worker.type.result == "fields"):
         return
+    traced = traced or any(edge.tap is not None for edge in outs)
     if worker.is_source:
         if worker.type.process_kind == "generator" and len(outs) == 1 and worker.process is not None:
             worker.step = watched.generator_step(worker, outs[0]) if traced else _generator_step(worker, outs[0])
@@ -458,6 +459,7 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
             or core.current is not worker  # perhaps a thread, while the loop is at work
             or not core.plain
             or port._observers is not None
+            or event.tap is not None
             or not edge.live
             or type(value) is Token
         ):

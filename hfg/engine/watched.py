@@ -1,4 +1,4 @@
-"""The short ways of the commonest shapes while somebody looks: they tell the trace and measure.
+"""The short ways of the commonest shapes while somebody looks: they tell the trace and taps, and measure.
 
 What they do is what the steps of the same names in `steps` do, and what they tell is what the general way tells, event
 by event (property: the trace with `fast` on and off). Apart from those, so that nobody pays who is not looked at.
@@ -51,6 +51,7 @@ def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None, quick:
     path = worker.path
     taken_label = taken.label
     given_label = given.label if given is not None else ""
+    tap = given.tap if given is not None else None
     now = core.now
     host: Any = core.host
     epoch: Any = host.epoch
@@ -125,6 +126,8 @@ def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None, quick:
         outputs.missing = 1
         if trace is not None:
             trace(TokenSent(at, given_label, token))
+        if tap is not None:
+            tap(token)
         target_inputs.missing = missing = target_inputs.missing - 1
         if not missing:
             if target.blocked or target_outputs.missing or target.placed or target.calls is not None or target.paced:
@@ -146,7 +149,7 @@ def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None, quick:
 
 
 def generator_step(worker: Worker, given: SyncEdge) -> Step:
-    """A generator with one output edge, traced; what measures it wraps the generator itself."""
+    """A generator with one output edge, traced or tapped; what measures it wraps the generator itself."""
     core = worker.core
     process: Any = worker.process
     outputs = worker.outputs
@@ -156,9 +159,10 @@ def generator_step(worker: Worker, given: SyncEdge) -> Step:
     of_its_own_kind = OF_ITS_OWN_KIND
     now = core.now
     carries = given.active
-    trace: Any = core.trace
+    trace = core.trace
     path = worker.path
     label = given.label
+    tap = given.tap
 
     def step(worker: Worker) -> None:
         if not worker.placed or worker.special or worker.busy or (worker.active and carries):
@@ -172,7 +176,8 @@ def generator_step(worker: Worker, given: SyncEdge) -> Step:
         core.current = worker
         stamp = worker.stamp = now()
         worker.busy = "firing"
-        trace(FiringStarted(stamp, path, number, "process"))
+        if trace is not None:
+            trace(FiringStarted(stamp, path, number, "process"))
         try:
             value = next(generator)
         except (StopIteration, EndOfStream):
@@ -197,10 +202,14 @@ def generator_step(worker: Worker, given: SyncEdge) -> Step:
         given.held = True
         outputs.missing = 1
         at = now()
-        trace(TokenSent(at, label, token))
+        if trace is not None:
+            trace(TokenSent(at, label, token))
+        if tap is not None:
+            tap(token)
         target_inputs.missing = missing = target_inputs.missing - 1
         if not missing:
             consider(target)
-        trace(FiringEnded(at, path, number, "done"))
+        if trace is not None:
+            trace(FiringEnded(at, path, number, "done"))
 
     return step

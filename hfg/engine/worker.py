@@ -56,13 +56,14 @@ NOTHING: Final[dict[str, Any]] = {}  # shared by the many that have none; never 
 class RunningEvent:
     """An event of a running node and the edges it feeds, slots first (D10 of docs/semantics.md, F9)."""
 
-    __slots__ = ("edges", "name", "pipelines", "port", "worker")
+    __slots__ = ("edges", "name", "pipelines", "port", "tap", "worker")
 
     def __init__(self, worker: Worker, name: str, port: Any) -> None:
         self.worker = worker
         self.name = name
         self.port = port
         self.edges: tuple[Any, ...] = ()
+        self.tap: tuple[Any, ...] | None = None  # who looks at its signals; () if at one of its edges only
 
     @property
     def label(self) -> str:

@@ -33,6 +33,7 @@ class Edge:
       ended: the consumer has taken END from it and waits for it no more (F4).
       handler: of the slot an event edge leads into, taking the value, where that is all there is to a call; None:
         the general way.
+      tap: sees every token that is put on it; None: nobody looks.
       via: the scopes (subgraphs) whose relays it passes; all must be enabled.
     """
 
@@ -50,6 +51,7 @@ class Edge:
         "position",
         "sent",
         "source",
+        "tap",
         "target",
         "target_kind",
         "via",
@@ -72,6 +74,7 @@ class Edge:
         self.ended = False
         self.via: tuple[Any, ...] = ()
         self.handler: Callable[[Any], Any] | None = None
+        self.tap: Callable[[Token[Any]], None] | None = None
 
 
 class SyncEdge(Edge):
