@@ -174,14 +174,14 @@ def test_the_mission_is_the_same_under_a_thousand_schedules() -> None:
 @pytest.mark.parametrize("name", VARIATIONS)
 def test_whatever_goes_wrong_no_schedule_loses_the_way(name: str) -> None:
     build = partial(mission.build, **VARIATIONS[name])
-    explore(build, runs=250, invariants=[*of_graph(build()), *OURS], result=outline)
+    explore(build, runs=100, invariants=[*of_graph(build()), *OURS], result=outline)
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("name", VARIATIONS)
 def test_whatever_goes_wrong_the_oracle_permits_every_move(name: str) -> None:
-    explore(partial(mission.build, **VARIATIONS[name]), runs=3, conform=True, result=outline)
+    explore(partial(mission.build, **VARIATIONS[name]), runs=1, conform=True, result=outline)
 
 
 # --- What it does.
