@@ -12,7 +12,7 @@ from benchmarks.peers.queues import Queues
 from benchmarks.peers.with_reactivex import Reactivex
 from benchmarks.works import cases
 
-HOPS = 100_000
+HOPS = 80_000
 COLUMNS = ("A1", "A10", "A50", "B10", "C", "E0", "E")
 ROWS = [*KINDS, Queues(), Reactivex()]
 DISTRIBUTIONS = ("hfg", "reactivex")

@@ -24,6 +24,9 @@ PAGE = ROOT / "docs" / "speed.md"
 SOURCE = ROOT / "docs" / "speed.jsonl"
 BLOCK = re.compile(r"(?P<begin><!-- (?P<name>[a-z]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
 OURS = "hfg, functions"
+MOST_DISTURBED = 1.2
+MOST_LOAD = 2.0
+WARNING = " **The machine was busy with something else: do not quote these.**"
 
 Records = Mapping[str, Record]
 
@@ -43,21 +46,25 @@ def cell(record: Record) -> str:
     return f"{text} ({record.spread:.0%})"
 
 
+def measured_on(record: Record) -> str:
+    """The machine, the versions, and what else it had to do."""
+    packages = ", ".join(f"{name} {version}" for name, version in record.versions.items())
+    return f"{record.machine}; {packages}; load {record.load[0]:.1f} before and {record.load[1]:.1f} after"
+
+
 def caption(records: Records) -> str:
     """What the figures were measured on, and how far to trust them."""
     several = list(records.values())
     first = several[0]
     spreads = sorted(record.spread for record in several)
-    packages = ", ".join(f"{name} {version}" for name, version in first.versions.items())
-    disturbed = [
-        record.median / statistics.median(record.figures["cpu"]) for record in several if "cpu" in record.figures
-    ]
-    clock = f"; the clock ran {statistics.median(disturbed):.2f} times the processor time" if disturbed else ""
+    ratios = [record.median / statistics.median(record.figures["cpu"]) for record in several if "cpu" in record.figures]
+    disturbed = statistics.median(ratios) if ratios else 1.0
+    clock = f"; the clock ran {disturbed:.2f} times the processor time" if ratios else ""
+    busy = disturbed > MOST_DISTURBED or first.load[0] > MOST_LOAD
     return (
-        f"*{first.machine}; {packages}; load {first.load[0]:.1f} before and {first.load[1]:.1f} after{clock}; "
-        f"{len(first.values)} fresh processes a case; spread {statistics.median(spreads):.0%} in the median, "
-        f"{spreads[-1]:.0%} at worst.*"
-    )
+        f"*{measured_on(first)}{clock}; fresh processes a case: {len(first.values)}; "
+        f"spread {statistics.median(spreads):.0%} in the median, {spreads[-1]:.0%} at worst.*"
+    ) + (WARNING if busy else "")
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
@@ -140,18 +147,12 @@ def profile(records: Records) -> str:
         ]
         for part in sorted(parts, key=lambda part: -part.median)
     ]
+    note = (
+        f"*{measured_on(times[0])}; fresh processes: {len(times[0].values)}, of about {parts[0].size:,} samples each.*"
+    )
     alone = table(["measured beside it", "µs"], [[record.case, cell(record)] for record in times])
     shares = table(["part", "share", "in all runs", "µs a hop"], rows)
-    return f"{shares}\n\n{alone}\n\n{profile_caption(parts, times[0])}"
-
-
-def profile_caption(parts: list[Record], hop: Record) -> str:
-    """As `caption`, but a spread means nothing for a share that is nearly none."""
-    packages = ", ".join(f"{name} {version}" for name, version in hop.versions.items())
-    return (
-        f"*{hop.machine}; {packages}; load {hop.load[0]:.1f} before and {hop.load[1]:.1f} after; "
-        f"{len(hop.values)} fresh processes of about {parts[0].size:,} samples.*"
-    )
+    return f"{shares}\n\n{alone}\n\n{note}"
 
 
 TABLES: dict[str, tuple[str, Callable[[Records], str]]] = {

@@ -121,3 +121,11 @@ def test_samples_are_sorted_into_parts_by_their_innermost_line(tmp_path: Path) -
 def test_a_profile_that_met_nothing_is_an_error() -> None:
     with pytest.raises(RuntimeError, match=r"Engine\._drain"):
         profile_hop.shares(["<module> (bench.py:1) 100"])
+
+
+def test_figures_of_a_busy_machine_say_so() -> None:
+    quiet = Record("suite", "case", "us", 10, {"wall": [1.0], "cpu": [1.0]}, "m", {}, (0.5, 1.0))
+    slow = quiet._replace(figures={"wall": [2.0], "cpu": [1.0]})
+    assert page.WARNING not in page.caption({"case": quiet})
+    assert page.WARNING in page.caption({"case": slow})
+    assert page.WARNING in page.caption({"case": quiet._replace(load=(7.0, 7.0))})
