@@ -23,6 +23,7 @@ from hfg.ports.parameters import REQUIRED, Parameter, ParameterSpec
 from hfg.ports.slots import UNSET, Slot
 from hfg.ports.states import State
 from hfg.signature import Signature, read_signature
+from hfg.types import is_hint
 
 __all__ = [
     "HOOKS",
@@ -272,8 +273,20 @@ def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED)
                 f'{where}: "{name}" cannot be the name of a port; use letters, digits and underscores, a letter '
                 f"first{_rename(kind, name)}"
             )
+    ports: tuple[Mapping[str, Any], ...] = (kind.inputs, kind.outputs, kind.events, kind.slots, kind.parameters)
+    for one in (port for some in ports for port in some.values()):
+        _check_type(one.name, one.type, where)
     for spec in kind.parameters.values():
         _check_default(spec, where)
+
+
+def _check_type(name: str, hint: Any, where: str) -> None:
+    """Refuse what stands in the place of a type and is none."""
+    if not is_hint(hint):
+        raise DeclarationError(
+            f'{where}: the type of "{name}" is {hint!r:.80}, which is no type; write the type itself, as in `int` or '
+            "`list[str]`"
+        )
 
 
 def _rename(kind: NodeType, name: str) -> str:

@@ -52,6 +52,7 @@ __all__ = [
     "TargetError",
     "TeardownError",
     "UsageError",
+    "in_words",
 ]
 
 
@@ -134,8 +135,17 @@ class NodeError(RunError):
     def __init__(self, path: str, what: str, cause: BaseException | str) -> None:
         self.path = path
         self.what = what
-        reason = cause if isinstance(cause, str) else f"{type(cause).__name__}: {cause}"
+        reason = cause if isinstance(cause, str) else in_words(cause)
         super().__init__(f'node "{path}" failed in {what}: {reason}')
+
+
+def in_words(error: BaseException) -> str:
+    """Name an exception of a user's, whose text may be empty or may itself raise."""
+    try:
+        text = str(error)
+    except Exception as fault:
+        text = f"its text cannot be made ({type(fault).__name__})"
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 class FiringTimeout(NodeError):

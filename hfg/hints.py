@@ -21,6 +21,7 @@ __all__ = [
     "function_name",
     "hints_of",
     "hints_of_class",
+    "is_iterator",
     "kind_of",
     "output_type",
     "result_of",
@@ -138,6 +139,11 @@ def result_of(hint: Any, kind: ProcessKind, has_inputs: bool) -> tuple[Any, Proc
     if kind == "function" and origin in (abc.Awaitable, abc.Coroutine):
         return output_type(arguments[-1] if arguments else Any), "async"
     return output_type(hint), kind
+
+
+def is_iterator(hint: Any) -> bool:
+    """Say whether an annotation promises one value after the other."""
+    return (typing.get_origin(hint) or hint) in (*_SYNC_ITERATORS, *_ASYNC_ITERATORS)
 
 
 def function_name(function: Any) -> str:

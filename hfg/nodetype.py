@@ -128,6 +128,11 @@ class Node:
                 f"node type {cls.__name__}: __init__ is not overridden, a node is made from its parameters alone; "
                 "declare hfg.Parameter and hfg.State, and open things in setup()"
             )
+        if cls.__eq__ is not object.__eq__ or cls.__hash__ is not object.__hash__:
+            raise DeclarationError(
+                f"node type {cls.__name__}: __eq__ and __hash__ are not overridden, a node is equal to itself alone; "
+                "compare what it holds by a method of another name"
+            )
         hidden = next((name for name in vars(cls) if name in _HIDDEN), None)
         if hidden is not None and not cls.__module__.startswith("hfg."):
             raise DeclarationError(

@@ -17,7 +17,7 @@ import annotated_types
 
 from hfg.description import InputSpec, ProcessKind
 from hfg.errors import DeclarationError
-from hfg.hints import MISSING, function_name, hints_of, kind_of, result_of, split_token
+from hfg.hints import MISSING, function_name, hints_of, is_iterator, kind_of, result_of, split_token
 from hfg.ports.parameters import REQUIRED, ParameterSpec, limits_of
 from hfg.types import describe
 
@@ -141,6 +141,11 @@ class _Reader:
         output = MISSING
         if "return" in self.hints:
             output, kind = result_of(self.hints["return"], kind, bool(self.inputs))
+            if kind == "async" and not self.inputs and is_iterator(self.hints["return"]):
+                raise DeclarationError(
+                    f"{self.where}: it is async and annotated as an iterator, but has no `yield`; write one, or "
+                    "annotate the value that it gives back"
+                )
         return self._signature(output, kind)
 
     def _signature(self, output: Any, kind: ProcessKind) -> Signature:

@@ -31,6 +31,7 @@ __all__ = [
     "accepts",
     "compatible",
     "describe",
+    "is_hint",
     "why_not",
 ]
 
@@ -363,6 +364,13 @@ def _bearable(value: Any, hint: Any) -> bool:
 @functools.lru_cache(maxsize=4096)
 def _describe(hint: Any) -> str:
     return _words(hint)
+
+
+def is_hint(value: Any) -> bool:
+    """Say whether this can be a type hint at all; a value, a name in quotes, a function or a module cannot."""
+    return not isinstance(value, str | bytes | int | float | complex | list | tuple | dict | set) and not isinstance(
+        value, types.FunctionType | types.BuiltinFunctionType | types.ModuleType
+    )
 
 
 def describe(hint: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import tracemalloc
 from collections.abc import AsyncIterator, Iterator
@@ -378,6 +379,35 @@ def test_a_subgraph_does_not_fire() -> None:
 
         class Broken(hfg.Node, Relaying):
             def process(self, value: int) -> None: ...
+
+
+@pytest.mark.parametrize("hint", [3, "int", [int], print, logging])
+def test_what_is_no_type_is_refused_as_the_type_of_a_port(hint: Any) -> None:
+    said = '"value" is .*, which is no type; write the type itself, as in `int`'
+    for declare in (hfg.Input, hfg.Output, hfg.Event):
+        with pytest.raises(DeclarationError, match=said):
+            type("Broken", (hfg.Node,), {"value": declare(hint)})
+    with pytest.raises(DeclarationError, match=said):
+        hfg.node(lambda value: None, inputs={"value": int}, outputs={"value": hint})
+    with pytest.raises(
+        hfg.errors.GraphError, match=r'the type of input "value" is .* write graph\.input\("value", int\)'
+    ):
+        hfg.Graph().input("value", hint)
+
+
+@pytest.mark.parametrize("method", [{"__eq__": lambda self, other: True}, {"__hash__": None}])
+def test_nodes_are_equal_to_themselves_alone(method: dict[str, Any]) -> None:
+    with pytest.raises(DeclarationError, match="__eq__ and __hash__ are not overridden, .* another name"):
+        type("Broken", (hfg.Node,), method)
+
+
+def test_a_node_type_is_no_dataclass() -> None:
+    class Broken(hfg.Node):
+        size: int = 3
+
+    made = dataclasses.dataclass(Broken)()
+    with pytest.raises(hfg.errors.GraphError, match=r"node type Broken was given an __init__, .* @dataclass: leave"):
+        hfg.Graph().add(made)
 
 
 def test_star_arguments_are_no_ports() -> None:

@@ -5,9 +5,12 @@ Stands on the verbs. Verbs return their exit code; only `main` knows about the p
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from importlib.metadata import version
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -47,13 +50,29 @@ def _root(
         raise typer.Exit
 
 
+@contextmanager
+def _streams() -> Iterator[None]:
+    """Somebody may have closed standard output or standard error, before or meanwhile (`hfg nodes | head`)."""
+    with Path(os.devnull).open("w", encoding="utf-8") as nowhere, ExitStack() as replaced:
+        if sys.stdout is None:
+            replaced.enter_context(redirect_stdout(nowhere))
+        if sys.stderr is None:
+            replaced.enter_context(redirect_stderr(nowhere))
+        try:
+            yield
+            sys.stdout.flush()
+        except BrokenPipeError:
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())  # Python flushes it once more as it leaves
+            sys.exit(1)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and give back its exit code.
 
     Args:
       arguments: those behind "hfg"; the process's own if not given.
     """
-    with Interrupt.installed():
+    with Interrupt.installed(), _streams():
         try:
             code = app(args=arguments, prog_name="hfg", standalone_mode=False)
         except TyperException as error:

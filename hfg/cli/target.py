@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from hfg.errors import TargetError
+from hfg.errors import TargetError, in_words
 from hfg.graph import Graph
 
 __all__ = ["load_graph", "load_module"]
@@ -35,8 +35,13 @@ def load_graph(target: str) -> Graph:
         return found
     try:
         graph = found()
+    except SystemExit as error:
+        raise TargetError(f"{place}: {_name(found)}() left the program; let it return the graph instead") from error
     except Exception as error:
-        raise TargetError(f"{place}: {_name(found)}() failed: {type(error).__name__}: {error}") from error
+        raise TargetError(f"{place}: {_name(found)}() failed: {in_words(error)}") from error
+    if inspect.iscoroutine(graph):
+        graph.close()
+        raise TargetError(f"{place}: {_name(found)}() is async; let a plain function build the graph")
     if not isinstance(graph, Graph):
         raise TargetError(
             f"{place}: {_name(found)}() gave back {_a(graph)}, not a Graph: return the graph that it builds"
@@ -56,6 +61,8 @@ def load_module(place: str) -> ModuleType:
         )
     if place.endswith(".py") or "/" in place or "\\" in place:
         return _load_file(Path(place))
+    if place.startswith("."):
+        raise TargetError(f'"{place}" is no module; name one from here on, as in package.module, or a file')
     _import_from(Path.cwd())
     try:
         return importlib.import_module(place)
@@ -63,9 +70,9 @@ def load_module(place: str) -> ModuleType:
         if error.name is not None and (place + ".").startswith(error.name + "."):
             hint = f"; is {place}.py meant?" if Path(f"{place}.py").exists() else ""
             raise TargetError(f'there is no module "{error.name}" here or installed{hint}') from None
-        raise TargetError(f"importing {place} failed: {type(error).__name__}: {error}") from error
+        raise TargetError(f"importing {place} failed: {in_words(error)}") from error
     except Exception as error:
-        raise TargetError(f"importing {place} failed: {type(error).__name__}: {error}") from error
+        raise TargetError(f"importing {place} failed: {in_words(error)}") from error
     except SystemExit as error:
         raise TargetError(
             f'importing {place} left the program; put what it runs under if __name__ == "__main__":'
@@ -101,7 +108,7 @@ def _load_file(file: Path) -> ModuleType:
             ) from error
         if not isinstance(error, Exception):
             raise
-        raise TargetError(f"{file.name} failed: {type(error).__name__}: {error}") from error
+        raise TargetError(f"{file.name} failed: {in_words(error)}") from error
     return module
 
 

@@ -174,7 +174,9 @@ class CodeRunner:
         """See `Host`."""
         try:
             result = call()
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             done(None, error)
             return
         if type(result) is not CoroutineType:

@@ -239,8 +239,10 @@ class Engine:
             pass
         except Exception as error:
             self.internal_fault(error)
-        except (asyncio.CancelledError, GeneratorExit) as error:
-            self._misused(core.current, error)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            self.misused(core.current, error)
         finally:
             core.pumping = core.plain = False
             core.current = None
@@ -274,9 +276,12 @@ class Engine:
             problem.__cause__ = error
         self.finish("failed", problem)
 
-    def _misused(self, worker: Worker | None, error: BaseException) -> None:
-        """A node's code raised what is no error but Python's way to end a task or generator: without us a hang."""
-        problem = NodeError(worker.path if worker is not None else "", "its code", error)
+    def misused(self, worker: Worker | None, error: BaseException, what: str = "its code") -> None:
+        """A node's code raised what is no error but Python's way to end a task or the program: without us a hang."""
+        cause: BaseException | str = error
+        if isinstance(error, SystemExit):
+            cause = "it left the program (sys.exit): end the run by an event that is connected to graph.stop"
+        problem = NodeError(worker.path if worker is not None else "", what, cause)
         problem.__cause__ = error
         self.finish("failed", problem)
 
@@ -284,8 +289,12 @@ class Engine:
         """Call something of ours in a callback of the loop; what it raises ends the run."""
         try:
             call()
+        except KeyboardInterrupt:
+            raise
         except Exception as error:
             self.internal_fault(error)
+        except BaseException as error:
+            self.misused(self.core.current, error)
 
     def _drain(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
         """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock."""

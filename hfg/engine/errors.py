@@ -12,7 +12,7 @@ from hfg.engine.agenda import block
 from hfg.engine.modifiers import automatic, report_error
 from hfg.engine.sending import flush_automatic, put_outputs
 from hfg.engine.worker import BACKOFF, Worker
-from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit
+from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit, in_words
 from hfg.ports.edges import EventEdge, SyncEdge
 
 __all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "fail_taken", "operator_failed", "time_out"]
@@ -52,7 +52,7 @@ def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
     worker.calls_failed += 1
     problem = as_node_error(worker, f"slot {slot}, call {worker.call_number}", error)
     policy = worker.options.on_error
-    report_error(worker, problem.what, error, policy)
+    report_error(worker, problem.what, in_words(error), policy)
     if policy == "stop":
         worker.core.host.finish("failed", problem)
         return
@@ -67,7 +67,7 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any 
     restarts = policy == "restart" and not worker.blocked & BACKOFF  # else that is under way
     if restarts and worker.restarts >= worker.options.restart_limit:
         policy = "stop"
-    report_error(worker, problem.what, problem.__cause__ or problem, policy)
+    report_error(worker, problem.what, in_words(problem.__cause__ or problem), policy)
     worker.written = None
     if policy == "stop":
         core.host.finish("failed", problem)

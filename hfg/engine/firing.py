@@ -7,6 +7,7 @@ The general way; `steps` has shorter ones for the common shapes, which fall back
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from types import CoroutineType
 from typing import Any
 
@@ -223,10 +224,27 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
     kind = worker.type.process_kind
     call: Any = worker.process
     if kind in ("generator", "async generator"):
+        step: Any = next if kind == "generator" else anext
         if worker.generator is None:
-            worker.generator = call(*arguments)
-        call, arguments = (next if kind == "generator" else anext), (worker.generator,)
+            call = partial(_open, worker, step)
+        else:
+            call, arguments = step, (worker.generator,)
     worker.core.host.execute(worker, call, arguments, _done(worker))
+
+
+def _open(worker: Worker, step: Callable[[Any], Any]) -> Any:
+    """Begin a source that is a generator, or a function that gives back an iterator, and take its first value."""
+    iterator = worker.process()  # type: ignore[misc]  # a source has one
+    method = "__next__" if step is next else "__anext__"
+    if not hasattr(iterator, method):
+        if type(iterator) is CoroutineType:
+            iterator.close()
+        raise TypeError(
+            f"it is annotated as an iterator but gave back {type(iterator).__name__}, not one; write `yield` in it, or "
+            "`return iter(...)`"
+        )
+    worker.generator = iterator
+    return step(iterator)
 
 
 def _done(worker: Worker) -> Callable[[Any, BaseException | None], None]:

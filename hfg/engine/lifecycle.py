@@ -88,10 +88,10 @@ def tear_down(worker: Worker, then: Then) -> None:
         else:
             _run_hook(worker, "teardown", then)
 
-    if generator is None:
+    close = getattr(generator, "close", None) or getattr(generator, "aclose", None)
+    if close is None:  # none, or an iterator that has nothing to close
         closed(None, None)
     else:
-        close = getattr(generator, "close", None) or generator.aclose
         worker.core.host.execute(worker, close, (), closed)
 
 

@@ -110,7 +110,13 @@ class Lifetime:
         engine = self._engine
         waiter: asyncio.Future[HfgError | None] = engine.loop.create_future()
         self._was_set_up.append(worker)
-        lifecycle.set_up(worker, partial(answer, waiter))
+        try:
+            lifecycle.set_up(worker, partial(answer, waiter))
+        except KeyboardInterrupt:
+            raise
+        except BaseException as problem:
+            engine.misused(worker, problem, "setup()")
+            return
         error = waiter.result() if waiter.done() else await waiter
         if error is not None:
             engine.finish("failed", error)
@@ -268,6 +274,10 @@ class Lifetime:
         except KeyboardInterrupt:  # meant for this hook, which blocks; the others have their turn
             engine.hurry()
             return NodeError(worker.path, "teardown()", "it was interrupted")
+        except BaseException as error:
+            problem = NodeError(worker.path, "teardown()", error)
+            problem.__cause__ = error
+            return problem
         limit = engine.teardown_limit_s
         if await self._within_limit(waiter):
             return waiter.result()

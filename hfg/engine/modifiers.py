@@ -115,8 +115,8 @@ def give_back(edge: Edge) -> None:
     set_active(sender, True, "returned")
 
 
-def report_error(worker: Worker, what: str, error: BaseException, policy: str) -> None:
+def report_error(worker: Worker, what: str, error: str, policy: str) -> None:
     """Tell whoever listens that a node's code failed."""
     core = worker.core
     if core.trace is not None:
-        core.trace(ErrorRaised(core.now(), worker.path, what, f"{type(error).__name__}: {error}", policy))
+        core.trace(ErrorRaised(core.now(), worker.path, what, error, policy))

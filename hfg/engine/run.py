@@ -378,6 +378,8 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
     if not isinstance(graph, Graph):
         raise UsageError(f"a Graph can run, not {type(graph).__name__}: write hfg.run(graph)")
     _need_clock(clock)
+    if graph._owner is not None:
+        raise UsageError(f'{graph._title} runs as a part of the whole: run graph "{graph._root.name}"')
     if graph._run is not None:
         raise UsageError(f'graph "{graph.name}" runs already: a graph has one run at a time; build a second graph')
     loop = asyncio.get_running_loop()

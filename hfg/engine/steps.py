@@ -298,7 +298,6 @@ def _generator_step(worker: Worker, given: SyncEdge) -> Step:
     """A generator with one output edge."""
     core = worker.core
     node = worker.node
-    process: Any = worker.process
     outputs = worker.outputs
     target: Worker = given.target
     target_inputs = target.inputs
@@ -308,12 +307,10 @@ def _generator_step(worker: Worker, given: SyncEdge) -> Step:
     of_its_own_kind = OF_ITS_OWN_KIND
 
     def step(worker: Worker) -> None:
-        if not worker.placed or worker.special or worker.busy or (worker.active and carries):
+        generator = worker.generator
+        if generator is None or not worker.placed or worker.special or worker.busy or (worker.active and carries):
             general(worker)
             return
-        generator = worker.generator
-        if generator is None:
-            generator = worker.generator = process()
         worker.queued = worker.placed = False
         worker.firings += 1
         core.current = worker

@@ -151,7 +151,6 @@ def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None, quick:
 def generator_step(worker: Worker, given: SyncEdge) -> Step:
     """A generator with one output edge, traced or tapped; what measures it wraps the generator itself."""
     core = worker.core
-    process: Any = worker.process
     outputs = worker.outputs
     target: Worker = given.target
     target_inputs = target.inputs
@@ -165,12 +164,10 @@ def generator_step(worker: Worker, given: SyncEdge) -> Step:
     tap = given.tap
 
     def step(worker: Worker) -> None:
-        if not worker.placed or worker.special or worker.busy or (worker.active and carries):
+        generator = worker.generator
+        if generator is None or not worker.placed or worker.special or worker.busy or (worker.active and carries):
             general(worker)
             return
-        generator = worker.generator
-        if generator is None:
-            generator = worker.generator = process()
         worker.queued = worker.placed = False
         worker.firings = number = worker.firings + 1
         core.current = worker

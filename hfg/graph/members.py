@@ -27,6 +27,11 @@ def need_new(node: Any) -> None:
         else:
             remedy = "make a node type of a function with hfg.node, or derive a class from hfg.Node"
         raise GraphError(f"graph.add takes a node, got {node!r}; {remedy}")
+    if type(node).__init__ is not Node.__init__:  # what a decorator such as @dataclass does behind the declaration
+        raise GraphError(
+            f"node type {type(node).__name__} was given an __init__, by a decorator such as @dataclass: leave that out "
+            "and declare hfg.Parameter and hfg.State"
+        )
     place = node._place
     if place is not None:
         raise GraphError(

@@ -43,6 +43,7 @@ from hfg.nodetype import Node, Place
 from hfg.ports import ParameterPort, Port, Source, Target
 from hfg.problem import Problem
 from hfg.token import Token
+from hfg.types import is_hint
 
 __all__ = ["Graph"]
 
@@ -388,7 +389,7 @@ class Graph:
         Raises:
           GraphError: the name is taken or not allowed, or this is the inside of a subgraph.
         """
-        port: GraphInput[T] = GraphInput(self, self._new_port("input", name), type)
+        port: GraphInput[T] = GraphInput(self, self._new_port("input", name, type), type)
         self.inputs[name] = port
         return port
 
@@ -398,7 +399,7 @@ class Graph:
         Raises:
           GraphError: the name is taken or not allowed, or this is the inside of a subgraph.
         """
-        port: GraphOutput[T] = GraphOutput(self, self._new_port("output", name), type)
+        port: GraphOutput[T] = GraphOutput(self, self._new_port("output", name, type), type)
         self.outputs[name] = port
         return port
 
@@ -586,7 +587,7 @@ class Graph:
         home = getattr(target, "graph", None)
         return isinstance(home, Graph) and home is not self and home._root is self
 
-    def _new_port(self, kind: str, name: str) -> str:
+    def _new_port(self, kind: str, name: str, hint: Any) -> str:
         self._need_rest("declaring a port")
         if self._owner is not None:
             raise GraphError(
@@ -596,6 +597,10 @@ class Graph:
         need_name(f"an {kind} of the graph", name)
         if name in self._boundary_ports():
             raise GraphError(f'{self._title} has a port "{name}" already; choose another name')
+        if not is_hint(hint):
+            raise GraphError(
+                f'the type of {kind} "{name}" is {hint!r:.80}, which is no type; write graph.{kind}("{name}", int)'
+            )
         return name
 
     def _boundary_ports(self) -> dict[str, Port]:

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import threading
 import time
+from typing import Any
 
 import pytest
 
@@ -168,14 +169,40 @@ def test_async_code_that_ignores_its_time_limit_is_dropped_at_the_end(fast: bool
 # --- code that raises what ends tasks ---
 
 
-@pytest.mark.parametrize("problem", [asyncio.CancelledError, GeneratorExit, SystemExit])
-def test_code_that_raises_what_is_no_error_does_not_hang_the_run(problem: type[BaseException], fast: bool) -> None:
-    class Raises(hfg.Node):
-        def process(self, value: int) -> None:
+class Stranger(BaseException):
+    """No error, and nothing that Python knows."""
+
+
+@pytest.mark.parametrize("problem", [asyncio.CancelledError, GeneratorExit, SystemExit, Stranger])
+@pytest.mark.parametrize("where", ["process", "setup", "teardown", "hear", "on_activated"])
+@pytest.mark.parametrize("is_async", [False, True])
+def test_code_that_raises_what_is_no_error_fails_the_run_with_its_path(
+    problem: type[BaseException], where: str, is_async: bool, fast: bool
+) -> None:
+    def fail(self: Any, *value: Any) -> None:
+        if self.where == where:
             raise problem
 
-    with pytest.raises((NodeError, SystemExit)):
-        run(one(Raises()), fast)
+    async def fail_async(self: Any, *value: Any) -> None:
+        fail(self)
+
+    class Raises(hfg.Node):
+        where = hfg.Parameter("")
+        value = hfg.Input(int)
+        setup = teardown = on_activated = fail_async if is_async else fail
+        hear = hfg.slot(type=object)(fail_async if is_async else fail)
+
+        def process(self, value: int) -> None:
+            fail(self)
+
+    graph = one(Raises(where=where))
+    graph.start.activates(graph["node"].hear)
+    with pytest.raises((NodeError, hfg.errors.TeardownError), match='node "node" failed in ') as raised:
+        run(graph, fast)
+    if problem is SystemExit and where in ("process", "setup", "hear"):
+        assert "it left the program (sys.exit): end the run by an event that is connected to graph.stop" in str(
+            raised.value
+        )
 
 
 def test_async_code_that_cancels_itself_does_not_hang_the_run(fast: bool) -> None:

@@ -47,6 +47,25 @@ def test_a_node_that_raises_in_a_thread_is_named_too() -> None:
     assert sentence(graph, True) == 'node "node" failed in firing 1: ZeroDivisionError: division by zero'
 
 
+class Mute(Exception):
+    """Cannot be told."""
+
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+@pytest.mark.parametrize(
+    ("problem", "said"), [(Mute, "Mute: its text cannot be made (RuntimeError)"), (ValueError, "ValueError")]
+)
+def test_an_exception_without_a_text_is_named(problem: type[Exception], said: str, fast: bool) -> None:
+    class Raises(hfg.Node):
+        def process(self, value: int) -> None:
+            raise problem
+
+    seen: list[Any] = []
+    assert sentence(one(Raises()), fast, trace=seen.append) == f'node "node" failed in firing 1: {said}'
+
+
 @hfg.node
 async def broken_source() -> AsyncIterator[int]:
     """Fails behind its first value."""

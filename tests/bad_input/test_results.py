@@ -243,3 +243,69 @@ def test_a_coroutine_from_a_thread_is_an_error_that_says_what_to_write(slot: boo
         'TypeError: it gave back a coroutine, but its group "work" is a thread and async code runs on the loop; write '
         "`async def` and leave out group="
     )
+
+
+# --- a source that says it is a generator ---
+
+
+@hfg.node
+def no_iterator() -> Iterator[int]:
+    """Gives back a list."""
+    return [1, 2]  # type: ignore[return-value]
+
+
+@hfg.node
+def forgets() -> Iterator[int]:
+    """Gives back nothing."""
+
+
+@hfg.node
+def mapped(*, count: int = 3) -> Iterator[int]:
+    """Gives back an iterator, which cannot be closed."""
+    return map(abs, range(count))
+
+
+@hfg.node
+def fails_at_once() -> Iterator[int]:
+    """Fails before there is an iterator."""
+    raise ValueError("mine")
+
+
+@pytest.mark.rule("F2", "X1")
+@pytest.mark.parametrize(("node", "found"), [(no_iterator, "list"), (forgets, "NoneType")])
+def test_a_source_that_gives_back_no_iterator_says_what_to_write(node: Any, found: str, fast: bool) -> None:
+    graph = hfg.Graph()
+    graph.add(node(), name="node") >> graph.add(Keep())
+    assert sentence(graph, fast) == (
+        f'node "node" failed in firing 1: TypeError: it is annotated as an iterator but gave back {found}, not one; '
+        "write `yield` in it, or `return iter(...)`"
+    )
+
+
+@pytest.mark.rule("F2")
+def test_an_async_source_without_yield_is_refused_where_it_is_declared() -> None:
+    async def forgot() -> AsyncIterator[int]:
+        return 1  # type: ignore[return-value]
+
+    with pytest.raises(
+        hfg.errors.DeclarationError, match="^node type forgot: it is async .* but has no `yield`; write"
+    ):
+        hfg.node(forgot)
+
+
+@pytest.mark.rule("F2", "X1")
+@pytest.mark.parametrize("group", ["loop", "work"])
+def test_a_source_that_fails_before_there_is_an_iterator_is_named(group: str, fast: bool) -> None:
+    graph = hfg.Graph()
+    graph.group("work", threads=1)
+    graph.add(fails_at_once(), group=group) >> graph.add(Keep())
+    assert sentence(graph, fast) == 'node "fails_at_once" failed in firing 1: ValueError: mine'
+
+
+@pytest.mark.rule("F2")
+def test_a_source_may_give_back_any_iterator(fast: bool) -> None:
+    graph = hfg.Graph()
+    sink = graph.add(Keep())
+    graph.add(mapped()) >> sink
+    run(graph, fast)
+    assert sink.values == [0, 1, 2]

@@ -129,6 +129,16 @@ def test_what_is_no_graph_cannot_run() -> None:
         hfg.run([])  # type: ignore[arg-type]
 
 
+def test_the_inside_of_a_subgraph_does_not_run_alone() -> None:
+    class Box(hfg.Subgraph):
+        def build(self, graph: hfg.Graph) -> None:
+            graph.add(numbers()) >> graph.add(Keep())
+
+    inside = hfg.Graph("whole").add(Box()).graph
+    with pytest.raises(hfg.errors.UsageError, match=r'^the graph inside "box" runs as .*: run graph "whole"$'):
+        run(inside)
+
+
 def test_an_unknown_policy_is_refused_before_anything_is_set_up() -> None:
     graph = hfg.Graph()
     ear = graph.add(SetsUp())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -344,6 +345,24 @@ def test_check_tells_each_error(hfg: Command) -> None:
     assert "error at" in shown.out
     problems = json.loads(hfg("check", "halves.py:unsound", "--json").out)
     assert "error" in {problem["severity"] for problem in problems}
+
+
+def test_closed_streams_are_no_trouble(hfg: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as closed:
+        closed.setattr(sys, "stdout", None)
+        closed.setattr(sys, "stderr", None)
+        assert main(["check", TARGET]) == 0
+        assert main(["run", TARGET, *VIRTUAL]) == 0
+
+
+def test_a_reader_that_has_gone_ends_the_command_quietly(hfg: Command) -> None:
+    writes = [sys.executable, "-m", "hfg", "nodes", "halves.py"]
+    with subprocess.Popen(writes, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
 
 
 def test_nodes_of_a_file(hfg: Command) -> None:

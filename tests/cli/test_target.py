@@ -99,6 +99,13 @@ def test_node_types_of_a_file_are_found_by_name() -> None:
         ("def build(size) -> hfg.Graph: ...\n", "a_file.py:build", "needs arguments"),
         ("def build() -> hfg.Graph:\n    return 3\n", "a_file.py", "gave back an int, not a Graph"),
         ("def build() -> hfg.Graph:\n    1 / 0\n", "a_file.py", "build() failed: ZeroDivisionError"),
+        (
+            "def build() -> hfg.Graph:\n    raise SystemExit\n",
+            "a_file.py",
+            "build() left the program; let it return the",
+        ),
+        ("async def build() -> hfg.Graph: ...\n", "a_file.py", "build() is async; let a plain function build"),
+        ("", ".", '"." is no module; name one from here on, as in package.module, or a file'),
         ("1 / 0\n", "a_file.py", "a_file.py failed: ZeroDivisionError"),
         ("import not_there\n", "a_file.py", "No module named 'not_there'"),
         ("import not_there\n", "a_file:graph", "No module named 'not_there'"),
