@@ -20,6 +20,7 @@ __all__ = [
     "ActivityLost",
     "CallEnded",
     "CallStarted",
+    "EditWaits",
     "ErrorRaised",
     "EventTriggered",
     "FiringEnded",
@@ -161,7 +162,7 @@ class ActivityChanged(TraceEvent, frozen=True):
 
 
 class ActivityLost(TraceEvent, frozen=True):
-    """A token with +1 was discarded and its sender is gone (A8)."""
+    """A token with +1 was discarded and its sender is gone (A8); or an active node was removed: its path."""
 
     edge: str
 
@@ -203,7 +204,16 @@ class QueueGrown(TraceEvent, frozen=True):
     capacity: int
 
 
+class EditWaits(TraceEvent, frozen=True):
+    """An edit waits for the end of what is under way; `nodes` start nothing until it is done or given up (R4)."""
+
+    nodes: tuple[str, ...]
+
+
 class StructureChanged(TraceEvent, frozen=True):
-    """The graph was edited while it ran (R4)."""
+    """The graph is another from now on (R4); what comes of it follows.
+
+    `change`: the commands as JSON, "undo" or "redo"; "" if an edit that waited was given up.
+    """
 
     change: str

@@ -16,7 +16,7 @@ from hfg.engine.scopes import Scope
 from hfg.engine.sending import flush_automatic, trigger
 from hfg.engine.worker import RATE, RESTING, Worker
 
-__all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "scopes_changed", "strip"]
+__all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed", "strip"]
 
 
 def changed(worker: Worker, active: bool) -> None:
@@ -76,10 +76,11 @@ def gate_changed(gates: Any) -> None:
     for gate in gates:
         for worker in gate.workers:
             if worker.is_source:
-                _rest(worker)
+                rest(worker)
 
 
-def _rest(worker: Worker) -> None:
+def rest(worker: Worker) -> None:
+    """Let a source rest, or go on, as its gates say now."""
     if worker.rate_timer is not None:
         worker.rate_timer.cancel()
         worker.rate_timer = None

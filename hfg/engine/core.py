@@ -7,6 +7,7 @@ are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asy
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from types import CoroutineType
 from typing import Any, Protocol
@@ -147,6 +148,7 @@ class Core:
         self.upstairs = upstairs
         self.now = host.now
         self.workers: list[Worker] = []
+        self._numbers = itertools.count()
         self.edges: list[SyncEdge | DelayEdge | EventEdge] = []
         self.scopes: list[Scope] = []
         self.by_path: dict[str, Worker] = {}
@@ -174,6 +176,10 @@ class Core:
         self.inside: Any = None  # the iteration whose inside this is (G4)
         self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
         self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
+
+    def number_workers(self) -> int:
+        """Give a number that no worker of this run has yet."""
+        return next(self._numbers)
 
     def after(self, delay_s: float, callback: Callable[[], None]) -> Timer:
         """Call back `delay_s` seconds from now."""

@@ -20,6 +20,7 @@ from hfg.engine import plan, quiet, rx, steps
 from hfg.engine.code import CodeRunner, answer
 from hfg.engine.consumers import Consumers
 from hfg.engine.core import Core
+from hfg.engine.edits import Edits
 from hfg.engine.groups import Dispatching, Group, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.lifetime import Lifetime
 from hfg.engine.pausing import Halt, Pausing
@@ -107,7 +108,7 @@ class Engine:
         self.taps = Taps(self)
         self.core.debug = settings.debug
         self.core.fast = settings.fast
-        self.flat = flat
+        self.flat: FlatGraph = flat
         self.holds = 0
         self.readers: list[Worker] = []
         self.read_out: set[Worker] = set()
@@ -132,6 +133,7 @@ class Engine:
         self.close = self.lifetime.close
         self.groups = self._make_groups()
         self.pausing = Pausing(self)
+        self.edits = Edits(self)
         self._loop_group = self.groups["loop"]
         self.started_at = 0.0
         self.hurried = asyncio.Event()

@@ -14,12 +14,23 @@ from hfg.engine.agenda import block, consider, unblock
 from hfg.engine.core import Core
 from hfg.engine.modifiers import derive_scopes, discard
 from hfg.engine.releasing import release
-from hfg.engine.worker import BACKOFF, DISABLED, ENDED, FUTILE, TORN_DOWN, Worker
+from hfg.engine.worker import BACKOFF, DISABLED, ENDED, FUTILE, REMOVED, TORN_DOWN, Worker
 from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge
 from hfg.trace import NodeEnabled
 
-__all__ = ["disable", "enable", "reset", "restart", "set_up", "settle_disabled", "tear_down", "when_idle"]
+__all__ = [
+    "Then",
+    "disable",
+    "enable",
+    "not_ended",
+    "reset",
+    "restart",
+    "set_up",
+    "settle_disabled",
+    "tear_down",
+    "when_idle",
+]
 
 Then = Callable[[NodeError | None], None]
 
@@ -134,7 +145,7 @@ def enable(worker: Worker, then: Callable[[], None]) -> None:
             then()  # disabled again meanwhile
             return
         worker.blocked &= ~(DISABLED | ENDED)
-        _not_ended(worker)
+        not_ended(worker)
         if core.trace is not None:
             core.trace(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
@@ -167,7 +178,8 @@ def _afresh(worker: Worker, then: Callable[[], None]) -> None:
         tear_down(worker, down)
 
 
-def _not_ended(worker: Worker) -> None:
+def not_ended(worker: Worker) -> None:
+    """The node starts afresh: it has not ended, nor have the inputs that it must have."""
     worker.pending_end = False
     worker.deferred = None
     for edge in worker.in_edges:
@@ -186,7 +198,7 @@ def reset(worker: Worker, then: Callable[[], None]) -> None:
     """The slot `reset`: teardown, setup, not ended; tokens and A(v) stay (A9)."""
 
     def up() -> None:
-        _not_ended(worker)
+        not_ended(worker)
         unblock(worker, ENDED)
         wiring.refresh(worker)
         _sources_matter_again(worker.core)
@@ -209,7 +221,7 @@ def restart(worker: Worker, backoff_s: float) -> None:
         when_idle(worker, up, lambda: None)
 
     def up(worker: Worker, then: Callable[[], None]) -> None:
-        if worker.blocked & DISABLED:
+        if worker.blocked & (DISABLED | REMOVED):
             over(None, then)
         else:
             set_up(worker, lambda error: over(error, then))

@@ -39,7 +39,7 @@ class Lifetime:
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self._was_set_up: list[Worker] = []
-        self._disposables: list[Callable[[], None]] = []
+        self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
         self._watch: Watch | None = None
 
     async def start(self) -> None:
@@ -61,17 +61,14 @@ class Lifetime:
             trigger(start, explicit=1)
         self._open_sources(core)
         for source, edge, operators in core.observables:
-            self._feed(source, edge, operators)
+            self.feed(source, edge, operators)
         engine.kick()
 
     async def _set_up_all(self, core: Core) -> bool:
         """Set up every node in order of adding, those inside an iteration right behind it; whether all went well."""
         engine = self._engine
         for worker in core.workers:
-            if worker.type is not None and (
-                worker.is_async or any(spec.is_async for spec in worker.type.slots.values())
-            ):
-                worker.carrier = engine.code.carrier(worker)
+            self.carry(worker)
         for edge in core.edges:
             if isinstance(edge, DelayEdge | EventEdge):
                 edge.queue.extend(Token(value, 0, engine.now(), 0) for value in edge.initial)
@@ -93,7 +90,7 @@ class Lifetime:
                 engine_ports.bind(worker)
             wiring.rewire(worker)
         for edge, operators in core.piped:
-            self._disposables.append(rx.pipe_edge(edge, operators, engine.scheduler))
+            self.pipe(edge, operators)
         return True
 
     def _open_sources(self, core: Core) -> None:
@@ -105,6 +102,11 @@ class Lifetime:
             consider(worker)
             if worker.iteration is not None:
                 self._open_sources(worker.iteration.core)
+
+    def carry(self, worker: Worker) -> None:
+        """Give an async node its dormant task."""
+        if worker.type is not None and (worker.is_async or any(spec.is_async for spec in worker.type.slots.values())):
+            worker.carrier = self._engine.code.carrier(worker)
 
     async def _set_up_one(self, worker: Worker) -> None:
         engine = self._engine
@@ -121,7 +123,22 @@ class Lifetime:
         if error is not None:
             engine.finish("failed", error)
 
-    def _feed(self, source: Any, edge: Any, operators: tuple[Any, ...]) -> None:
+    def pipe(self, edge: Any, operators: tuple[Any, ...]) -> None:
+        """Put operators on an edge (P9)."""
+        self._disposables[edge] = rx.pipe_edge(edge, operators, self._engine.scheduler)
+
+    def came(self, worker: Worker) -> None:
+        """A node was set up while the run was under way (R4)."""
+        self._was_set_up.append(worker)
+
+    def forget(self, one: Any) -> None:
+        """An edge, or a node that was torn down, is no longer part of the run (R4)."""
+        if one in self._disposables:
+            self._disposables.pop(one)()
+        elif one in self._was_set_up:
+            self._was_set_up.remove(one)
+
+    def feed(self, source: Any, edge: Any, operators: tuple[Any, ...]) -> None:
         """An outside observable holds the run open until it completes (R5)."""
         engine = self._engine
         engine.hold()
@@ -136,9 +153,13 @@ class Lifetime:
                     engine.finish("failed", problem)
                 engine.unhold()
 
-        self._disposables.append(
-            rx.feed_from_observable(source, edge, operators, engine.scheduler, engine.from_any_thread, over)
-        )
+        dispose = rx.feed_from_observable(source, edge, operators, engine.scheduler, engine.from_any_thread, over)
+
+        def stop() -> None:
+            dispose()
+            over(None)
+
+        self._disposables[edge] = stop
 
     def _until(self) -> None:
         engine = self._engine
@@ -174,7 +195,7 @@ class Lifetime:
         outcome, error = engine.ended_how
         problems: list[NodeError] = []
         try:
-            for dispose in self._disposables:
+            for dispose in self._disposables.values():
                 dispose()
             problems += await self._cancel_code()
             for worker in reversed(self._was_set_up):

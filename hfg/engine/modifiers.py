@@ -12,7 +12,7 @@ from hfg.activity.rules import after_receipt
 from hfg.engine.agenda import freed, remove_call, unplace
 from hfg.engine.core import Core
 from hfg.engine.scopes import Scope
-from hfg.engine.worker import Worker
+from hfg.engine.worker import REMOVED, Worker
 from hfg.ports.edges import Edge, EventEdge
 from hfg.token import Token
 from hfg.trace import ActivityChanged, ActivityLost, ErrorRaised, TokenDropped
@@ -107,7 +107,7 @@ def give_back(edge: Edge) -> None:
     """A8: activity is never lost unseen: the sender has it again, or its loss is counted."""
     sender: Worker = edge.source
     core: Core = edge.target.core
-    if sender.node is None:
+    if sender.node is None or sender.blocked & REMOVED:
         core.lost_activity += 1
         if core.trace is not None:
             core.trace(ActivityLost(core.now(), edge.label))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hfg.engine.agenda import block, freed, must_wait
+from hfg.engine.agenda import block, freed, must_wait, unblock
 from hfg.engine.core import Core
 from hfg.engine.sending import enqueue, put_outputs
 from hfg.engine.worker import CALLS_BLOCKED, DISABLED, ENDED, FULL, FUTILE, RESTING, UNREADY, UNWIRED, Worker
@@ -22,6 +22,7 @@ __all__ = [
     "complete_operators",
     "end_events",
     "grow",
+    "judge_sources",
     "node_ended",
     "only_futile_in_flight",
     "only_waiting_for_room",
@@ -122,14 +123,25 @@ def end_events(core: Core) -> bool:
 
 
 def node_ended(worker: Worker) -> None:
-    """A node is over: its operators complete (P9).
-
-    And sources that only feed the dead are futile when no other is left (R5).
-    """
+    """A node is over: its operators complete (P9), and sources may feed nobody any more (R5)."""
     core = worker.core
     if not worker.slot_edges:
         for edge in worker.event_edges():
             complete_edge(edge)
+    _note_futile(core)
+
+
+def judge_sources(core: Core) -> None:
+    """The structure has changed: sources that fed only the dead may matter again, or others do not any more (R5)."""
+    if core.futile:
+        core.futile = False
+        for source in core.sources:
+            unblock(source, FUTILE)
+    _note_futile(core)
+
+
+def _note_futile(core: Core) -> None:
+    """Sources that only feed the dead are futile when no other is left."""
     sources = [one for one in core.sources if not one.blocked & (ENDED | DISABLED)]
     if sources and all(_feeds_only_ended(source) for source in sources):
         core.futile = True

@@ -17,6 +17,7 @@ from typing import Any, Literal
 from hfg.engine import outside, relays
 from hfg.engine.code import answer
 from hfg.engine.consumers import Listener
+from hfg.engine.editable import Editable
 from hfg.engine.engine import Engine
 from hfg.engine.interrupt import CtrlC
 from hfg.engine.report import Report, edge_reports, node_reports
@@ -42,7 +43,7 @@ __all__ = ["Run", "run", "run_async", "running"]
 Clock = Literal["real", "virtual"]
 
 
-class Run(Steering):
+class Run(Steering, Editable):
     """A graph that runs; made by `running`."""
 
     def __init__(self, graph: Graph, engine: Engine) -> None:
@@ -412,7 +413,9 @@ def _refuse_endless(flat: FlatGraph) -> None:
         )
 
 
-async def _run_to_end(graph: Graph, clock: Clock, settings: Settings, ctrl_c: CtrlC | None = None) -> Report:
+async def _run_to_end(
+    graph: Graph, clock: Clock, settings: Settings, begin: Callable[[Run], object] | None, ctrl_c: CtrlC | None = None
+) -> Report:
     run = _prepare(graph, clock, settings)
     engine = run._engine
     if ctrl_c is not None:
@@ -420,6 +423,8 @@ async def _run_to_end(graph: Graph, clock: Clock, settings: Settings, ctrl_c: Ct
     try:
         for worker in engine.core.readers:
             outside.collect(engine, worker, run._outputs.setdefault(worker.port_name, []))
+        if begin is not None:
+            begin(run)
         if settings.allow_idle:
             engine.hold()
         await engine.start()
@@ -442,6 +447,7 @@ async def run_async(
     policy: str | None = None,
     seed: int | None = None,
     trace: Callable[[TraceEvent], None] | None = None,
+    begin: Callable[[Run], object] | None = None,
     allow_idle: bool = False,
     block_warning_s: float = 0.1,
     fast: bool = True,
@@ -460,7 +466,7 @@ async def run_async(
         allow_idle=allow_idle,
         block_warning_s=block_warning_s,
     )
-    return await _run_to_end(graph, clock or "real", settings)
+    return await _run_to_end(graph, clock or "real", settings, begin)
 
 
 def run(
@@ -472,6 +478,7 @@ def run(
     policy: str | None = None,
     seed: int | None = None,
     trace: Callable[[TraceEvent], None] | None = None,
+    begin: Callable[[Run], object] | None = None,
     allow_idle: bool = False,
     block_warning_s: float = 0.1,
     fast: bool = True,
@@ -486,6 +493,7 @@ def run(
       policy: for all groups, in place of their own: "fifo", "priority", "random" (R2).
       seed: of the policy "random".
       trace: receives every event of the run (R7); one that raises is removed.
+      begin: called with the run on its loop, before its nodes are set up: the place for `run.tap` and `run.trace`.
       allow_idle: a quiet graph does not end; it waits for subscribers, `stop` or Ctrl-C.
       block_warning_s: after how long a firing on the loop group is warned about; 0 for never.
       fast: take short ways for common shapes; outcomes do not differ.
@@ -522,7 +530,7 @@ def run(
     runner = asyncio.Runner(loop_factory=factory)
     try:
         with ctrl_c.handled(runner.get_loop()), runner:
-            report = runner.run(_run_to_end(graph, clock, settings, ctrl_c))
+            report = runner.run(_run_to_end(graph, clock, settings, begin, ctrl_c))
         if not ctrl_c.count:
             return report
     except (asyncio.CancelledError, KeyboardInterrupt, RunError):

@@ -26,6 +26,7 @@ __all__ = [
     "FULL",
     "FUTILE",
     "RATE",
+    "REMOVED",
     "RESTING",
     "STARTING",
     "TORN_DOWN",
@@ -47,6 +48,7 @@ UNREADY: Final = 128  # its ready() said no; asked again after each firing, call
 STARTING: Final = 256  # sources, until `start` has been triggered (A10)
 FUTILE: Final = 512  # a source all of whose edges lead to ended nodes, when all other sources are over (R5)
 TORN_DOWN: Final = 1024  # the run is ending (R5, X3)
+REMOVED: Final = 2048  # an edit took it out of the graph (R4)
 
 CALLS_BLOCKED: Final = FULL | BACKOFF | TORN_DOWN
 

@@ -1,0 +1,325 @@
+"""Edits of a graph that runs: commands, undo and redo that take effect between firings (rule R4).
+
+One edit after the other: checked on the drawn graph, new nodes are set up while the others go on, then the touched
+nodes are held as they come to rest, the plan is changed at one moment, and all go on. What fails on the way leaves
+graph and run as they were. Stands on `reforming` and `lifecycle`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from functools import partial
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from hfg.engine import lifecycle, plan, subgraphs
+from hfg.engine import ports as engine_ports
+from hfg.engine.code import answer
+from hfg.engine.reforming import reform
+from hfg.engine.replanning import Replan, closes_a_ring, replan
+from hfg.engine.worker import Worker
+from hfg.errors import HfgError, NodeError, NotRunning
+from hfg.graph import Graph
+from hfg.graph.changes import Change, OptionsChange, ParameterChange, undo_all
+from hfg.graph.checks import check_flat
+from hfg.graph.commands import Command, encode
+from hfg.graph.editing import Transaction, history_of, may_break, prepare, refuse_new_errors
+from hfg.graph.flat import flatten
+from hfg.graph.reloading import reloaded
+from hfg.trace import EditWaits, ParameterSet, StructureChanged
+
+if TYPE_CHECKING:
+    from hfg.engine.engine import Engine
+
+__all__ = ["Edits"]
+
+
+class Edits:
+    """Edits the graph of one engine."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._graph: Graph = engine.flat.graph
+        self._turn = asyncio.Lock()
+
+    async def edit(self, commands: Sequence[Command]) -> None:
+        """See `Run.edit`."""
+        async with self._turn:
+            await self._edit(commands)
+
+    async def reload(self, module: str | ModuleType) -> None:
+        """See `Run.reload`."""
+        async with self._turn:
+            with reloaded(self._graph, module) as commands:
+                await self._edit(commands)
+
+    async def _edit(self, commands: Sequence[Command]) -> None:
+        self._need_run()
+        what = encode(commands)
+        transaction = prepare(self._graph, commands, check=False)
+        await self._follow(transaction.changes, what, check=may_break(commands))
+        history_of(self._graph).note(transaction)
+
+    async def undo(self) -> None:
+        """See `Run.undo`."""
+        async with self._turn:
+            self._need_run()
+            history = history_of(self._graph)
+            await self._follow(undo_all(history.next_undo().changes), "undo", check=False)
+            history.undo_done()
+
+    async def redo(self) -> None:
+        """See `Run.redo`."""
+        async with self._turn:
+            self._need_run()
+            history = history_of(self._graph)
+            transaction: Transaction = history.next_redo()
+            for change in transaction.changes:
+                change.do()
+            await self._follow(transaction.changes, "redo", check=False)
+            history.redo_done()
+
+    def _need_run(self) -> None:
+        if self._engine.core.over:
+            raise NotRunning("the run is over: edit the graph with graph.edit(...)")
+
+    # --- following what was done to the drawn graph
+
+    async def _follow(self, changes: Sequence[Change], what: str, *, check: bool) -> None:
+        """Let the run be as the drawn graph is; if that fails, take back what was done to it."""
+        engine = self._engine
+        values = [change for change in changes if isinstance(change, ParameterChange)]
+        come: list[Worker] = []
+        took_effect = False
+        engine.hold()
+        try:
+            how = replan(engine.core, engine.flat, changes)
+            if check:
+                self._refuse_errors(how)
+            undo_all(values)  # nodes work with the old values until their firings are over
+            await self._set_up(how, come)
+            async with _Held(engine, how.touched) as held:
+                await self._exchange_nodes(how)
+                self._need_run()
+                for value in values:
+                    value.do()
+                took_effect = held.done = True
+                self._take_effect(how, come, changes, what)
+                await self._enable(changes)
+        except BaseException:
+            if not took_effect:
+                undo_all(changes)
+                for worker in come:
+                    await self._tear_down(worker)
+            raise
+        finally:
+            engine.unhold()
+        for worker in how.gone:
+            await self._tear_down(worker)
+
+    def _refuse_errors(self, how: Replan) -> None:
+        """A graph that runs has no errors, and gets none."""
+        if how.whole:
+            refuse_new_errors((), [one for one in check_flat(how.flat) if one.severity == "error"])
+        elif closes_a_ring(self._engine.core, how.new):
+            refuse_new_errors((), [one for one in check_flat(flatten(self._graph)) if one.severity == "error"])
+
+    async def _set_up(self, how: Replan, come: list[Worker]) -> None:
+        """Make workers of the nodes that come and set them up, before anybody is held for them."""
+        engine = self._engine
+        for node in how.come:
+            worker = plan.make_worker(engine.core, node, engine.groups)
+            come.append(worker)
+            engine.lifetime.carry(worker)
+            worker.busy = "setup"
+            await self._hook(worker, lifecycle.set_up)
+            engine.lifetime.came(worker)
+
+    async def _hook(self, worker: Worker, hook: Callable[[Worker, lifecycle.Then], None]) -> None:
+        """Run a hook of a node to its end.
+
+        Raises:
+          NodeError: it failed.
+        """
+        waiter: asyncio.Future[NodeError | None] = self._engine.loop.create_future()
+        hook(worker, partial(answer, waiter))
+        error = waiter.result() if waiter.done() else await waiter
+        if error is not None:
+            raise error
+
+    async def _exchange_nodes(self, how: Replan) -> None:
+        """Tear down the nodes that are replaced and set up the others in their place; back again if that fails."""
+        done: list[tuple[Worker, Any]] = []
+        for worker, node in how.swapped:
+            old = worker.node
+            await self._hook(worker, lifecycle.tear_down)
+            engine_ports.release_ports(worker)
+            done.append((worker, old))
+            try:
+                await self._become(worker, node)
+            except BaseException:
+                for changed, before in reversed(done):
+                    await self._hook(changed, lifecycle.tear_down)
+                    await self._become(changed, before)
+                raise
+        for worker, _ in done:
+            lifecycle.not_ended(worker)
+
+    async def _become(self, worker: Worker, node: Any) -> None:
+        if worker.carrier is not None:
+            worker.carrier.drop()
+            worker.carrier = None
+        worker.node = node
+        worker.type = type(node)._type
+        worker.silent_code = worker.type.is_function
+        worker.is_async = worker.type.process_kind.startswith("async")
+        node._active = worker.active
+        self._engine.lifetime.carry(worker)
+        await self._hook(worker, lifecycle.set_up)
+
+    def _take_effect(self, how: Replan, come: list[Worker], changes: Sequence[Change], what: str) -> None:
+        """From one moment to the next the run is another."""
+        engine = self._engine
+        core = engine.core
+        if core.trace is not None:
+            core.trace(StructureChanged(core.now(), what))
+        engine.flat = how.flat
+        for edge, flat in reform(core, how, come, engine.groups):
+            if flat.source.kind == "observable":
+                engine.lifetime.feed(flat.source.port, edge, flat.through)
+            elif flat.through:
+                engine.lifetime.pipe(edge, flat.through)
+        for edge in how.lost:
+            engine.lifetime.forget(edge)
+        for worker in how.gone:
+            engine.pausing.forget(worker)
+        for change in changes:
+            if isinstance(change, ParameterChange) and core.trace is not None and change.node._place is not None:
+                core.trace(ParameterSet(core.now(), change.node._place.path, change.name, change.after))
+        for worker in come:
+            core.upstairs.idle_again(worker)
+
+    async def _enable(self, changes: Sequence[Change]) -> None:
+        """Nodes and subgraphs that are enabled or disabled (F10)."""
+        core = self._engine.core
+        for change in changes:
+            if not isinstance(change, OptionsChange) or change.before.group != change.after.group:
+                continue
+            worker = next((one for one in core.workers if one.node is change.node), None)
+            if worker is None:
+                continue
+            self._note_options(worker, change.after.enabled)
+            waiter: asyncio.Future[None] = self._engine.loop.create_future()
+            then = partial(answer, waiter, None)
+            if worker.scope is not None and change.after.enabled:
+                subgraphs.enable_scope(worker.scope, then)
+            elif worker.scope is not None:
+                subgraphs.disable_scope(worker.scope)
+                then()
+            elif change.after.enabled:
+                lifecycle.enable(worker, then)
+            else:
+                lifecycle.disable(worker)
+                then()
+            if not waiter.done():
+                await waiter
+
+    def _note_options(self, worker: Worker, enabled: bool) -> None:
+        flat = self._engine.flat
+        for node in flat.nodes:
+            if node.node is worker.node:
+                worker.options = node.options = msgspec.structs.replace(node.options, enabled=enabled)
+        for scope in flat.scopes:
+            if scope.subgraph is worker.node:
+                scope.options = msgspec.structs.replace(scope.options, enabled=enabled)
+
+    async def _tear_down(self, worker: Worker) -> None:
+        """A node that is gone closes what it has opened; if it fails, that is told with the other errors (X3)."""
+        engine = self._engine
+        for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
+            if timer is not None:
+                timer.cancel()
+        worker.rate_timer = worker.limit_timer = worker.active_timer = None
+        try:
+            await self._hook(worker, lifecycle.tear_down)
+        except HfgError as error:
+            engine.core.errors.append(error)
+        engine_ports.release_ports(worker)
+        engine.lifetime.forget(worker)
+        if worker.carrier is not None:
+            worker.carrier.drop()
+
+
+class _Held:
+    """Holds nodes as they come to rest; inside the block all of them rest.
+
+    Attributes:
+      done: the edit has taken effect; else it was given up.
+    """
+
+    def __init__(self, engine: Engine, workers: Sequence[Worker]) -> None:
+        self._engine = engine
+        self._workers = workers
+        self._letting_go: list[Callable[[], None]] = []
+        self._given_up = False
+        self.done = False
+        self._said = False
+
+    async def __aenter__(self) -> _Held:
+        engine = self._engine
+        core = engine.core
+        waiter: asyncio.Future[None] = engine.loop.create_future()
+        left = [len(self._workers)]
+
+        def rests(_worker: Worker, over: Callable[[], None]) -> None:
+            if self._given_up:
+                over()
+                return
+            self._letting_go.append(over)
+            left[0] -= 1
+            if not left[0]:
+                answer(waiter, None)
+
+        for worker in self._workers:
+            lifecycle.when_idle(worker, rests, _nothing)
+        if left[0]:
+            if core.trace is not None:
+                self._said = True
+                core.trace(EditWaits(core.now(), tuple(worker.path for worker in self._workers)))
+            try:
+                await self._or_end(waiter)
+            except BaseException:
+                self._let_go()
+                raise
+        return self
+
+    async def _or_end(self, waiter: asyncio.Future[None]) -> None:
+        """Wait until all rest, or the run is over."""
+        engine = self._engine
+        ending = asyncio.ensure_future(engine.ending.wait())
+        try:
+            await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            ending.cancel()
+        if engine.core.over:
+            raise NotRunning("the run ended before the edit could take effect; the graph is as it was")
+
+    async def __aexit__(self, *_: object) -> None:
+        self._let_go()
+
+    def _let_go(self) -> None:
+        core = self._engine.core
+        self._given_up = True
+        if not self.done and self._said and core.trace is not None and not core.over:
+            core.trace(StructureChanged(core.now(), ""))
+        letting_go, self._letting_go = self._letting_go, []
+        for over in letting_go:
+            over()
+        self._engine.kick()
+
+
+def _nothing() -> None:
+    """Nobody waits for a node to be let go."""

@@ -1,0 +1,352 @@
+"""What an edit does to the plan of a run: which workers and edges go, come, stay (rules R4, G1).
+
+What stays is told by identity: a node by its object, an edge by the ports at its ends, so that grouping nodes into a
+subgraph moves no token. A change of single edges between plain nodes is found without looking at the rest. Decides
+only; `reforming` does it. Stands on `plan`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import msgspec
+
+from hfg.engine.core import Core
+from hfg.engine.worker import Worker
+from hfg.errors import UsageError
+from hfg.graph import Graph
+from hfg.graph.boxes import is_box, iterated
+from hfg.graph.changes import (
+    Change,
+    EdgeChange,
+    EdgeSwap,
+    NodeChange,
+    NodeSwap,
+    OptionsChange,
+    ParameterChange,
+    Renaming,
+)
+from hfg.graph.edges import Edge as DrawnEdge
+from hfg.graph.edges import is_feed
+from hfg.graph.flat import ROOT, End, FlatEdge, FlatGraph, FlatNode, flatten
+from hfg.ports import InnerSource, InnerTarget
+from hfg.ports.edges import SyncEdge
+
+__all__ = ["Replan", "closes_a_ring", "replan"]
+
+
+_JOINED = ("input", "parameter")
+
+
+class Replan(msgspec.Struct, eq=False):
+    """What is to be done to a plan.
+
+    Attributes:
+      flat: the flat graph as it will be; only of a `whole` replan, else the present one with its edges exchanged.
+      whole: everything was looked at.
+      edges: running edges that stay, each with what is said about it from now on.
+      lost: running edges that go.
+      new: edges that come.
+      nodes: workers that stay, each with what is said about it from now on; only of a whole replan.
+      gone: workers that go.
+      come: nodes that come.
+      swapped: workers that get another node.
+      touched: workers that must not fire while it is done.
+      spots: of a replan that is not whole: where in the order each new edge comes.
+    """
+
+    flat: FlatGraph
+    whole: bool
+    edges: list[tuple[Any, FlatEdge]] = []
+    lost: list[Any] = []
+    new: list[FlatEdge] = []
+    nodes: list[tuple[Worker, FlatNode]] = []
+    gone: list[Worker] = []
+    come: list[FlatNode] = []
+    swapped: list[tuple[Worker, Any]] = []
+    touched: list[Worker] = []
+    spots: list[int] = []
+
+
+def replan(core: Core, flat: FlatGraph, changes: Sequence[Change]) -> Replan:
+    """Find out what changes of the drawn graph mean to the plan of its run.
+
+    Args:
+      core: the run; nothing of it is changed.
+      flat: the flat graph it was planned from.
+      changes: have been made to the drawn graph.
+
+    Raises:
+      UsageError: a change is one that no run can follow: inside a subgraph that iterates.
+    """
+    for change in changes:
+        _refuse_iterating(change)
+    found = _few_edges(core, flat, changes)
+    if found is None:
+        found = _whole(core, flat, changes)
+    touched = dict.fromkeys(found.touched)
+    for edge in found.lost:
+        touched |= dict.fromkeys((edge.source, edge.target))
+    by_node = {worker.node: worker for worker in core.workers} if found.new or changes else {}
+    for new in found.new:
+        for end in (new.source, new.target):
+            worker = by_node.get(getattr(end.port, "node", None))
+            if worker is not None:
+                touched[worker] = None
+    for change in changes:
+        if isinstance(change, OptionsChange | ParameterChange) and change.node in by_node:
+            touched[by_node[change.node]] = None
+    touched |= dict.fromkeys((*found.gone, *(worker for worker, _ in found.swapped)))
+    found.touched = [worker for worker in touched if worker.node is not None and worker.scope is None]
+    return found
+
+
+# --- a few edges ---
+
+
+def _few_edges(core: Core, flat: FlatGraph, changes: Sequence[Change]) -> Replan | None:
+    """Edges between plain nodes, drawn or rubbed out, and what needs no new plan at all; else None."""
+    drawn: dict[DrawnEdge, bool] = {}  # whether it comes or goes
+    swaps: dict[DrawnEdge, DrawnEdge] = {}
+    for change in changes:
+        if isinstance(change, EdgeChange) and change.for_good and _is_plain(change.edge):
+            if drawn.pop(change.edge, change.added) is not change.added:
+                continue  # it came and went
+            drawn[change.edge] = change.added
+        elif isinstance(change, EdgeSwap) and _is_plain(change.new) and _is_plain(change.old):
+            if (change.old.source, change.old.target) != (change.new.source, change.new.target):
+                return None
+            if change.old in drawn:
+                return None
+            swaps[change.old] = change.new
+        elif isinstance(change, OptionsChange):
+            if change.before.group != change.after.group:
+                return None
+        elif not isinstance(change, ParameterChange):
+            return None
+    found = Replan(flat, whole=False)
+    at = {edge.segments[0]: edge.index for edge in flat.edges} if drawn or swaps else {}
+    for old, new in _final(swaps):
+        index = at.get(old)
+        if index is None or len(flat.edges[index].segments) > 1:
+            return None
+        said = msgspec.structs.replace(flat.edges[index], active=new.active, segments=(new,))
+        found.edges.append((core.edges[index], said))
+        at[new] = index
+        found.touched += [core.edges[index].source, core.edges[index].target]
+    for edge, comes in drawn.items():
+        if comes:
+            continue
+        index = at.get(edge)
+        if index is None or len(flat.edges[index].segments) > 1:
+            return None
+        found.lost.append(core.edges[index])
+    nodes = {node.node: node for node in flat.nodes} if any(drawn.values()) else {}
+    labels = {edge.label for edge in flat.edges} if core.scopes and any(drawn.values()) else set()
+    spots = []
+    for edge, comes in drawn.items():
+        if comes:
+            source, target = _end(edge.source, nodes, flat), _end(edge.target, nodes, flat)
+            spot = _spot(edge, flat, at)
+            if source is None or target is None or spot is None or edge.label in labels:
+                return None
+            spots.append((*spot, _flat_edge(edge, source, target)))
+    spots.sort(key=lambda one: one[:2])
+    found.new = [edge for _, _, edge in spots]
+    found.spots = [spot for spot, _, _ in spots]
+    return found
+
+
+def _final(swaps: dict[DrawnEdge, DrawnEdge]) -> Iterable[tuple[DrawnEdge, DrawnEdge]]:
+    """An edge that was exchanged twice is exchanged for the last."""
+    seconds = set(swaps.values())
+    for old, first in swaps.items():
+        if old in seconds:
+            continue
+        new = first
+        while new in swaps and swaps[new] is not old:
+            new = swaps[new]
+        yield old, new
+
+
+def _is_plain(edge: DrawnEdge) -> bool:
+    """Whether it is one edge of the flat graph: both ends at nodes that are no subgraphs, or at the whole graph."""
+    return not any(
+        is_feed(end) or isinstance(end, InnerSource | InnerTarget) or is_box(end.node)
+        for end in (edge.source, edge.target)
+    )
+
+
+def _end(port: Any, nodes: dict[Any, FlatNode], flat: FlatGraph) -> End | None:
+    if port.node is flat.graph:
+        return End(ROOT, port.kind, port.name, port)
+    node = nodes.get(port.node)
+    return None if node is None else End(node.index, port.kind, port.name, port)
+
+
+def _flat_edge(edge: DrawnEdge, source: End, target: End) -> FlatEdge:
+    options = edge.options
+    return FlatEdge(
+        0,
+        edge.label,
+        source,
+        target,
+        edge.active,
+        options.capacity,
+        options.overflow,
+        options.capacity_limit,
+        options.through,
+        options.initial,
+        (),
+        (edge,),
+    )
+
+
+def _spot(edge: DrawnEdge, flat: FlatGraph, at: dict[DrawnEdge, int]) -> tuple[int, int] | None:
+    """Before which edge of the flat graph a new one comes: behind that drawn before it in the same graph."""
+    home: Graph = edge.target.graph if edge.target.node is not flat.graph else edge.source.graph
+    if edge not in home.edges:
+        home = flat.graph
+    drawn = home.edges.index(edge)
+    for before in reversed(home.edges[:drawn]):
+        if before in at:
+            return at[before] + 1, drawn
+    return (0, drawn) if home is flat.graph else None
+
+
+# --- the whole ---
+
+
+def _whole(core: Core, flat: FlatGraph, changes: Sequence[Change]) -> Replan:
+    """Plan afresh and compare."""
+    after = flatten(flat.graph)
+    found = Replan(after, whole=True)
+    by_node = {worker.node: worker for worker in core.workers if worker.node is not None}
+    swapped: dict[Worker, Any] = {}
+    for change in changes:
+        if isinstance(change, NodeSwap) and change.old in by_node:
+            worker = by_node.pop(change.old)
+            by_node[change.new] = worker
+            swapped[worker] = change.new
+    stays = {scope.subgraph for scope in after.scopes}
+    for node in after.nodes:
+        worker_found = by_node.get(node.node)
+        if worker_found is None:
+            found.come.append(node)
+            if node.iteration is not None:
+                raise _cannot_iterate(node.path)
+        else:
+            stays.add(node.node)
+            found.nodes.append((worker_found, node))
+    found.swapped = [(worker, node) for worker, node in swapped.items() if node in stays and worker.node is not node]
+    found.gone = [worker for node, worker in by_node.items() if node not in stays]
+    for worker in found.gone:
+        if worker.iteration is not None:
+            raise _cannot_iterate(worker.path)
+    _compare_edges(core, flat, after, changes, by_node, found)
+    for worker, node in found.nodes:
+        if worker.path != node.path or worker.options.group != node.options.group:
+            found.touched.append(worker)
+    return found
+
+
+def _compare_edges(
+    core: Core,
+    before: FlatGraph,
+    after: FlatGraph,
+    changes: Sequence[Change],
+    by_node: dict[Any, Worker],
+    found: Replan,
+) -> None:
+    """Edges with the same ends are the same, unless somebody rubbed them out for good."""
+    rubbed_out = {
+        change.edge for change in changes if isinstance(change, EdgeChange) and not change.added and change.for_good
+    }
+    present: dict[Any, list[Any]] = {}
+    for edge, old in zip(core.edges, before.edges, strict=False):
+        if rubbed_out.isdisjoint(old.segments):
+            present.setdefault(_ends_of(old, edge.source, edge.target), []).append(edge)
+    kept = set()
+    for new in after.edges:
+        source, target = by_node.get(_node_of(new.source)), by_node.get(_node_of(new.target))
+        same = present.get(_ends_of(new, source or _outside(new.source), target or _outside(new.target)))
+        if same:
+            edge = same.pop(0)
+            kept.add(edge)
+            found.edges.append((edge, new))
+            if edge.active != new.active:
+                found.touched += [edge.source, edge.target]
+        else:
+            found.new.append(new)
+    found.lost = [edge for edge, _ in zip(core.edges, before.edges, strict=False) if edge not in kept]
+
+
+def _node_of(end: End) -> Any:
+    return getattr(end.port, "node", None)
+
+
+def _outside(end: End) -> Any:
+    return end.port if end.kind == "observable" else None
+
+
+def _ends_of(flat: FlatEdge, source: Any, target: Any) -> tuple[Any, ...]:
+    """What makes an edge the same: workers and names of ports; the graph's own ports and observables are themselves."""
+    begin = source if getattr(source, "node", None) is not None else flat.source.port
+    end = target if getattr(target, "node", None) is not None else flat.target.port
+    delayed = bool(flat.initial) and not flat.is_event_edge  # another kind of edge
+    return (begin, flat.source.kind, flat.source.name, end, flat.target.kind, flat.target.name, delayed)
+
+
+# --- refusals ---
+
+
+def _refuse_iterating(change: Change) -> None:
+    around: Any = getattr(change, "graph", None)
+    if around is None:
+        place = getattr(getattr(change, "node", None) or getattr(change, "new", None), "_place", None)
+        around = None if place is None else place.graph
+    if isinstance(change, ParameterChange):
+        return
+    while isinstance(around, Graph) and around._owner is not None:
+        owner = around._owner
+        if iterated(owner) and not isinstance(change, Renaming):
+            raise _cannot_iterate(owner.place.path)
+        around = owner._place.graph if owner._place is not None else None
+    if isinstance(change, NodeChange) and change.options.iterate_over:
+        raise _cannot_iterate(change.name)
+
+
+def _cannot_iterate(path: str) -> UsageError:
+    return UsageError(
+        f'"{path}" iterates over collections, and what iterates is not added, removed or changed inside while the '
+        "graph runs: stop the run, then graph.edit(...)"
+    )
+
+
+def closes_a_ring(core: Core, new: Sequence[FlatEdge]) -> bool:
+    """Whether new synchronous edges make a ring without a delay (rule P7); looks only as far as they lead."""
+    added: dict[Any, list[Any]] = {}
+    for edge in new:
+        if not edge.is_event_edge and not edge.initial and edge.target.kind in _JOINED:
+            added.setdefault(edge.source.port.node, []).append(edge.target.port.node)
+    by_node = {worker.node: worker for worker in core.workers} if added else {}
+    for begin, targets in added.items():
+        seen = set(targets)
+        waiting = list(targets)
+        while waiting:
+            node = waiting.pop()
+            if node is begin:
+                return True
+            onward = list(added.get(node, ()))
+            worker = by_node.get(node)
+            if worker is not None:
+                for edges in worker.wired_out:
+                    onward += [
+                        edge.target.node for edge in edges if type(edge) is SyncEdge and edge.target_kind in _JOINED
+                    ]
+            for one in onward:
+                if one is not None and one not in seen:
+                    seen.add(one)
+                    waiting.append(one)
+    return False
