@@ -33,6 +33,7 @@ FLOORS = {
     "hfg.signature": 2,
     "hfg.graph": 3,
     "hfg.activity": 4,
+    "hfg.timeline": 4,
     "hfg.engine": 5,
     "hfg.nodes": 6,
     "hfg.files": 6,

@@ -24,6 +24,7 @@ from hfg.cli.target import load_graph
 from hfg.engine import Report, VirtualTimeLoop, run_async
 from hfg.errors import HfgError, TargetError, UsageError
 from hfg.graph import Graph
+from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
 
 __all__ = ["Clock", "run"]
@@ -51,7 +52,11 @@ def run(
     policy: Annotated[str | None, typer.Option(help="Which node is next: fifo, priority, random ...")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the policy random.")] = None,
     trace: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write every event of the run, one JSON object a line.")
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write every event of the run, one JSON object a line; in .json, a timeline for Perfetto.",
+        ),
     ] = None,
     json: Annotated[
         bool, typer.Option("--json", help="Write the report as JSON; what nodes print goes to standard error.")
@@ -71,7 +76,7 @@ def run(
     graph = load_graph(target)
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()
-    with redirect_stdout(sys.stderr if json else sys.stdout), _writing(trace, interrupt) as write:
+    with redirect_stdout(sys.stderr if json else sys.stdout), _writing(trace, graph, interrupt) as write:
         options = {"until_s": until, "debug": debug, "policy": policy, "seed": seed, "trace": write}
         report, error = _run(graph, clock, options, interrupt)
     if json and report is not None:
@@ -111,8 +116,8 @@ def _run(
 
 
 @contextmanager
-def _writing(file: Path | None, interrupt: Interrupt) -> Iterator[Callable[[TraceEvent], None] | None]:
-    """Open the trace file; it is whole however the run ends."""
+def _writing(file: Path | None, graph: Graph, interrupt: Interrupt) -> Iterator[Callable[[TraceEvent], None] | None]:
+    """Open the trace file; it is whole however the run ends. One that ends in .json becomes a timeline."""
     if file is None:
         yield None
         return
@@ -121,6 +126,11 @@ def _writing(file: Path | None, interrupt: Interrupt) -> Iterator[Callable[[Trac
     except OSError as error:
         raise TargetError(f"the trace cannot be written to {file}: {error.strerror}") from None
     with stream:
+        if file.suffix == ".json":
+            with Timeline(stream, graph) as timeline:
+                interrupt.before_leaving.append(timeline.close)
+                yield timeline
+            return
         interrupt.before_leaving.append(stream.flush)
         yield lambda event: _write(stream.write, event)
 

@@ -149,6 +149,15 @@ def test_trace_holds_every_event_as_a_line(hfg: Command) -> None:
     assert {"RunStarted", "FiringStarted", "TokenSent", "RunEnded"} <= {event["type"] for event in events}
 
 
+def test_a_trace_in_json_is_a_timeline(hfg: Command) -> None:
+    assert hfg("run", TARGET, *VIRTUAL, "--trace", "run.json").code == 0
+    events = json.loads(Path("run.json").read_text(encoding="utf-8"))
+    assert {"M", "X"} <= {event["ph"] for event in events}
+    shown = hfg("run", TARGET, *VIRTUAL, "--trace", "no/such/folder.json")
+    assert (shown.code, shown.out) == (2, "")
+    assert "the trace cannot be written to no/such/folder.json: No such file or directory" in shown.err
+
+
 def test_trace_tells_markers_from_texts(hfg: Command) -> None:
     with Path("halves.py").open("a", encoding="utf-8") as file:
         file.write(ODD_VALUES)

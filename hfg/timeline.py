@@ -1,0 +1,290 @@
+"""A run as a timeline: a consumer of the trace that writes what Perfetto and chrome://tracing open.
+
+Each group is a row with its firings and slot calls as boxes; code that waits lets others begin meanwhile, which are
+drawn on further rows of the group. Each node that was ever active has a row with its active times. A signal is an arrow
+from the box that sent it to the box that took it; errors and dropped tokens are marks.
+
+The file is the JSON array form of the Trace Event Format: one event a line, written while the graph runs, so that what
+a crash leaves behind can be opened too. Stands on `trace` and `graph`; knows no engine.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from io import BufferedIOBase
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from hfg.errors import UsageError
+from hfg.graph import Graph
+from hfg.graph.flat import FlatGraph, flatten
+from hfg.trace import (
+    ActivityChanged,
+    CallEnded,
+    CallStarted,
+    ErrorRaised,
+    EventTriggered,
+    FiringEnded,
+    FiringStarted,
+    QueueGrown,
+    RunEnded,
+    TokenDrained,
+    TokenDropped,
+    TokenSent,
+    TokenTaken,
+    TraceEvent,
+)
+
+__all__ = ["Timeline"]
+
+_GROUPS, _ACTIVITY = 1, 2  # the format's "processes"
+_ROWS = 1000  # numbers for the rows of a group
+_APART_US = 0.001  # two events are never at the same time: what happens at one instant stays in order, arrows in boxes
+
+
+class _Box:
+    """A firing or call under way, and the arrows that leave or reach it."""
+
+    __slots__ = ("args", "arrows", "began", "category", "name", "row")
+
+    def __init__(self, name: str, category: str, began: float, row: int, args: dict[str, Any]) -> None:
+        self.name = name
+        self.category = category
+        self.began = began
+        self.row = row
+        self.args = args
+        self.arrows: list[dict[str, Any]] = []
+
+
+class Timeline:
+    """Writes a run as a timeline; give it to a run as its `trace`. The file is whole when the run is over.
+
+    Example:
+      >>> import hfg, json, tempfile, pathlib
+      >>> from hfg.testing.nodes import script, sink
+      >>> graph = hfg.Graph()
+      >>> _ = graph.add(script()) >> graph.add(sink())
+      >>> file = pathlib.Path(tempfile.mkdtemp(), "run.json")
+      >>> report = hfg.run(graph, clock="virtual", trace=Timeline(file, graph))
+      >>> sorted({event["name"] for event in json.loads(file.read_text()) if event["ph"] == "X"})
+      ['script', 'sink']
+    """
+
+    def __init__(self, file: str | os.PathLike[str] | BufferedIOBase, graph: Graph) -> None:
+        """Open the file, before anything runs.
+
+        Args:
+          file: where to write; a path, or a binary stream that is left open.
+          graph: whose run it will be; its groups become rows.
+
+        Raises:
+          UsageError: the file cannot be written.
+        """
+        if isinstance(file, str | os.PathLike):
+            try:
+                self._stream: Any = Path(file).open("wb")  # noqa: SIM115  # closed with the run
+            except OSError as error:
+                raise UsageError(f"the timeline cannot be written to {file}: {error.strerror}") from None
+            self._ours = True
+        else:
+            self._stream, self._ours = file, False
+        self._groups = dict(_groups(flatten(graph)))
+        self._first = True
+        self._closed = False
+        self._origin: float | None = None
+        self._now = 0.0
+        self._open: dict[str, _Box] = {}  # by node
+        self._rows: dict[str, list[str | None]] = {}  # per group: who is on each of its rows
+        self._row_ids: dict[tuple[str, int], int] = {}
+        self._last_row: dict[str, int] = {}
+        self._active: dict[str, float] = {}
+        self._activity_rows: dict[str, int] = {}
+        self._events: set[str] = set()
+        self._flying: dict[tuple[str, int], int] = {}  # signals under way, by edge and number
+        self._arrows = 0
+        self._stream.write(b"[\n")
+        self._name("process_name", _GROUPS, 0, f'groups of "{graph.name}"')
+        self._name("process_name", _ACTIVITY, 0, "activity")
+
+    def __call__(self, event: TraceEvent) -> None:
+        """Take one event of the run."""
+        if self._closed:
+            return
+        if self._origin is None:
+            self._origin = event.time
+        self._now = max(self._now + _APART_US, (event.time - self._origin) * 1e6)
+        match event:
+            case FiringStarted(node=node, number=number, kind=kind):
+                self._begin(node, node, "silent" if kind == "silent" else "firing", {"firing": number})
+            case CallStarted(node=node, number=number, slot=slot, edge=edge):
+                self._begin(node, f"{node}.{slot}", "call", {"call": number, "edge": edge})
+            case FiringEnded(node=node, outcome=outcome) | CallEnded(node=node, outcome=outcome):
+                self._end(node, outcome)
+            case EventTriggered(event=label):
+                self._events.add(label)
+            case TokenSent(edge=edge, token=token):
+                self._sent(edge, token.sequence)
+            case TokenTaken(edge=edge, token=token):
+                self._taken(edge, token.sequence)
+            case ActivityChanged(node=node, active=active):
+                self._activity(node, active)
+            case ErrorRaised(node=node, what=what, error=error):
+                self._mark(node, f"error in {node}", {"what": what, "error": _plain(error)})
+            case TokenDropped(edge=edge, token=token, reason=reason):
+                self._flying.pop((edge, token.sequence), None)
+                self._mark(_source(edge)[0], f"dropped: {reason}", {"edge": edge})
+            case TokenDrained(edge=edge, token=token):
+                self._flying.pop((edge, token.sequence), None)
+            case QueueGrown(edge=edge, capacity=capacity):
+                self._mark(_source(edge)[0], "queue grown", {"edge": edge, "capacity": capacity})
+            case RunEnded(outcome=outcome):
+                self.close(outcome)
+
+    def close(self, outcome: str = "cut off") -> None:
+        """End what is under way and the file. The end of the run does it; does nothing the second time."""
+        if self._closed:
+            return
+        for node in list(self._open):
+            self._end(node, f"under way at the end: {outcome}")
+        for node in list(self._active):
+            self._activity(node, False)
+        self._closed = True
+        self._stream.write(b"\n]\n")
+        if self._ours:
+            self._stream.close()
+        else:
+            self._stream.flush()
+
+    def __enter__(self) -> Timeline:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if not getattr(self, "_closed", True):
+            with contextlib.suppress(OSError, ValueError):  # the disk is full, or the stream was closed
+                self.close()
+
+    # --- boxes ------------------------------------------------------------------------------------------------------
+
+    def _begin(self, node: str, name: str, category: str, args: dict[str, Any]) -> None:
+        group = self._groups.get(node, "loop")
+        rows = self._rows.setdefault(group, [])
+        row = self._last_row.get(node, 0)
+        if row >= len(rows) or rows[row] is not None:
+            row = next((free for free, who in enumerate(rows) if who is None), len(rows))
+        if row == len(rows):
+            rows.append(None)
+        rows[row] = node
+        self._last_row[node] = row
+        self._open[node] = _Box(name, category, self._now, row, args)
+
+    def _end(self, node: str, outcome: str) -> None:
+        box = self._open.pop(node, None)
+        if box is None:
+            return  # it had begun before somebody looked
+        group = self._groups.get(node, "loop")
+        self._rows[group][box.row] = None
+        self._write(
+            ph="X",
+            name=box.name,
+            cat=box.category,
+            pid=_GROUPS,
+            tid=self._row(group, box.row),
+            ts=box.began,
+            dur=self._now - box.began,
+            args={**box.args, "outcome": outcome},
+        )
+        for arrow in box.arrows:  # behind the box that they are bound to
+            self._write(**arrow)
+
+    def _row(self, group: str, row: int) -> int:
+        key = (group, row)
+        number = self._row_ids.get(key)
+        if number is None:
+            place = list(dict.fromkeys([*self._groups.values(), group])).index(group)
+            number = self._row_ids[key] = (place + 1) * _ROWS + row
+            self._name("thread_name", _GROUPS, number, group if not row else f"{group} ({row + 1})")
+            self._name("thread_sort_index", _GROUPS, number, number)
+        return number
+
+    # --- arrows -----------------------------------------------------------------------------------------------------
+
+    def _sent(self, edge: str, sequence: int) -> None:
+        node, event = _source(edge)
+        box = self._open.get(node)
+        if event in self._events and box is not None:
+            self._arrows += 1
+            self._flying[edge, sequence] = self._arrows
+            box.arrows.append(self._arrow("s", event, self._arrows, node, box))
+
+    def _taken(self, edge: str, sequence: int) -> None:
+        number = self._flying.pop((edge, sequence), None)
+        node = edge.partition(" -> ")[2].rpartition(".")[0]
+        box = self._open.get(node)
+        if number is not None and box is not None:
+            box.arrows.append({**self._arrow("f", _source(edge)[1], number, node, box), "bp": "e"})
+
+    def _arrow(self, phase: Literal["s", "f"], name: str, number: int, node: str, box: _Box) -> dict[str, Any]:
+        row = self._row(self._groups.get(node, "loop"), box.row)
+        return {"ph": phase, "name": name, "cat": "event", "id": number, "pid": _GROUPS, "tid": row, "ts": self._now}
+
+    # --- activity and marks -----------------------------------------------------------------------------------------
+
+    def _activity(self, node: str, active: bool) -> None:
+        if active:
+            self._active.setdefault(node, self._now)
+            return
+        began = self._active.pop(node, None)
+        if began is None:
+            return
+        row = self._activity_rows.get(node)
+        if row is None:
+            row = self._activity_rows[node] = len(self._activity_rows) + _ROWS
+            self._name("thread_name", _ACTIVITY, row, node)
+            self._name("thread_sort_index", _ACTIVITY, row, row)
+        self._write(
+            ph="X", name="active", cat="activity", pid=_ACTIVITY, tid=row, ts=began, dur=self._now - began, args={}
+        )
+
+    def _mark(self, node: str, name: str, args: dict[str, Any]) -> None:
+        box = self._open.get(node)
+        row = self._row(self._groups.get(node, "loop"), 0 if box is None else box.row)
+        self._write(ph="i", s="t", name=name, cat="mark", pid=_GROUPS, tid=row, ts=self._now, args=args)
+
+    # --- the file ---------------------------------------------------------------------------------------------------
+
+    def _name(self, what: str, pid: int, tid: int, value: str | int) -> None:
+        key = "sort_index" if what == "thread_sort_index" else "name"
+        self._write(ph="M", name=what, pid=pid, tid=tid, args={key: value})
+
+    def _write(self, **fields: Any) -> None:
+        for key in ("ts", "dur"):
+            if key in fields:
+                fields[key] = round(fields[key], 3)
+        self._stream.write(b"" if self._first else b",\n")
+        self._first = False
+        self._stream.write(msgspec.json.encode(fields))
+
+
+def _plain(text: str) -> str:
+    """JSON has no lone surrogates, the texts of errors may."""
+    return text.encode("utf-8", "replace").decode()
+
+
+def _source(edge: str) -> tuple[str, str]:
+    """The node in front of an edge, and the port it begins at."""
+    port = edge.partition(" -> ")[0]
+    return port.rpartition(".")[0], port
+
+
+def _groups(flat: FlatGraph) -> Iterator[tuple[str, str]]:
+    for node in flat.nodes:
+        yield node.path, node.options.group or "loop"
+        if node.iteration is not None:
+            yield from _groups(node.iteration)
