@@ -178,6 +178,12 @@ def node(
         raise DeclarationError(
             f"hfg.node needs a function, got {function!r}; options are given by keyword, as in hfg.node(outputs=Found)"
         )
+    for word, given in (("inputs", inputs), ("parameters", parameters)):
+        if given is not None and not isinstance(given, Mapping):
+            raise DeclarationError(
+                f"hfg.node({function_name(function)}): {word} is a mapping from names of arguments, got {given!r:.80}; "
+                f'write {word}={{"name": ...}}'
+            )
     caller = sys._getframe(1)
     while caller.f_globals.get("__name__") == "functools" and caller.f_back is not None:
         caller = caller.f_back

@@ -410,6 +410,18 @@ def test_a_node_type_is_no_dataclass() -> None:
         hfg.Graph().add(made)
 
 
+@pytest.mark.parametrize("word", ["inputs", "parameters"])
+def test_inputs_and_parameters_of_a_function_are_mappings(word: str) -> None:
+    given: dict[str, Any] = {"inputs": {"value": int}, word: ["value"]}
+    with pytest.raises(DeclarationError, match=rf"{word} is a mapping from names of arguments, got \['value'\]; write"):
+        hfg.node(lambda value: None, outputs=int, **given)
+
+
+def test_a_slot_is_made_of_a_method() -> None:
+    with pytest.raises(DeclarationError, match=r"hfg.slot is for a method, got 3; write @hfg.slot or hfg.slot\(type"):
+        hfg.slot(3)  # type: ignore[call-overload]
+
+
 def test_star_arguments_are_no_ports() -> None:
     with pytest.raises(DeclarationError, match=r'"\*values" cannot be a port'):
 

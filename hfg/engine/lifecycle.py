@@ -78,7 +78,13 @@ def set_up(worker: Worker, then: Then) -> None:
         then(None)
         return
     worker.is_up = True  # from here on, for `teardown` follows a setup that fails half-way too
-    worker.node._reset_states()
+    try:
+        worker.node._reset_states()
+    except Exception as error:  # a default that cannot be copied, a factory that fails
+        problem = NodeError(worker.path, "its state", error)
+        problem.__cause__ = error
+        then(problem)
+        return
     worker.core.upstairs.bind_ports(worker)
     _run_hook(worker, "setup", then)
 

@@ -22,7 +22,7 @@ from hfg.errors import NotRunning, UsageError
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.types import accepts, describe
 
-__all__ = ["Feed", "collect", "need_modifier", "read", "signal", "until"]
+__all__ = ["Feed", "collect", "need_sendable", "read", "signal", "until"]
 
 
 class Feed:
@@ -69,7 +69,7 @@ class Feed:
             raise NotRunning(
                 f'the feed of "{self._worker.port_name}" is closed: use it inside "async with run.feed(...)"'
             )
-        need_modifier(activity)
+        need_sendable(activity, stamp)
         if value is not None and not isinstance(value, Token | Marker) and not accepts(value, self._hint):
             raise TypeError(
                 f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got '
@@ -127,8 +127,10 @@ class Feed:
                 return
 
 
-def need_modifier(activity: int | None) -> None:
-    """Refuse what is no activity modifier."""
+def need_sendable(activity: int | None, stamp: float | None) -> None:
+    """Refuse what is no activity modifier, or no stamp."""
+    if stamp is not None and not isinstance(stamp, int | float):
+        raise UsageError(f"stamp must be seconds on the run's clock, or None for what rule T5 says, got {stamp!r}")
     if activity not in (None, -1, 0, 1):
         raise UsageError(f"activity must be -1, 0 or +1, or None for what rule A3 says, got {activity!r}")
 

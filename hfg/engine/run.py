@@ -74,7 +74,7 @@ class Run(Steering, Editable):
                 f"run.trigger is for slots and events of nodes, got {port!r}; give tokens to a graph input "
                 f"with run.feed"
             )
-        outside.need_modifier(activity)
+        outside.need_sendable(activity, stamp)
         plain = value.value if isinstance(value, Token) else value
         if not accepts(plain, port.type) and (plain is not None or port.kind == "slot"):
             raise TypeError(f'{port.kind} "{port.path}" expects {describe(port.type)}, got {plain!r:.80}')

@@ -46,6 +46,8 @@ def iterated_inputs(node: Node, path: str, given: Iterable[str]) -> tuple[str, .
     Raises:
       GraphError: the node is no subgraph, or has no such input.
     """
+    if not isinstance(given, Iterable):
+        raise GraphError(f'node "{path}": iterate_over takes names of inputs, as in ("items",), got {given!r}')
     names = (given,) if isinstance(given, str) else tuple(given)
     if not is_box(node):
         if names:

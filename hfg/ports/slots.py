@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
 from typing_extensions import TypeForm
 
-from hfg.errors import UsageError
+from hfg.errors import DeclarationError, UsageError
 from hfg.ports.base import Kind, Owner, Port, Target
 from hfg.ports.relays import InnerSource, inner_source
 from hfg.token import Token
@@ -112,4 +112,6 @@ def slot(handler: Callable[..., Any] | None = None, /, *, type: Any = UNSET) -> 
     The annotation of its argument is the slot's type; annotated `hfg.Token[int]` it gets the token; without an argument
     it takes any signal. `@hfg.slot(type=...)` says the type itself.
     """
+    if handler is not None and not callable(handler):
+        raise DeclarationError(f"hfg.slot is for a method, got {handler!r:.80}; write @hfg.slot or hfg.slot(type=int)")
     return Slot(handler, type)

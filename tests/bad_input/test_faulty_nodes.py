@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -89,6 +90,18 @@ def test_the_users_frames_are_in_the_cause(fast: bool) -> None:
         frame = frame.tb_next
     assert frame is not None
     assert frame.tb_frame.f_code.co_name == "broken"
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        (hfg.State(threading.Lock()), "TypeError: cannot pickle '_thread.lock' object"),
+        (hfg.State(factory=3), "TypeError: 'int' object is not callable"),  # type: ignore[arg-type]
+    ],
+)
+def test_a_state_that_cannot_be_made_is_named(state: Any, said: str, fast: bool) -> None:
+    node = type("Stateful", (hfg.Node,), {"value": hfg.Input(int), "lock": state, "process": lambda self, value: None})
+    assert sentence(one(node()), fast) == f'node "node" failed in its state: {said}'
 
 
 class Hooked(hfg.Node):

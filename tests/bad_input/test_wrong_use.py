@@ -245,6 +245,20 @@ def test_a_feed_of_the_wrong_type_is_refused_and_changes_nothing(fast: bool) -> 
     assert drive(main) == [2]
 
 
+def test_a_modifier_or_stamp_that_is_none_is_refused(fast: bool) -> None:
+    async def main() -> None:
+        graph = hfg.Graph()
+        ear = graph.add(Ear())
+        async with hfg.running(graph, fast=fast) as run:
+            with pytest.raises(hfg.errors.UsageError, match=r"activity must be -1, 0 or \+1, or None .* got 5"):
+                await run.trigger(ear.hear, 1, activity=5)
+            with pytest.raises(hfg.errors.UsageError, match="stamp must be seconds on the run's clock, .* got 'now'"):
+                await run.trigger(ear.hear, 1, stamp="now")  # type: ignore[arg-type]
+        assert ear.heard == []
+
+    drive(main)
+
+
 def test_unknown_and_unconnected_ports_of_the_graph_are_named() -> None:
     async def main() -> None:
         graph = hfg.Graph("box")
