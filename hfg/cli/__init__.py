@@ -2,10 +2,17 @@
 
     app         the command itself: verbs, options of all, what an error looks like
     run         hfg run TARGET      run a graph to its end
+    tap         hfg tap TARGET PATH run it and print what passes a port
+    top         hfg top             watch a graph that runs in another process
     check       hfg check TARGET    look for mistakes without running
     draw        hfg draw TARGET     show what a graph looks like
     nodes       hfg nodes [MODULE]  which node types there are
+    new         hfg new node NAME   begin a file; templates: what it says
+    execute     a run with everything around it
+    live        the table while a graph runs    table     what it says    terminal  where it is drawn
+    sockets     how one process looks at a run in another
     target      finds what TARGET names
+    options     those of several verbs          completing  what the Tab key offers
     settings    --param path=value
     interrupt   Ctrl-C
     show        sentences, tracebacks, tables

@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hfg.cli import check, draw, nodes, run, show
+from hfg.cli import check, draw, new, nodes, run, show, tap, top
 from hfg.cli.interrupt import Interrupt
 from hfg.errors import HfgError, TargetError
 
@@ -25,7 +25,6 @@ __all__ = ["app", "main"]
 app = typer.Typer(
     name="hfg",
     help="Build, check and run activity flow graphs.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -34,6 +33,9 @@ app.command("run")(run.run)
 app.command("check")(check.check)
 app.command("draw")(draw.draw)
 app.command("nodes")(nodes.nodes)
+app.command("tap")(tap.tap)
+app.command("top")(top.top)
+app.add_typer(new.new, name="new")
 
 
 @app.callback(invoke_without_command=True)

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from hfg.cli import show
+from hfg.cli.options import TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import CheckFailed, HfgError, MachineError, TargetError
 from hfg.graph import Graph
@@ -21,7 +22,7 @@ __all__ = ["check"]
 
 
 def check(
-    target: Annotated[str, typer.Argument(help="module:graph, file.py or file.py:graph")],
+    target: TargetArgument,
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:

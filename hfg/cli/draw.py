@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from hfg.cli import show
+from hfg.cli.options import TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import UsageError
 from hfg.graph.drawing import FORMATS
@@ -17,7 +18,7 @@ __all__ = ["draw"]
 
 
 def draw(
-    target: Annotated[str, typer.Argument(help="module:graph, file.py or file.py:graph")],
+    target: TargetArgument,
     out: Annotated[
         Path | None, typer.Argument(help="a file that ends in .mmd or .dot; without it, standard output")
     ] = None,

@@ -15,7 +15,7 @@ import numpy as np
 
 from hfg.token import Token
 
-__all__ = ["encode"]
+__all__ = ["encode", "text"]
 
 _LONGEST_VALUE: Final = 200
 _DEEPEST: Final = 5
@@ -24,6 +24,8 @@ _DEEPEST: Final = 5
 def encode(value: Any) -> bytes:
     """Write JSON on one line; never fails, whatever the value."""
     try:
+        if isinstance(value, Token):
+            return _ENCODER.encode(_marked_token(value) if value.is_marker else value)
         token = getattr(value, "token", None)
         return _ENCODER.encode(_marked(value) if isinstance(token, Token) and token.is_marker else value)
     except Exception:  # a text with half a character, a container that holds itself, a __repr__ that raises ...
@@ -33,9 +35,20 @@ def encode(value: Any) -> bytes:
 def _marked(event: Any) -> Any:
     """Put "marker" in place of the value of the event's token."""
     built = msgspec.to_builtins(event, enc_hook=_text)
-    token = built["token"]
-    built["token"] = {"marker": token.pop("value"), **token}
+    built["token"] = _marked_token(event.token)
     return built
+
+
+def _marked_token(token: Token[Any]) -> dict[str, Any]:
+    built = msgspec.to_builtins(token, enc_hook=_text)
+    return {"marker": built.pop("value"), **built}
+
+
+def text(value: Any) -> str:
+    """Describe any value on one line, for people; never fails."""
+    if isinstance(value, str):
+        value = repr(value)
+    return " ".join(str(_text(value)).split("\n"))
 
 
 def _writable(value: Any, depth: int) -> Any:
@@ -64,11 +77,11 @@ def _text(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     try:
-        text = value if isinstance(value, str) else str(value) if isinstance(value, BaseException) else repr(value)
+        told = value if isinstance(value, str) else str(value) if isinstance(value, BaseException) else repr(value)
     except Exception as error:
-        text = f"<{type(value).__name__}, whose text cannot be made: {type(error).__name__}>"
-    text = _clean(text)
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + "…"
+        told = f"<{type(value).__name__}, whose text cannot be made: {type(error).__name__}>"
+    told = _clean(told)
+    return told if len(told) <= _LONGEST_VALUE else told[: _LONGEST_VALUE - 1] + "…"
 
 
 def _clean(text: str) -> str:

@@ -7,7 +7,8 @@
        after 1.8 s: say who does not come back and leave ──────────────────────┘
     second Ctrl-C: leave at once
 
-Stands on asyncio and signals; knows neither graphs nor verbs.
+A request to end (SIGTERM) and a terminal that goes away (SIGHUP) are treated alike. Stands on asyncio and signals;
+knows neither graphs nor verbs.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import Any, ClassVar, Final
 
 __all__ = ["Interrupt"]
 
+_ALIKE = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 _BREAK_IN_AFTER_S = 0.6
 _LEAVE_AFTER_S = 1.8
 
@@ -58,7 +60,10 @@ class Interrupt:
         if threading.current_thread() is not threading.main_thread():
             yield interrupt
             return
-        previous = signal.signal(signal.SIGINT, interrupt._pressed)
+        previous = {signal.SIGINT: signal.signal(signal.SIGINT, interrupt._pressed)}
+        for one in _ALIKE:
+            if signal.getsignal(one) is signal.SIG_DFL:  # nohup has it ignored
+                previous[one] = signal.signal(one, interrupt._pressed)
         outer, cls.current = cls.current, interrupt
         interrupt._is_installed = True
         try:
@@ -66,7 +71,8 @@ class Interrupt:
         finally:
             cls.current = outer
             interrupt._is_installed = False
-            signal.signal(signal.SIGINT, previous)
+            for one, handler in previous.items():
+                signal.signal(one, handler)
 
     @contextmanager
     def cancels(self, task: asyncio.Task[Any]) -> Iterator[None]:
@@ -127,6 +133,7 @@ class Interrupt:
         for call in self.before_leaving:
             with suppress(ValueError, OSError):  # closed already, or the disk is full: nothing keeps us here
                 call()
-        sys.stderr.write(f"hfg: {sentence}\n")
-        sys.stderr.flush()
+        with suppress(ValueError, OSError):
+            sys.stderr.write(f"hfg: {sentence}\n")
+            sys.stderr.flush()
         os._exit(1)

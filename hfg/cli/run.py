@@ -1,54 +1,39 @@
 """`hfg run TARGET`: runs a graph to its end and tells how it went.
 
-Stands on the engine, `target`, `settings`, `interrupt` and `show`.
+Stands on `execute`, `live`, `target`, `settings`, `interrupt` and `show`.
 """
 
 from __future__ import annotations
 
-import asyncio
-import logging
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from hfg.cli import show
 from hfg.cli.encoding import encode
+from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
+from hfg.cli.live import live_table
+from hfg.cli.options import Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
-from hfg.engine import Report, VirtualTimeLoop, run_async
-from hfg.errors import HfgError, TargetError, UsageError
+from hfg.errors import TargetError
 from hfg.graph import Graph
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
 
-__all__ = ["Clock", "run"]
-
-
-class Clock(StrEnum):
-    """The clocks a run can have."""
-
-    real = "real"
-    virtual = "virtual"
+__all__ = ["run"]
 
 
 def run(
-    target: Annotated[str, typer.Argument(help="module:graph, file.py or file.py:graph")],
-    clock: Annotated[Clock, typer.Option(help="virtual: as fast as the machine can, the same each time.")] = Clock.real,
-    until: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="End the run at this time on its clock.")
-    ] = None,
-    param: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATH=VALUE", help="Set a parameter, as in lookup.tolerance=0.2; may be given several times."
-        ),
-    ] = None,
+    target: TargetArgument,
+    clock: ClockOption = Clock.real,
+    until: UntilOption = None,
+    param: ParamOption = None,
     policy: Annotated[str | None, typer.Option(help="Which node is next: fifo, priority, random ...")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the policy random.")] = None,
     trace: Annotated[
@@ -58,27 +43,30 @@ def run(
             help="Write every event of the run, one JSON object a line; in .json, a timeline for Perfetto.",
         ),
     ] = None,
+    table: Annotated[
+        bool, typer.Option(help="On a terminal and the real clock, a live table of nodes while it runs.")
+    ] = True,
     json: Annotated[
         bool, typer.Option("--json", help="Write the report as JSON; what nodes print goes to standard error.")
     ] = False,
-    debug: Annotated[
-        bool, typer.Option("--debug", help="Check values against port types; show hfg's own frames in tracebacks.")
-    ] = False,
+    debug: DebugOption = False,
     verbose: Annotated[
         int, typer.Option("-v", "--verbose", count=True, help="Report each node; twice, each edge.")
     ] = 0,
 ) -> int:
     """Run a graph to its end; Ctrl-C ends it earlier, twice at once."""
     show.set_debug(debug)
-    _log_to_stderr(verbose, debug)
-    if until is not None and until < 0:
-        raise typer.BadParameter(f"--until: seconds are not negative, got {until:g}")
+    show.log_to_stderr(verbose, debug)
     graph = load_graph(target)
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()
-    with redirect_stdout(sys.stderr if json else sys.stdout), _writing(trace, graph, interrupt) as write:
+    with (
+        redirect_stdout(sys.stderr if json else sys.stdout),
+        _writing(trace, graph, interrupt) as write,
+        live_table(table and not json and clock is Clock.real) as live,
+    ):
         options = {"until_s": until, "debug": debug, "policy": policy, "seed": seed, "trace": write}
-        report, error = _run(graph, clock, options, interrupt)
+        report, error = execute(graph, target, clock, interrupt, live.begin if live else None, **options)
     if json and report is not None:
         show.json(report)
     if interrupt.count:
@@ -89,30 +77,6 @@ def run(
     elif report is not None and (not json or verbose):
         show.report(graph.name, report, verbose)
     return 0 if error is None else 1
-
-
-def _run(
-    graph: Graph, clock: Clock, options: dict[str, Any], interrupt: Interrupt
-) -> tuple[Report | None, HfgError | None]:
-    """Run it on a loop of its own; a failed run's report comes with its error."""
-
-    async def main() -> Report:
-        task = asyncio.current_task()
-        assert task is not None
-        with interrupt.cancels(task):
-            return await run_async(graph, clock=clock.value, **options)
-
-    try:
-        with asyncio.Runner(loop_factory=VirtualTimeLoop if clock is Clock.virtual else None) as runner:
-            return runner.run(main()), None
-    except UsageError as error:  # an unknown policy, for example: not the run's fault
-        raise TargetError(str(error)) from None
-    except HfgError as error:
-        return getattr(error, "report", None), error
-    except (asyncio.CancelledError, KeyboardInterrupt):
-        if not interrupt.count:
-            raise
-        return None, None
 
 
 @contextmanager
@@ -137,9 +101,3 @@ def _writing(file: Path | None, graph: Graph, interrupt: Interrupt) -> Iterator[
 
 def _write(write: Callable[[bytes], object], event: TraceEvent) -> None:
     write(encode(event) + b"\n")
-
-
-def _log_to_stderr(verbosity: int, debug: bool) -> None:
-    level = logging.DEBUG if debug else logging.INFO if verbosity else logging.WARNING
-    logging.basicConfig(level=logging.WARNING, format="%(levelname)s: %(message)s", stream=sys.stderr)
-    logging.getLogger("hfg").setLevel(level)

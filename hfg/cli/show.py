@@ -5,9 +5,11 @@ Stands on rich and `encoding`; knows reports and problems, no verbs.
 
 from __future__ import annotations
 
+import logging
 import sys
 import traceback
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,7 @@ from hfg.cli.encoding import encode
 from hfg.engine.report import Report
 from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
 
-__all__ = ["failure", "json", "report", "sentence", "set_debug", "table", "user_traceback"]
+__all__ = ["failure", "json", "log_to_stderr", "report", "sentence", "set_debug", "table", "user_traceback"]
 
 _OURS = str(Path(__file__).resolve().parent.parent)
 _MACHINERY = (
@@ -42,9 +44,28 @@ def set_debug(debug: bool) -> None:
     _debug = debug
 
 
+def log_to_stderr(verbosity: int, debug: bool) -> None:
+    """Write log records to standard error, whatever that is when they come: warnings, from verbosity 1 more."""
+    level = logging.DEBUG if debug else logging.INFO if verbosity else logging.WARNING
+    handler = logging.StreamHandler(_StandardError())
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s: %(message)s", handlers=[handler])
+    logging.getLogger("hfg").setLevel(level)
+
+
+class _StandardError:
+    """Standard error as it is now: a live table stands in for it at times."""
+
+    def write(self, text: str) -> None:
+        sys.stderr.write(text)
+
+    def flush(self) -> None:
+        sys.stderr.flush()
+
+
 def sentence(text: str) -> None:
     """Write one sentence to standard error."""
-    sys.stderr.write(f"hfg: {text}\n")
+    with suppress(OSError):  # the terminal has gone away: nobody reads it
+        sys.stderr.write(f"hfg: {text}\n")
 
 
 def failure(error: BaseException) -> None:

@@ -9,7 +9,8 @@ Which module stands on which; imports go down only:
     iteration   plan  ports  rx                carrier  virtual  watchdog  report
     steps       short ways for common shapes   quiet       growing, ending, stalling
     watched     the same while somebody looks  consumers   who listens to the trace
-    statistics  numbers while it runs          meters      what measures the code of nodes
+    glance      the few that a table shows     statistics  numbers while it runs
+    meters      what measures the code of nodes
     errors      what a failure brings          activity    what a change of A(v) brings
     firing      what a node does next          builtin_slots  subgraphs  lifecycle
     wiring      which edges are live
@@ -17,6 +18,7 @@ Which module stands on which; imports go down only:
     core  worker  scopes  groups  settings     the state of a run
 """
 
+from hfg.engine.glance import Glance, NodeGlance, glance
 from hfg.engine.report import EdgeReport, NodeReport, Report
 from hfg.engine.run import Run, run, run_async, running
 from hfg.engine.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
@@ -25,7 +27,9 @@ from hfg.engine.virtual import VirtualTimeLoop
 __all__ = [
     "EdgeReport",
     "EdgeStatistics",
+    "Glance",
     "GroupStatistics",
+    "NodeGlance",
     "NodeReport",
     "NodeStatistics",
     "Report",
@@ -33,6 +37,7 @@ __all__ = [
     "Statistics",
     "Times",
     "VirtualTimeLoop",
+    "glance",
     "run",
     "run_async",
     "running",

@@ -1,0 +1,95 @@
+"""What the shell offers at the Tab key: targets, ports and parameters.
+
+The names of graphs are read from the text of a file, which is not run. Ports and parameters are known only when the
+graph is built, so there the target is imported, in silence; whatever goes wrong means no offer. Stands on `target`.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import typer
+
+from hfg.cli.target import load_graph
+from hfg.graph import Graph
+from hfg.graph.boxes import is_box
+from hfg.nodetype import Node
+
+__all__ = ["parameters", "ports", "targets"]
+
+
+def targets(incomplete: str) -> list[str]:
+    """Python files, and the graphs of the one that is named."""
+    name, colon, _ = incomplete.rpartition(":")
+    file = Path(name if colon else incomplete)
+    if file.suffix == ".py" and file.is_file():
+        return [one for one in (f"{file}:{graph}" for graph in _graphs_in(file)) if one.startswith(incomplete)]
+    folder = Path(incomplete) if incomplete.endswith("/") else file.parent
+    try:
+        found = sorted(folder.iterdir())
+    except OSError:
+        return []
+    offers = [f"{one}/" if one.is_dir() else str(one) for one in found if one.is_dir() or one.suffix == ".py"]
+    return [one for one in offers if one.startswith(incomplete) and not Path(one).name.startswith((".", "__"))]
+
+
+def ports(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Outputs, events, inputs and slots of the target's nodes."""
+    return [
+        one
+        for path, node in _nodes(ctx)
+        for kind in (node.ports.outputs, node.ports.events, node.ports.inputs, node.ports.slots)
+        for one in (f"{path}.{name}" for name in kind)
+        if one.startswith(incomplete)
+    ]
+
+
+def parameters(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Parameters of the target's nodes, as the beginning of an assignment."""
+    return [
+        one
+        for path, node in _nodes(ctx)
+        for one in (f"{path}.{name}=" for name in node.ports.parameters)
+        if one.startswith(incomplete)
+    ]
+
+
+def _nodes(ctx: typer.Context) -> list[tuple[str, Node]]:
+    target = ctx.params.get("target")
+    if not target:
+        return []
+    try:
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            return list(_inside(load_graph(target), ""))
+    except Exception:  # a target that does not work completes to nothing
+        return []
+
+
+def _inside(graph: Graph, before: str) -> Iterator[tuple[str, Node]]:
+    for name, node in graph.nodes.items():
+        yield before + name, node
+        if is_box(node):
+            yield from _inside(node._graph, f"{before}{name}/")
+
+
+def _graphs_in(file: Path) -> list[str]:
+    """Names in a file that are graphs, or functions that promise one, as far as its text shows."""
+    try:
+        body = ast.parse(file.read_bytes()).body
+    except (OSError, SyntaxError, ValueError):
+        return []
+    names = []
+    for one in body:
+        if isinstance(one, ast.FunctionDef) and one.returns is not None and _last_word(one.returns) == "Graph":
+            names.append(one.name)
+        elif isinstance(one, ast.Assign) and isinstance(one.value, ast.Call) and _last_word(one.value.func) == "Graph":
+            names += [target.id for target in one.targets if isinstance(target, ast.Name)]
+    return [name for name in names if not name.startswith("_")]
+
+
+def _last_word(expression: ast.expr) -> str:
+    return ast.unparse(expression).strip("'\"").rpartition(".")[2]

@@ -1,0 +1,70 @@
+"""The live table while a graph runs: four times a second a glance, drawn at the foot of the terminal.
+
+Stands on `terminal`, `table` and the engine.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from hfg.cli.table import View
+from hfg.cli.terminal import Foot, is_terminal
+from hfg.engine import Run, glance
+
+__all__ = ["EVERY_S", "Live", "live_table"]
+
+EVERY_S: Final = 0.25
+
+
+class Live:
+    """Draws one run, from `begin` until `end`."""
+
+    def __init__(self, foot: Foot) -> None:
+        self._foot = foot
+        self._view = View()
+        self._run: Run | None = None
+        self._timer: asyncio.TimerHandle | None = None
+
+    def begin(self, run: Run) -> None:
+        """Draw this run from now on; to be called on its loop."""
+        self._run = run
+        self._view.look(glance(run))  # measuring begins, and rates have something to begin with
+        self._again()
+
+    def refresh(self) -> None:
+        """Look and draw, unless the terminal takes nothing at the moment."""
+        if self._run is not None and self._foot.is_ready():
+            self._view.look(glance(self._run))
+            columns, height = self._foot.size()
+            self._foot.draw(self._view.lines(columns, height, coloured=self._foot.coloured))
+
+    def end(self) -> None:
+        """Draw no more."""
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _again(self) -> None:
+        self._timer = asyncio.get_running_loop().call_later(EVERY_S, self._tick)
+
+    def _tick(self) -> None:
+        self.refresh()
+        self._again()
+
+
+@contextmanager
+def live_table(wanted: bool) -> Iterator[Live | None]:
+    """A table below what is printed inside the block; None where there is no terminal for it."""
+    if not wanted or not is_terminal(sys.stdout, sys.stderr):
+        yield None
+        return
+    foot = Foot(sys.stderr)
+    live = Live(foot)
+    with foot.beneath():
+        try:
+            yield live
+        finally:
+            live.end()

@@ -1,0 +1,46 @@
+"""Arguments and options that several verbs have. Stands on typer and `completing`."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from hfg.cli import completing
+
+__all__ = ["Clock", "ClockOption", "DebugOption", "ParamOption", "TargetArgument", "UntilOption"]
+
+
+class Clock(StrEnum):
+    """The clocks a run can have."""
+
+    real = "real"
+    virtual = "virtual"
+
+
+def _not_negative(seconds: float | None) -> float | None:
+    if seconds is not None and seconds < 0:
+        raise typer.BadParameter(f"--until: seconds are not negative, got {seconds:g}")
+    return seconds
+
+
+TargetArgument = Annotated[
+    str, typer.Argument(help="module:graph, file.py or file.py:graph", autocompletion=completing.targets)
+]
+ClockOption = Annotated[Clock, typer.Option(help="virtual: as fast as the machine can, the same each time.")]
+UntilOption = Annotated[
+    float | None,
+    typer.Option(metavar="SECONDS", callback=_not_negative, help="End the run at this time on its clock."),
+]
+ParamOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PATH=VALUE",
+        help="Set a parameter, as in lookup.tolerance=0.2; may be given several times.",
+        autocompletion=completing.parameters,
+    ),
+]
+DebugOption = Annotated[
+    bool, typer.Option("--debug", help="Check values against port types; show hfg's own frames in tracebacks.")
+]

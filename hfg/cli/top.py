@@ -1,0 +1,120 @@
+"""`hfg top [RUN]`: the live table of a graph that runs in another process.
+
+Stands on `sockets`, `table`, `terminal` and `show`.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Annotated
+
+import msgspec
+import typer
+
+from hfg.cli import show
+from hfg.cli.live import EVERY_S
+from hfg.cli.sockets import Answer, Line, runs
+from hfg.cli.table import View
+from hfg.cli.terminal import Foot, is_terminal
+from hfg.engine import Glance
+from hfg.errors import TargetError
+
+__all__ = ["top"]
+
+_PIPE_COLUMNS = 200
+_BETWEEN_S = 1.0  # where there is one table only, rates are those of so long
+
+
+def top(
+    run: Annotated[
+        str | None, typer.Argument(help="process id or name of the graph; without it, the only one that runs")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write one look at the run as JSON.")] = False,
+) -> int:
+    """Watch a graph that `hfg run` runs in another process, on the real clock; without a terminal, one table."""
+    there = _find(run)
+    if len(there) > 1:
+        rows = [(one.pid, one.graph, one.target) for one in there]
+        show.table("", ("process", "graph", "target"), rows)
+        show.sentence("more than one graph runs: name its process, as in hfg top " + str(there[0].pid))
+        return 2
+    pid = there[0].pid
+    try:
+        with Line(pid) as line:
+            if json or not is_terminal(sys.stdout):
+                return _once(line, json)
+            _watch(line)
+    except KeyboardInterrupt:  # how one leaves it
+        return 0
+    return 0
+
+
+def _find(named: str | None) -> list[Answer]:
+    """The runs that are meant.
+
+    Raises:
+      TargetError: none is.
+    """
+    if named is not None and named.isdecimal():
+        return [Answer(pid=int(named))]
+    found = runs()
+    if not found:
+        raise TargetError(
+            "no graph runs that could be looked at: hfg run begins one, on the real clock, as the same user"
+        )
+    if named is None:
+        return found
+    fitting = [one for one in found if one.graph == named]
+    if not fitting:
+        there = ", ".join(f'"{one.graph}" in process {one.pid}' for one in found)
+        raise TargetError(f'no graph "{named}" runs that could be looked at; there is {there}')
+    return fitting
+
+
+def _once(line: Line, json: bool) -> int:
+    """Look twice, so that there are rates, and write what was seen."""
+    view = View()
+    glances: list[Glance] = []
+    while len(glances) < 2:
+        if glances:
+            time.sleep(_BETWEEN_S)
+        glance = _glance(line)
+        if glance is None:
+            show.sentence("the run does not answer: a node blocks its loop")
+            return 1
+        glances.append(glance)
+        view.look(glance)
+    last = glances[-1]
+    if json:
+        head = {"graph": last.graph, "outcome": last.outcome, "duration_s": last.duration_s}
+        show.json({**head, "nodes": [row._asdict() for row in view.rows()]})
+    else:
+        sys.stdout.write("\n".join(view.lines(_PIPE_COLUMNS, len(last.nodes) + 10)) + "\n")
+    return 0
+
+
+def _watch(line: Line) -> None:
+    """Draw until the run is over."""
+    foot = Foot(sys.stdout)
+    view = View()
+    glance = None
+    try:
+        while True:
+            newest = _glance(line)
+            if newest is not None:
+                glance = newest
+            elif glance is not None:
+                glance = msgspec.structs.replace(glance, outcome="does not answer: a node blocks its loop")
+            if glance is not None and foot.is_ready():
+                view.look(glance)
+                columns, height = foot.size()
+                foot.draw(view.lines(columns, height, coloured=foot.coloured))
+            time.sleep(EVERY_S)
+    except TargetError as over:
+        show.sentence(str(over))
+
+
+def _glance(line: Line) -> Glance | None:
+    answer = line.ask("glance")
+    return None if answer is None else answer.glance
