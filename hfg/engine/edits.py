@@ -20,7 +20,7 @@ from hfg.engine import ports as engine_ports
 from hfg.engine.code import answer
 from hfg.engine.reforming import reform
 from hfg.engine.replanning import Replan, closes_a_ring, replan
-from hfg.engine.worker import Worker
+from hfg.engine.worker import ENDED, UNREADY, Worker
 from hfg.errors import HfgError, NodeError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.changes import Change, OptionsChange, ParameterChange, undo_all
@@ -108,7 +108,8 @@ class Edits:
                     value.do()
                 took_effect = held.done = True
                 self._take_effect(how, come, changes, what)
-                await self._enable(changes)
+                await self._enable(changes, of_subgraphs=False)
+            await self._enable(changes, of_subgraphs=True)  # which hold their nodes themselves
         except BaseException:
             if not took_effect:
                 undo_all(changes)
@@ -167,6 +168,7 @@ class Edits:
                 raise
         for worker, _ in done:
             lifecycle.not_ended(worker)
+            worker.blocked &= ~(ENDED | UNREADY)
 
     async def _become(self, worker: Worker, node: Any) -> None:
         if worker.carrier is not None:
@@ -198,18 +200,20 @@ class Edits:
             engine.pausing.forget(worker)
         for change in changes:
             if isinstance(change, ParameterChange) and core.trace is not None and change.node._place is not None:
-                core.trace(ParameterSet(core.now(), change.node._place.path, change.name, change.after))
+                here = core.by_path.get(change.node._place.path)
+                if here is not None and here.node is change.node:
+                    core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
         for worker in come:
             core.upstairs.idle_again(worker)
 
-    async def _enable(self, changes: Sequence[Change]) -> None:
+    async def _enable(self, changes: Sequence[Change], *, of_subgraphs: bool) -> None:
         """Nodes and subgraphs that are enabled or disabled (F10)."""
         core = self._engine.core
         for change in changes:
             if not isinstance(change, OptionsChange) or change.before.group != change.after.group:
                 continue
             worker = next((one for one in core.workers if one.node is change.node), None)
-            if worker is None:
+            if worker is None or of_subgraphs is not (worker.scope is not None):
                 continue
             self._note_options(worker, change.after.enabled)
             waiter: asyncio.Future[None] = self._engine.loop.create_future()
@@ -239,10 +243,11 @@ class Edits:
     async def _tear_down(self, worker: Worker) -> None:
         """A node that is gone closes what it has opened; if it fails, that is told with the other errors (X3)."""
         engine = self._engine
-        for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
+        for name in ("rate_timer", "limit_timer", "active_timer", "backoff_timer"):
+            timer = getattr(worker, name)
             if timer is not None:
                 timer.cancel()
-        worker.rate_timer = worker.limit_timer = worker.active_timer = None
+                setattr(worker, name, None)
         try:
             await self._hook(worker, lifecycle.tear_down)
         except HfgError as error:

@@ -18,7 +18,7 @@ from hfg.engine.modifiers import automatic, derive_scopes, receive, touch
 from hfg.engine.releasing import release
 from hfg.engine.sending import flush_automatic, put_outputs
 from hfg.engine.wiring import rewire
-from hfg.engine.worker import CALLS_BLOCKED, UNREADY, Worker
+from hfg.engine.worker import CALLS_BLOCKED, DISABLED, UNREADY, Worker
 from hfg.errors import EndOfStream, UsageError
 from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
@@ -61,8 +61,10 @@ def _ask_ready(worker: Worker) -> None:
             worker.core.upstairs.fail(worker, "ready()", error, answer=False)
             if not worker.busy:  # else its restart has begun
                 idle_again(worker, asked=True)
-        elif ready and worker.placed:
+        elif ready and worker.placed and worker.on_idle is None:
             fire(worker)
+        elif ready and worker.placed:  # an edit was faster, and asks to be before the firing
+            idle_again(worker)
         elif worker.placed:
             worker.placed = False
             worker.blocked |= UNREADY
@@ -362,6 +364,8 @@ def finish_firing(worker: Worker, outcome: Any) -> None:
     cancel_limit(worker)
     flush_automatic(worker)
     if core.trace is not None:
+        if outcome == "done" and worker.blocked & DISABLED:
+            outcome = "abandoned"  # disabled meanwhile, with a subgraph around it: its outputs went nowhere (F10)
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, outcome))
     taken = worker.taken
     worker.written = None

@@ -141,7 +141,7 @@ def settle_disabled(worker: Worker) -> None:
 def enable(worker: Worker, then: Callable[[], None]) -> None:
     """F10: the node starts afresh; A(v) is kept. In the back-off of a restart that sets it up, when it is over."""
     core = worker.core
-    worker.own_enabled = True
+    itself, worker.own_enabled = not worker.own_enabled, True
     if not worker.blocked & DISABLED or not all(scope.enabled for scope in worker.around):
         then()
         return
@@ -152,7 +152,7 @@ def enable(worker: Worker, then: Callable[[], None]) -> None:
             return
         worker.blocked &= ~(DISABLED | ENDED)
         not_ended(worker)
-        if core.trace is not None:
+        if itself and core.trace is not None:  # else the subgraph around it was, and that is told
             core.trace(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
         consider(worker)
@@ -224,6 +224,7 @@ def restart(worker: Worker, backoff_s: float) -> None:
         tear_down(worker, lambda _error: then())
 
     def rested() -> None:
+        worker.backoff_timer = None
         when_idle(worker, up, lambda: None)
 
     def up(worker: Worker, then: Callable[[], None]) -> None:
@@ -240,6 +241,6 @@ def restart(worker: Worker, backoff_s: float) -> None:
             then()
 
     def rest() -> None:
-        core.after(backoff_s, rested)
+        worker.backoff_timer = core.after(backoff_s, rested)
 
     when_idle(worker, down, rest)

@@ -13,13 +13,14 @@ from hfg.engine import plan, ports, quiet, steps, wiring
 from hfg.engine.activity import rest
 from hfg.engine.agenda import block, note_full
 from hfg.engine.core import Core
+from hfg.engine.ending import drain_left
 from hfg.engine.groups import Group
 from hfg.engine.modifiers import derive_scopes, discard, touch
 from hfg.engine.releasing import release
 from hfg.engine.replanning import Replan
 from hfg.engine.scopes import Scope
 from hfg.engine.sending import flush_automatic
-from hfg.engine.worker import DISABLED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
+from hfg.engine.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
 from hfg.graph.flat import FlatEdge, FlatGraph
 from hfg.ports.automatic import AUTOMATIC_EVENTS
 from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
@@ -236,7 +237,7 @@ class _Reforming:
             self.touched[edge.source] = None
         if type(edge) is SyncEdge:
             before, edge.sequential = edge.sequential, plan.is_sequential(edge.source, edge.target)
-            if before and not edge.sequential and edge.token is None and edge.held:
+            if before and not edge.sequential and edge.target.held and edge in edge.target.taken:
                 release((edge,))  # taken and waited for until now; the firing that took it is over
 
     def _gates(self, flat: FlatGraph, workers: list[Worker]) -> None:
@@ -269,6 +270,8 @@ class _Reforming:
             edge.live = wiring.is_live(edge)
             if isinstance(edge, DelayEdge | EventEdge) and edge.initial:
                 _lay(edge)
+                if edge.target.blocked & ENDED:
+                    drain_left(edge)
         touched = [worker for worker in self.touched if not worker.blocked & REMOVED]
         for worker in touched:
             self._bind(worker)

@@ -66,13 +66,23 @@ def disable_scope(scope: Scope) -> None:
         return
     scope.enabled = False
     core = scope.worker.core
-    if core.trace is not None:
+    if core.trace is not None and _is_alone_in_it(scope):
         core.trace(NodeEnabled(core.now(), scope.path, False))
     for worker in scope.members:
         if not worker.blocked & DISABLED:
             block(worker, DISABLED)
             lifecycle.settle_disabled(worker)
     wiring.refresh_via(scope)
+
+
+def _is_alone_in_it(scope: Scope) -> bool:
+    """Whether it makes a difference: inside a subgraph that is disabled itself it makes none."""
+    around = scope.parent
+    while around is not None:
+        if not around.enabled:
+            return False
+        around = around.parent
+    return True
 
 
 def enable_scope(scope: Scope, then: Callable[[], None]) -> None:
@@ -82,7 +92,7 @@ def enable_scope(scope: Scope, then: Callable[[], None]) -> None:
         return
     scope.enabled = True
     core = scope.worker.core
-    if core.trace is not None:
+    if core.trace is not None and _is_alone_in_it(scope):
         core.trace(NodeEnabled(core.now(), scope.path, True))
     wiring.refresh_via(scope)
 

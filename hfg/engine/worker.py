@@ -99,6 +99,7 @@ class Worker:
         "active_timer",
         "ahead",
         "around",
+        "backoff_timer",
         "blocked",
         "busy",
         "call_edge",
@@ -267,6 +268,7 @@ class Worker:
         self.next_start = 0.0
         self.rate_timer: Any = None
         self.limit_timer: Any = None
+        self.backoff_timer: Any = None
         self.active_timer: Any = None
         self.gate_next = float("-inf")  # when its last firing began, for a throttling gate
 

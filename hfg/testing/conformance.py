@@ -19,6 +19,7 @@ from hfg.trace import (
     ActivityLost,
     CallEnded,
     CallStarted,
+    EditWaits,
     ErrorRaised,
     EventTriggered,
     FiringEnded,
@@ -141,13 +142,15 @@ class Replay:
         self.seen: list[TraceEvent] = []
         self._paused = False  # time may go on although nodes are enabled (R3)
         self.expected: list[TraceEvent] = []
-        self._connected = {
-            self.machine.event_path(line.edge.source.owner, line.edge.source.name)
-            for line in self.machine.lines
-            if line.edge.source.kind == "event"
-        }
-        self._delays = {line.edge.label for line in self.machine.lines if line.delay}
+        self._delays: set[str] = set()
+        self._look_at_edges()
         self._expect(self.machine.start())
+
+    def _look_at_edges(self) -> None:
+        lines = self.machine.lines
+        events = [line.edge.source for line in lines if line.edge.source.kind == "event"]
+        self._connected = {self.machine.event_path(source.owner, source.name) for source in events}
+        self._delays |= {line.edge.label for line in lines if line.delay}  # what is said of one that was removed, too
 
     def see(self, event: TraceEvent) -> None:
         """Take the next event of the run.
@@ -161,9 +164,20 @@ class Replay:
             return
         if event.time > self.machine.now + _SAME_TIME:
             self._let_time_go(event)
-        if not self._match(event):
+        if isinstance(event, EditWaits):
+            self.machine.hold(event.nodes)
+        elif isinstance(event, StructureChanged):
+            self._follow_edit(event)
+        elif not self._match(event):
             self._decide(event)
         self.seen.append(event)
+
+    def _follow_edit(self, event: StructureChanged) -> None:
+        """The run is edited (R4): so is the reference."""
+        mark = len(self.machine.observed)
+        self.machine.edit(event.change)
+        self._look_at_edges()
+        self._expect(self.machine.observed_since(mark))
 
     def tell(self, stimulus: Callable[[ReferenceMachine], None]) -> None:
         """Let the world outside do to the reference what it is about to do to the run."""
@@ -214,7 +228,7 @@ class Replay:
             return event.event not in self._connected
         if isinstance(event, TokenProcessed):  # a delay ends the wave: nobody waits, so nobody need be told when
             return event.edge in self._delays
-        return isinstance(event, StructureChanged | RunPaused | RunResumed)
+        return isinstance(event, RunPaused | RunResumed)
 
     def is_inside(self, event: TraceEvent) -> bool:
         """Whether an event happened inside an iterating subgraph."""
@@ -371,6 +385,11 @@ class Replay:
             steps = [move for move in moves if move.kind in ("wait", "finish", "complete")]
             if self._paused and not any(move.kind == "wait" for move in steps):
                 steps = [Move("wait", time=event.time)]
+            if isinstance(event, EditWaits | StructureChanged) and all(
+                move.kind == "wait" for move in self.machine.owed_moves()
+            ):
+                # somebody outside has waited so long (R4)
+                steps = [*(move for move in moves if move.kind == "wait"), Move("wait", time=event.time)]
             wait = min(steps, key=lambda move: (move.kind == "finish", move.time), default=None)
             if wait is None:
                 raise Divergence("time went on although the rules permit moves now", event, self)

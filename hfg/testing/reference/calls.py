@@ -210,6 +210,9 @@ class Calling(Firing):
         index = station.leaf.index
         if station.flight is not None and station.flight.what == "firing":
             station.flight.void = True
+        for line in self.lines:  # nobody waits for what it has taken
+            if line.edge.target.owner == index and line.edge.target.name != "enable" and line.unprocessed:
+                self.process(line)
         self._empty(lambda line: line.edge.target.owner == index and line.edge.target.name != "enable")
         self._empty(lambda line: line.edge.source.owner == index and not line.edge.is_event)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from hfg.errors import QueueLimit, Stalled
-from hfg.testing.reference.calls import Calling
+from hfg.testing.reference.edits import Editing
 from hfg.testing.reference.state import Line
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
@@ -80,7 +80,7 @@ class Move:
         return f'{self.kind} "{self.node}"'
 
 
-class ReferenceMachine(Calling):
+class ReferenceMachine(Editing):
     """A run of a graph whose every decision is taken from outside.
 
     Args:
@@ -206,6 +206,8 @@ class ReferenceMachine(Calling):
 
     def next_of(self, index: int) -> Move | None:
         """F9: of a node's calls and its firing, the one with the oldest place."""
+        if self.is_held(index):
+            return None
         station = self.stations[index]
         line = self.next_call(index)
         held = bool(self.full_lines(index)) or station.resting_until is not None

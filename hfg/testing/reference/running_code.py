@@ -28,14 +28,17 @@ class RunningCode(Sending):
     def connect_ports(self) -> None:
         """Let the ports of all nodes speak to this machine."""
         for station in self.stations:
-            if station.leaf.inside is not None:
-                continue
-            for name in station.type.outputs:
-                station.node.ports.outputs[name]._emit = self._writer(station, name)
-            for name in station.type.events:
-                port = station.node.ports.events[name]
-                port._emit = self._trigger_of(station, name)
-                port._emit_wait = self._waiting_trigger_of(station, name)
+            if station.leaf.inside is None:
+                self.connect_one(station)
+
+    def connect_one(self, station: Station) -> None:
+        """Let the ports of a node speak to this machine."""
+        for name in station.type.outputs:
+            station.node.ports.outputs[name]._emit = self._writer(station, name)
+        for name in station.type.events:
+            port = station.node.ports.events[name]
+            port._emit = self._trigger_of(station, name)
+            port._emit_wait = self._waiting_trigger_of(station, name)
 
     def _writer(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], None]:
         def write(value: Any, activity: int | None, stamp: float | None) -> None:

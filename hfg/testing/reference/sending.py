@@ -273,7 +273,7 @@ class Sending(State):
 
     def process(self, line: Line) -> None:
         """Count one taken token as processed."""
-        if not line.delay:
+        if not line.delay and line.unprocessed:  # else nobody waits any more, for the node was disabled meanwhile
             line.unprocessed -= 1
             self.observe(TokenProcessed(self.now, line.edge.label))
 

@@ -17,7 +17,7 @@ from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import TraceEvent
 
-__all__ = ["Flight", "Line", "Lying", "State", "Station", "newest"]
+__all__ = ["Flight", "Line", "Lying", "State", "Station", "fresh", "newest"]
 
 
 @dataclass
@@ -128,7 +128,7 @@ class State:
         self.graph = graph
         self.now = 0.0
         self.tick = 0
-        self.stations = [Station(leaf, _fresh(leaf)) for leaf in self.structure.leaves]
+        self.stations = [Station(leaf, fresh(leaf)) for leaf in self.structure.leaves]
         self.lines = [Line(edge, edge.capacity) for edge in self.structure.edges]
         self.box_enabled = [bool(box.options.enabled) for box in self.structure.boxes]
         self.box_active = [False] * len(self.structure.boxes)
@@ -142,6 +142,7 @@ class State:
         self.error: BaseException | None = None
         self.observed: list[TraceEvent] = []
         self.lost_activity = 0
+        self.held: set[int] = set()  # stations that an edit waits for (R4), by identity
         for station in self.stations:
             station.enabled = bool(station.leaf.options.enabled)
 
@@ -347,7 +348,8 @@ class State:
         return min(candidates, key=lambda line: line.queue[0].place, default=None)
 
 
-def _fresh(leaf: Leaf) -> Any:
+def fresh(leaf: Leaf) -> Any:
+    """Make the copy of a node that does the work."""
     node = leaf.node._copy()
     node._place = leaf.node._place  # code may ask where it is
     return node

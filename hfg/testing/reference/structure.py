@@ -100,6 +100,7 @@ class Edge:
     initial: tuple[Any, ...]
     via: tuple[int, ...]
     within: int | None = None  # the iterating subgraph around it
+    parts: tuple[Any, ...] = ()  # the drawn edges that it consists of
 
     @property
     def is_event(self) -> bool:
@@ -278,6 +279,7 @@ class _Dissolving:
                 through=tuple(operator for part, _ in parts for operator in part.options.through),
                 initial=tuple(value for part, _ in reversed(parts) for value in part.options.initial),
                 via=via,
+                parts=tuple(part for part, _ in parts),
             )
         )
 

@@ -1,0 +1,259 @@
+"""A machine whose graph is edited on the way (rule R4).
+
+Commands are carried out on the machine's own drawing; then all of it is dissolved afresh, and what was there before is
+found again: stations by their nodes, lines by their ends. What is gone lets go what lay on it. Sees how drawings are
+edited, and shares nothing with what runs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from hfg.graph.changes import Change, EdgeChange, NodeSwap, OptionsChange, ParameterChange, undo_all
+from hfg.graph.commands import decode
+from hfg.graph.editing import history_of, prepare
+from hfg.testing.reference.calls import Calling
+from hfg.testing.reference.state import Line, Lying, Station, fresh
+from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of, is_box, whole
+from hfg.token import Token
+from hfg.trace import ActivityLost, ParameterSet, TokenDropped, TokenProcessed
+
+__all__ = ["Editing"]
+
+_GONE = boundary_of(10_000)
+"""The sender of tokens whose sender was removed."""
+
+
+class Editing(Calling):
+    """A machine that follows edits."""
+
+    paths: dict[str, int]
+    labels: dict[str, Line]
+
+    def hold(self, paths: Iterable[str]) -> None:
+        """An edit waits: these nodes start nothing until it is done."""
+        self.held = {id(self.stations[self.paths[path]]) for path in paths}
+
+    def is_held(self, index: int) -> bool:
+        """Whether an edit waits for the node, or for others with it."""
+        return id(self.stations[index]) in self.held
+
+    def edit(self, what: str) -> None:
+        """Carry out what a run says it has carried out: commands as JSON, "undo", "redo"; "" was given up."""
+        self.held = set()
+        if what:
+            self._follow(self._draw(what))
+        self.settle()
+
+    def _draw(self, what: str) -> Sequence[Change]:
+        """Edit the drawing; its parameters are first what tokens have made of them (P8)."""
+        for station in self.stations:
+            if station.leaf.inside is None:
+                station.leaf.node._parameters.update(station.node._parameters)
+        history = history_of(self.graph)
+        if what == "undo":
+            changes = undo_all(history.next_undo().changes)
+            history.undo_done()
+            return changes
+        if what == "redo":
+            transaction = history.next_redo()
+            for change in transaction.changes:
+                change.do()
+            history.redo_done()
+            return transaction.changes
+        transaction = prepare(self.graph, decode(what), check=False)
+        history.note(transaction)
+        return transaction.changes
+
+    def _follow(self, changes: Sequence[Change]) -> None:
+        name_of = {owner: self._name_of(owner) for owner in self._owners()}  # by what it is, not by its number
+        before = {id(station.leaf.node): station for station in self.stations}
+        boxes = {id(box.node): box.index for box in self.structure.boxes}
+        swapped: dict[int, Station] = {}
+        for change in changes:
+            if isinstance(change, NodeSwap) and id(change.old) in before:
+                station = before[id(change.new)] = before.pop(id(change.old))
+                swapped[id(station)] = station
+        rubbed_out = {id(one.edge) for one in changes if isinstance(one, EdgeChange) and not one.added and one.for_good}
+        old_lines = [(name_of[line.edge.source.owner], name_of[line.edge.target.owner], line) for line in self.lines]
+        senders = [(lying, name_of.get(lying.sender, "")) for line in self.lines for lying in line.queue]
+        after = whole(self.graph)
+        self._exchange_stations(after, before)
+        self._exchange_boxes(after, boxes)
+        number_of = {self._name_of(owner): owner for owner in self._owners()}
+        for lying, name in senders:
+            lying.sender = number_of.get(name, _GONE)
+        lost, new = self._exchange_lines(old_lines, number_of, rubbed_out)
+        self.paths = {station.path: station.leaf.index for station in self.stations}
+        self.paths |= {box.path: -2 - box.index for box in after.boxes}
+        self.paths[""] = ROOT
+        self.labels = {line.edge.label: line for line in self.lines}
+        for station in self.stations:
+            if id(station) not in {id(one) for one in before.values()}:
+                self.connect_one(station)
+                self.set_up(station)
+            elif id(station) in swapped:
+                self._exchange_node(station)
+        for line in new:
+            for value in line.edge.initial:
+                line.queue.append(Lying(Token(value, 0, self.now, 0), self.next_tick(), line.edge.source.owner))
+        for line in lost:
+            self._let_go(line)
+        here = {id(station) for station in self.stations}
+        for station in before.values():
+            if id(station) not in here:
+                self._remove(station)
+        for change in changes:
+            self._set(change)
+        for station in self.stations:
+            self._process_what_is_pipelined_now(station)
+
+    # --- who is who
+
+    def _owners(self) -> list[int]:
+        iterating = [boundary_of(station.leaf.index) for station in self.stations if station.leaf.inside is not None]
+        return [*range(len(self.stations)), *(-2 - box.index for box in self.structure.boxes), *iterating, ROOT]
+
+    def _name_of(self, owner: int) -> Any:
+        if owner == ROOT:
+            return "root"
+        if owner >= 0:
+            return id(self.stations[owner])
+        if is_box(owner):
+            return id(self.structure.boxes[-2 - owner].node)
+        return ("inside", id(self.stations[boundary_of(0) - owner]))
+
+    def _exchange_stations(self, after: Any, before: dict[int, Station]) -> None:
+        stations = []
+        for leaf in after.leaves:
+            station = before.get(id(leaf.node))
+            if station is None:
+                station = Station(leaf, fresh(leaf), enabled=bool(leaf.options.enabled))
+            station.leaf = leaf
+            station.node._place = leaf.node._place
+            stations.append(station)
+        self.stations = stations
+
+    def _exchange_boxes(self, after: Any, boxes: dict[int, int]) -> None:
+        was = [boxes.get(id(box.node)) for box in after.boxes]
+        self.box_enabled = [
+            bool(box.options.enabled) if old is None else self.box_enabled[old]
+            for box, old in zip(after.boxes, was, strict=True)
+        ]
+        self.box_active = [False if old is None else self.box_active[old] for old in was]
+        self.box_since = [None if old is None else self.box_since[old] for old in was]
+        calls = dict(self.box_calls)
+        self.box_calls = {
+            -2 - index: calls[-2 - old] for index, old in enumerate(was) if old is not None and -2 - old in calls
+        }
+        self.structure = after
+
+    def _exchange_lines(
+        self, old_lines: list[tuple[Any, Any, Line]], number_of: dict[Any, int], rubbed_out: set[int]
+    ) -> tuple[list[Line], list[Line]]:
+        """Find the lines again; gives those that are lost and those that are new."""
+        there: dict[Any, list[Line]] = {}
+        outside, lost = [], []
+        for source, target, line in old_lines:
+            edge = line.edge
+            if edge.source.name == "outside":
+                if target in number_of:
+                    owner = number_of[target]
+                    path = self.stations[owner].path if owner >= 0 else self._path_outside(owner)
+                    edge.target = edge.target._replace(owner=owner)
+                    edge.label = f"outside -> {path}.{edge.target.name}" if path else edge.label
+                    outside.append(line)
+                else:
+                    lost.append(line)
+            elif rubbed_out.isdisjoint(id(part) for part in edge.parts):
+                there.setdefault((source, target, *_kind(edge)), []).append(line)
+            else:
+                lost.append(line)
+        lines, new = [], []
+        for edge in self.structure.edges:
+            same = there.get((self._name_of(edge.source.owner), self._name_of(edge.target.owner), *_kind(edge)))
+            line = same.pop(0) if same else Line(edge, edge.capacity)
+            if line.edge is edge:
+                new.append(line)
+            line.edge = edge
+            lines.append(line)
+        self.lines = lines + outside
+        return lost + [line for lines in there.values() for line in lines], new
+
+    def _path_outside(self, owner: int) -> str:
+        return "" if owner == ROOT else self.structure.boxes[-2 - owner].path
+
+    # --- what follows
+
+    def _let_go(self, line: Line) -> None:
+        """A removed edge counts as processed; what lay on it is dropped, activity goes back (A8)."""
+        for lying in line.queue:
+            self.observe(TokenDropped(self.now, line.edge.label, lying.token, "removed"))
+            if lying.token.activity == 1:
+                if lying.sender >= 0:
+                    self.set_active(lying.sender, True, "returned")
+                else:
+                    self.lost_activity += 1
+                    self.observe(ActivityLost(self.now, line.edge.label))
+        if not line.edge.is_event and (len(line.queue) > line.delay or line.unprocessed):
+            self.observe(TokenProcessed(self.now, line.edge.label))
+        line.queue.clear()
+        for station in self.stations:
+            station.owed = [one for one in station.owed if one is not line]
+            if station.flight is not None:
+                station.flight.taken = [one for one in station.flight.taken if one is not line]
+
+    def _remove(self, station: Station) -> None:
+        if station.active:
+            self.lost_activity += 1
+            self.observe(ActivityLost(self.now, station.path))
+        for line in station.owed:
+            if line in self.lines:
+                self.process(line)
+        self.tear_down(station)
+
+    def _exchange_node(self, station: Station) -> None:
+        """Another node in its place: teardown, setup, not ended; tokens and A(v) stay."""
+        self.tear_down(station)
+        station.node = fresh(station.leaf)
+        station.node._active = station.active
+        self.connect_one(station)
+        if station.resting_until is None:  # else its back-off does it
+            self.set_up(station)
+
+    def _set(self, change: Change) -> None:
+        """Parameters, and what is enabled (F10)."""
+        if not isinstance(change, ParameterChange | OptionsChange):
+            return
+        owner = self._owner_of(change.node)
+        if owner is None:
+            return
+        if isinstance(change, ParameterChange):
+            if owner >= 0:
+                self.stations[owner].node._parameters[change.name] = change.after
+            self.observe(ParameterSet(self.now, self.path_of(owner), change.name, change.after))
+        elif change.before.group == change.after.group:
+            if change.after.enabled:
+                self.enable(owner)
+            else:
+                self.disable(owner)
+
+    def _owner_of(self, node: Any) -> int | None:
+        """Whose a drawn node is; None if the same edit has removed it."""
+        stations = [index for index, station in enumerate(self.stations) if station.leaf.node is node]
+        return next(iter([*stations, *(-2 - box.index for box in self.structure.boxes if box.node is node)]), None)
+
+    def _process_what_is_pipelined_now(self, station: Station) -> None:
+        """In its new group a node's mode may be another (F5)."""
+        owed, station.owed = station.owed, []
+        for line in owed:
+            if self.is_pipelined(line):
+                self.process(line)
+            else:
+                station.owed.append(line)
+
+
+def _kind(edge: Edge) -> tuple[Any, ...]:
+    source: End = edge.source
+    return (source.kind, source.name, edge.target.kind, edge.target.name, bool(edge.initial) and not edge.is_event)
