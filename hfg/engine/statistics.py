@@ -377,7 +377,7 @@ class Measuring:
             dropped=edge.dropped,
             drained=edge.drained,
             untaken=edge.untaken,
-            deepest=edge.deepest,
+            deepest=max(edge.deepest, int(edge.sent > edge.dropped + edge.drained)),  # short ways count from two on
             capacity=getattr(edge, "capacity", None),
             grown=getattr(edge, "grown", 0),
         )

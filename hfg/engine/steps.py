@@ -14,14 +14,14 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
-from hfg.engine import ending, errors, firing, watched
-from hfg.engine.agenda import block, consider, freed
+from hfg.engine import ending, errors, firing, joins, watched
+from hfg.engine.agenda import consider, freed, note_full
 from hfg.engine.calls import await_call
 from hfg.engine.core import OF_ITS_OWN_KIND, PENDING
 from hfg.engine.modifiers import derive_scopes, touch
 from hfg.engine.releasing import outputs_done, release
 from hfg.engine.sending import flush_automatic, trigger
-from hfg.engine.worker import CALLS_BLOCKED, ENDED, FULL, RunningEvent, Worker
+from hfg.engine.worker import CALLS_BLOCKED, ENDED, RunningEvent, Worker
 from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import Token
@@ -76,12 +76,21 @@ def _choose(worker: Worker) -> None:
         return
     if any(edge.target.is_boundary_output and edge.target.process is None for edge in outs):
         return  # a reader waits at its barrier
-    if len(outs) > 1 or (worker.type.result == "fields"):
+    if worker.type.result == "fields" or (outs and worker.type.result != "single"):
         return
     traced = traced or any(edge.tap is not None for edge in outs)
     if worker.is_source:
-        if worker.type.process_kind == "generator" and len(outs) == 1 and worker.process is not None:
+        if worker.type.process_kind != "generator" or worker.process is None or not outs:
+            return
+        if len(outs) > 1:
+            if not traced:
+                worker.step = joins.fork_step(worker, tuple(outs))
+        else:
             worker.step = watched.generator_step(worker, outs[0]) if traced else _generator_step(worker, outs[0])
+        return
+    if len(outs) > 1 or len(worker.in_edges) > 1 or any(type(edge) is EventEdge for edge in worker.in_edges):
+        if not traced and worker.meter is None:
+            worker.step = _wide(worker, tuple(outs))
         return
     if (
         len(worker.in_edges) == 1
@@ -107,6 +116,21 @@ def _choose(worker: Worker) -> None:
                     worker.meter.steps = (quick, worker.step)
             elif not traced:
                 worker.step = _async_step(worker, edge, given)
+
+
+def _wide(worker: Worker, outs: tuple[Any, ...]) -> Step:
+    """A plain function with several edges, or behind an event."""
+    edges = worker.live_inputs
+    whole = len(edges) == len(worker.in_edges) == len(worker.unset) and not any(worker.wants_token)
+    if not whole or worker.is_async or worker.type.process_kind != "function":
+        return firing.step
+    if any(edge.target_kind != "input" for edge in edges):
+        return firing.step
+    if len(edges) == 1 and type(edges[0]) is EventEdge:
+        return joins.handle_step(worker, edges[0], outs) if edges[0].mandatory else firing.step
+    if all(type(edge) is SyncEdge and edge.sequential == edges[0].sequential for edge in edges):
+        return joins.join_step(worker, edges, outs)
+    return firing.step
 
 
 def _leave_lying(worker: Worker) -> None:
@@ -477,17 +501,11 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
                 derive_scopes(core)
         else:
             queue.append(Token(value, 0, stamp, number))
-        depth = len(queue)
-        if depth > edge.deepest:
-            edge.deepest = depth
-        if depth >= edge.capacity and not edge.full:
-            edge.full = True
-            worker.full_edges += 1
-            block(worker, FULL)
+        if calls or target.busy or edge.capacity == 1:  # else it is the only one that waits
+            edge.deepest = max(edge.deepest, len(queue))
+            note_full(edge)
         calls.append(edge)
-        if (
-            not target.queued
-        ):  # if it is busy or blocked its step does nothing, and it is queued again when that is over
+        if not target.queued and not target.busy:  # if it is blocked its step does nothing
             target.queued = True
             target.push(target)
         if core.current is not worker:  # a thread was here after all, and perhaps the loop has gone to rest

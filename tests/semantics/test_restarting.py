@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
+from reactivex import operators as ops
 
 import hfg
 from tests.semantics.nodes import Ear, Keep, drive, numbers, run
@@ -172,3 +173,48 @@ class Fails(hfg.Node):
 
     def process(self, value: object) -> None:
         raise ValueError("always")
+
+
+class TellsItself(hfg.Node):
+    """Triggers, out of a slot, over an operator that fails into another slot of its own."""
+
+    back = hfg.Event(int)
+    story: ClassVar[list[str]] = []
+
+    def setup(self) -> None:
+        self.story.append("up")
+
+    def teardown(self) -> None:
+        self.story.append("down")
+
+    @hfg.slot
+    def say(self, value: int) -> None:
+        self.back.trigger(value)
+        self.story.append(f"said {value}")
+
+    @hfg.slot
+    def hear(self, value: int) -> None:
+        self.story.append(f"heard {value}")
+
+
+@pytest.mark.rule("X1", "F9", "P9")
+def test_a_call_that_makes_an_operator_fail_is_over_before_its_node_is_restarted(fast: bool) -> None:
+    graph = hfg.Graph()
+    TellsItself.story.clear()
+    node, start = graph.add(TellsItself(), on_error="restart", restart_backoff_s=0.1), graph.add(Starter())
+    graph.connect(graph.add(numbers(count=2), max_rate_hz=1).out, start.value)
+    graph.connect(start.signal, node.say)
+    graph.connect(node.back, node.hear, through=[ops.map(lambda token: token.value / (token.value - 1))])
+    report = run(graph, fast)
+    assert TellsItself.story == ["up", "said 1", "down", "up", "said 2", "down"]
+    assert report.nodes["tells_itself"].restarts == 1
+
+
+class Starter(hfg.Node):
+    """Turns values into signals."""
+
+    value = hfg.Input(int)
+    signal = hfg.Event(int)
+
+    def process(self, value: int) -> None:
+        self.signal.trigger(value)

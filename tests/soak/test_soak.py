@@ -41,3 +41,15 @@ def test_the_engine_does_what_the_oracle_permits(block: int) -> None:
         plan = random_plan(seed, Allowed(threads=seed % 10 == 0, max_nodes=5 + seed % 6))
         if suite.reference(plan, seed) is not None:
             suite.check(plan, seed)
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("block", range(BLOCKS))
+def test_the_short_ways_do_the_same_as_the_general_way(block: int) -> None:
+    suite = _random_graphs()
+    first = SEED + block * (GRAPHS // BLOCKS)
+    for seed in range(first, first + GRAPHS // BLOCKS):
+        plan = random_plan(seed, Allowed(max_nodes=5 + seed % 6))
+        if suite.reference(plan, seed) is not None:
+            suite.check(plan, seed, suite.short_ways_differ)
