@@ -70,6 +70,11 @@ class _Timer:
             engine.guard(self._callback)
             engine.go_on()
 
+    def recount(self, counts: bool) -> None:
+        if self._handle is not None:
+            self._engine.core.timers += counts - self._counts
+            self._counts = counts
+
     def cancel(self) -> None:
         if self._handle is not None:
             self._handle.cancel()

@@ -237,8 +237,14 @@ class _Reforming:
             self.touched[edge.source] = None
         if type(edge) is SyncEdge:
             before, edge.sequential = edge.sequential, plan.is_sequential(edge.source, edge.target)
-            if before and not edge.sequential and edge.target.held and edge in edge.target.taken:
-                release((edge,))  # taken and waited for until now; the firing that took it is over
+            target: Worker = edge.target
+            if before is edge.sequential or not target.held or edge not in target.taken:
+                return
+            # its last firing is over, but not what it has sent (F5)
+            if before:
+                release((edge,))  # that was waited for until now
+            else:
+                target.taken = tuple(one for one in target.taken if one is not edge)
 
     def _gates(self, flat: FlatGraph, workers: list[Worker]) -> None:
         core = self.core
@@ -276,6 +282,8 @@ class _Reforming:
         for worker in touched:
             self._bind(worker)
             plan.watch(worker)
+            if worker.active_timer is not None:
+                worker.active_timer.recount(worker.timeout_leads_somewhere())
         if how.whole:
             for edge in core.edges:
                 edge.live = wiring.is_live(edge)

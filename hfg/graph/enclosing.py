@@ -14,7 +14,7 @@ import msgspec
 
 from hfg.errors import GraphError
 from hfg.graph.changes import Change, EdgeChange, GateChange, NodeChange, PromotionChange
-from hfg.graph.edges import Edge
+from hfg.graph.edges import Edge, refuse
 from hfg.graph.naming import need_name
 from hfg.graph.options import ACTIVE, PLAIN, EdgeOptions, NodeOptions, in_group
 from hfg.graph.structure import Graph
@@ -147,17 +147,19 @@ def _outer_half(edge: Edge, box: Any, ports: _Names, inner: set[Any]) -> Edge | 
     if edge not in ports.of:
         return None
     port = ports.port(edge, box)
-    return (
-        Edge(edge.source, port, edge.options) if _owner(edge.target) in inner else Edge(port, edge.target, edge.options)
-    )
+    if _owner(edge.target) in inner:
+        return Edge(edge.source, port, msgspec.structs.replace(edge.options, initial=()))
+    return Edge(port, edge.target, edge.options)
 
 
 def _inner_half(edge: Edge, box: Any, ports: _Names, inner: set[Any]) -> Edge:
+    """Initial tokens go to the part at the target, so that what else is led there has none."""
     if edge not in ports.of:
         return edge
-    options = ACTIVE if edge.active else PLAIN
     relay = ports.port(edge, box).inner
-    return Edge(relay, edge.target, options) if _owner(edge.target) in inner else Edge(edge.source, relay, options)
+    if _owner(edge.target) in inner:
+        return Edge(relay, edge.target, EdgeOptions(active=edge.active, initial=edge.options.initial))
+    return Edge(edge.source, relay, ACTIVE if edge.active else PLAIN)
 
 
 # --- dissolving ---
@@ -219,10 +221,12 @@ def dissolve(do: Do, box: Any, levels: Sequence[Graph]) -> None:
             at += 1
             continue
         for whole in joined.get(edge, ()):
+            refuse(around, whole.source, whole.target, whole.options)
             do(EdgeChange(around, whole, at, added=True, for_good=False))
             at += 1
     for edges in own.values():
         for whole in edges:
+            refuse(around, whole.source, whole.target, whole.options)
             do(EdgeChange(around, whole, len(around.edges), added=True, for_good=False))
     for _, gate in gates:
         do(GateChange(around, gate, len(around.gates), added=True))

@@ -142,7 +142,7 @@ def _let_time_pass(replaying: Replay, until: float) -> None:
     """Nothing moved until somebody outside did something."""
     machine = replaying.machine
     while machine.now < until:
-        moves = machine.moves()
+        moves = machine.owed_moves()
         if any(move.kind != "wait" for move in moves):
             return
         replaying._apply(Move("wait", time=min([until, *(move.time for move in moves)])))

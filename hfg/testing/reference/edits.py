@@ -42,9 +42,24 @@ class Editing(Calling):
     def edit(self, what: str) -> None:
         """Carry out what a run says it has carried out: commands as JSON, "undo", "redo"; "" was given up."""
         self.held = set()
+        self._note_missed_timeouts()
         if what:
             self._follow(self._draw(what))
         self.settle()
+
+    def _note_missed_timeouts(self) -> None:
+        """A12: what nobody was connected to when its time was over does not come later."""
+        for owner in [*range(len(self.stations)), *(-2 - box.index for box in self.structure.boxes)]:
+            if owner >= 0:
+                since, limit = self.stations[owner].active_since, self.stations[owner].leaf.options.active_for_s
+            else:
+                since, limit = self.box_since[-2 - owner], self.structure.boxes[-2 - owner].options.active_for_s
+            if since is None or limit is None or not self.is_over(since + limit):
+                continue
+            if owner >= 0 and not self.lines_from(owner, "event", "timeout"):
+                self.stations[owner].active_since = None
+            elif owner < 0 and not self.lines_from(owner, "event", "timeout"):
+                self.box_since[-2 - owner] = None
 
     def _draw(self, what: str) -> Sequence[Change]:
         """Edit the drawing; its parameters are first what tokens have made of them (P8)."""
