@@ -32,6 +32,7 @@ from hfg.trace import (
     FiringStarted,
     QueueGrown,
     RunEnded,
+    StructureChanged,
     TokenDrained,
     TokenDropped,
     TokenSent,
@@ -49,10 +50,11 @@ _APART_US = 0.001  # two events are never at the same time: what happens at one 
 class _Box:
     """A firing or call under way, and the arrows that leave or reach it."""
 
-    __slots__ = ("args", "arrows", "began", "category", "name", "row")
+    __slots__ = ("args", "arrows", "began", "category", "group", "name", "row")
 
-    def __init__(self, name: str, category: str, began: float, row: int, args: dict[str, Any]) -> None:
+    def __init__(self, name: str, category: str, began: float, group: str, row: int, args: dict[str, Any]) -> None:
         self.name = name
+        self.group = group
         self.category = category
         self.began = began
         self.row = row
@@ -92,6 +94,7 @@ class Timeline:
             self._ours = True
         else:
             self._stream, self._ours = file, False
+        self._graph = graph
         self._groups = dict(_groups(flatten(graph)))
         self._first = True
         self._closed = False
@@ -141,6 +144,8 @@ class Timeline:
                 self._flying.pop((edge, token.sequence), None)
             case QueueGrown(edge=edge, capacity=capacity):
                 self._mark(_source(edge)[0], "queue grown", {"edge": edge, "capacity": capacity})
+            case StructureChanged():
+                self._groups |= _groups(flatten(self._graph))
             case RunEnded(outcome=outcome):
                 self.close(outcome)
 
@@ -182,20 +187,19 @@ class Timeline:
             rows.append(None)
         rows[row] = node
         self._last_row[node] = row
-        self._open[node] = _Box(name, category, self._now, row, args)
+        self._open[node] = _Box(name, category, self._now, group, row, args)
 
     def _end(self, node: str, outcome: str) -> None:
         box = self._open.pop(node, None)
         if box is None:
             return  # it had begun before somebody looked
-        group = self._groups.get(node, "loop")
-        self._rows[group][box.row] = None
+        self._rows[box.group][box.row] = None
         self._write(
             ph="X",
             name=box.name,
             cat=box.category,
             pid=_GROUPS,
-            tid=self._row(group, box.row),
+            tid=self._row(box.group, box.row),
             ts=box.began,
             dur=self._now - box.began,
             args={**box.args, "outcome": outcome},
@@ -221,17 +225,17 @@ class Timeline:
         if event in self._events and box is not None:
             self._arrows += 1
             self._flying[edge, sequence] = self._arrows
-            box.arrows.append(self._arrow("s", event, self._arrows, node, box))
+            box.arrows.append(self._arrow("s", event, self._arrows, box))
 
     def _taken(self, edge: str, sequence: int) -> None:
         number = self._flying.pop((edge, sequence), None)
         node = edge.partition(" -> ")[2].rpartition(".")[0]
         box = self._open.get(node)
         if number is not None and box is not None:
-            box.arrows.append({**self._arrow("f", _source(edge)[1], number, node, box), "bp": "e"})
+            box.arrows.append({**self._arrow("f", _source(edge)[1], number, box), "bp": "e"})
 
-    def _arrow(self, phase: Literal["s", "f"], name: str, number: int, node: str, box: _Box) -> dict[str, Any]:
-        row = self._row(self._groups.get(node, "loop"), box.row)
+    def _arrow(self, phase: Literal["s", "f"], name: str, number: int, box: _Box) -> dict[str, Any]:
+        row = self._row(box.group, box.row)
         return {"ph": phase, "name": name, "cat": "event", "id": number, "pid": _GROUPS, "tid": row, "ts": self._now}
 
     # --- activity and marks -----------------------------------------------------------------------------------------

@@ -203,6 +203,7 @@ class Edits:
                 here = core.by_path.get(change.node._place.path)
                 if here is not None and here.node is change.node:
                     core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
+        engine.looked_at_anew([worker for worker, _ in how.swapped])
         for worker in come:
             core.upstairs.idle_again(worker)
 

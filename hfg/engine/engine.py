@@ -12,7 +12,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from hfg.clock import current_clock
@@ -476,6 +476,12 @@ class Engine:
             if self.ended_how is not None:
                 self.measuring.end()
         return self.measuring
+
+    def looked_at_anew(self, swapped: Sequence[Worker]) -> None:
+        """The graph was edited: who looks at it finds its places again; these workers have another node (R4)."""
+        if self.measuring is not None:
+            self.measuring.refit(swapped)
+        self.taps.find_again()
 
     def _listen(self, take: Callable[[TraceEvent], None] | None) -> None:
         """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""

@@ -152,6 +152,13 @@ class Meter:
                 worker.process = self._calls(self.code)
         self.measure_slots()
 
+    def refit(self) -> None:
+        """The worker has another node: what was measured stays, its code is measured from now on."""
+        self.code = self.worker.process
+        self.steps = None
+        self._wrapped.clear()
+        self.measure()
+
     def measure_slots(self) -> None:
         """Wrap the handlers of slots that are connected by now."""
         worker = self.worker
@@ -200,7 +207,6 @@ class Meter:
         worker = self.worker
         now = self._now
         took = self.took
-        threaded = worker.group.threaded
 
         def measured(*arguments: Any) -> Any:
             if self.left <= 0:
@@ -212,7 +218,7 @@ class Meter:
             except BaseException:
                 took(monotonic() - began)
                 raise
-            if type(result) is CoroutineType and not threaded:
+            if type(result) is CoroutineType and not worker.group.threaded:
                 return self._await(result, began, stamp)
             took(monotonic() - began, None if stamp is None else now() - stamp)
             return result

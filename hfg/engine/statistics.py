@@ -7,7 +7,7 @@ exact. Stands on `meters`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -251,6 +251,13 @@ class Measuring:
             if worker.core.started:
                 steps.choose(worker)
         return meter
+
+    def refit(self, workers: Iterable[Worker]) -> None:
+        """These workers have other nodes now: from here on the code of those is measured."""
+        for worker in workers:
+            if worker.meter is not None:
+                worker.meter.refit()
+                steps.choose(worker)
 
     def end(self) -> None:
         """The run is over."""

@@ -130,7 +130,7 @@ class Taps:
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._buffers: list[_Buffer] = []
+        self._buffers: dict[_Buffer, tuple[Any, list[tuple[Any, Look]]]] = {}  # what each looks at, and where that is
         self._looks: dict[Any, list[Look]] = {}  # by edge, event, or (worker, slot) for edges still to come
 
     def add(self, what: Any, size: int | None, max_rate_hz: Any) -> Tap:
@@ -144,16 +144,30 @@ class Taps:
             raise UsageError(f"size is how many tokens a tap keeps, 1 or more, got {size!r}")
         if max_rate_hz is not None and not (isinstance(max_rate_hz, int | float) and max_rate_hz > 0):
             raise UsageError(f"max_rate_hz is how many tokens a second a tap gives at most, got {max_rate_hz!r}")
-        places = self._places(self._by_path(what) if isinstance(what, str) else what)
+        what = self._by_path(what) if isinstance(what, str) else what
+        places = self._places(what)
         buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1))
+        self._attach(buffer, what, places)
+        if self._engine.core.over:
+            buffer.end()
+        return Tap(buffer, max_rate_hz, partial(self._remove, buffer))
+
+    def find_again(self) -> None:
+        """The graph was edited: what is looked at may be elsewhere, or nowhere for now (R4)."""
+        for buffer, (what, _) in list(self._buffers.items()):
+            self._remove(buffer)
+            try:
+                places = self._places(what)
+            except (GraphError, UsageError):
+                places = []
+            self._attach(buffer, what, places)
+
+    def _attach(self, buffer: _Buffer, what: Any, places: list[tuple[Any, list[Any]]]) -> None:
         looks = [(place, _first_live(group, place, buffer.put) if group else buffer.put) for place, group in places]
+        self._buffers[buffer] = (what, looks)
         for place, look in looks:
             self._looks.setdefault(place, []).append(look)
             self._install(place)
-        self._buffers.append(buffer)
-        if self._engine.core.over:
-            buffer.end()
-        return Tap(buffer, max_rate_hz, partial(self._remove, buffer, looks))
 
     def adopt(self, edge: Any) -> None:
         """An edge into a slot was made while the graph runs: whoever looks at the slot looks at it too."""
@@ -166,12 +180,9 @@ class Taps:
         for buffer in self._buffers:
             buffer.end()
 
-    def _remove(self, buffer: _Buffer, looks: list[tuple[Any, Look]]) -> None:
-        if buffer not in self._buffers:
-            return
-        self._buffers.remove(buffer)
-        gone = [look for _, look in looks]
-        for place in list(self._looks):
+    def _remove(self, buffer: _Buffer) -> None:
+        gone = [look for _, look in self._buffers.pop(buffer, (None, []))[1]]
+        for place in list(self._looks) if gone else ():
             left = [look for look in self._looks[place] if look not in gone]
             if len(left) != len(self._looks[place]):
                 self._looks[place] = left

@@ -11,6 +11,7 @@ import msgspec
 import pytest
 
 import hfg
+from hfg import commands
 from hfg.engine.meters import BATCH, KEPT, Distribution
 from hfg.testing import Recorder
 
@@ -364,3 +365,33 @@ def test_percentiles_are_right_within_seven_percent(scale: float) -> None:
     assert slow == pytest.approx(scale * 0.99, rel=0.07)
     assert distribution.longest == scale
     assert distribution.mean == pytest.approx(scale * 0.5005)
+
+
+@hfg.node
+def twice(value: int) -> int:
+    """Another function with the same ports."""
+    return value * 2
+
+
+@pytest.mark.rule("R4")
+@pytest.mark.parametrize("fast", [True, False])
+def test_a_node_that_takes_the_place_of_another_is_measured_and_runs_its_own_code(fast: bool) -> None:
+    seen: list[int] = []
+
+    @hfg.node
+    def keep(value: int) -> None:
+        """Keep."""
+        seen.append(value)
+
+    async def main() -> hfg.Statistics:
+        async with hfg.running(line(work(), keep(), rate=10, count=6), fast=fast) as run:
+            run.statistics()
+            await asyncio.sleep(0.25)
+            await run.edit(commands.Replace("work", f"{__name__}:twice"))
+            await run.wait_finished()
+            return run.statistics()
+
+    statistics = drive(main)
+    assert seen == [0, 1, 2, 6, 8, 10]
+    (path,) = [path for path in statistics.nodes if path not in ("source", "keep")]
+    assert statistics.nodes[path].busy.count == 6

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import pytest
 
 import hfg
+from hfg import commands
 from hfg.engine.run import Run
 from hfg.testing.nodes import Relay, script
 
@@ -306,3 +307,21 @@ def test_a_tap_inside_an_iteration_sees_the_elements() -> None:
             return [token.value async for token in tap]
 
     assert drive(main) == [1, 2, 3]
+
+
+@pytest.mark.rule("R4")
+def test_a_tap_follows_its_port_through_edits_of_the_graph() -> None:
+    async def main() -> tuple[list[Any], list[Any]]:
+        graph = pipeline(8)
+        async with hfg.running(graph) as run:
+            out, value = run.tap("forward.out"), run.tap("keep.value")
+            await asyncio.sleep(0.15)
+            await run.edit(commands.Disconnect("forward.out", "keep.value"))
+            await asyncio.sleep(0.2)
+            await run.edit(commands.Connect("forward.out", "keep.value"), commands.Rename("keep", "kept"))
+            await run.wait_finished()
+            return [[token.value async for token in tap] for tap in (out, value)]  # type: ignore[return-value]
+
+    out, value = drive(main)
+    assert out == [1, 2, 3, 4, 5, 6, 7, 8, hfg.END]
+    assert value == [1, 2, 5, 6, 7, 8, hfg.END]
