@@ -17,7 +17,6 @@ TESTS = Path(__file__).resolve().parent
 SEMANTICS = (TESTS.parent / "docs" / "semantics.md").read_text(encoding="utf-8")
 
 LATER = {
-    "R4": "a graph cannot be edited while it runs yet",
     "L1": "there is no transport yet",
     "L2": "there is no transport yet",
     "L3": "there is no transport yet",
