@@ -89,8 +89,10 @@ def _choose(worker: Worker) -> None:
             worker.step = watched.generator_step(worker, outs[0]) if traced else _generator_step(worker, outs[0])
         return
     if len(outs) > 1 or len(worker.in_edges) > 1 or any(type(edge) is EventEdge for edge in worker.in_edges):
-        if not traced and worker.meter is None:
-            worker.step = _wide(worker, tuple(outs))
+        if not traced:
+            worker.step = wide = _wide(worker, tuple(outs))
+            if worker.meter is not None and wide is not firing.step:
+                worker.step = watched.general_step(worker, wide)
         return
     if (
         len(worker.in_edges) == 1
@@ -112,8 +114,6 @@ def _choose(worker: Worker) -> None:
                     worker.step = quick
                 if traced or worker.meter is not None:
                     worker.step = watched.through_step(worker, edge, given, quick)
-                if quick is not None and worker.meter is not None:
-                    worker.meter.steps = (quick, worker.step)
             elif not traced:
                 worker.step = _async_step(worker, edge, given)
 

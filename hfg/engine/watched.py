@@ -21,7 +21,7 @@ from hfg.ports.edges import SyncEdge
 from hfg.token import Token
 from hfg.trace import FiringEnded, FiringStarted, TokenProcessed, TokenSent, TokenTaken
 
-__all__ = ["generator_step", "through_step"]
+__all__ = ["general_step", "generator_step", "through_step"]
 
 Step = Callable[[Worker], None]
 
@@ -145,6 +145,24 @@ def through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None, quick:
         else:
             release(only)
 
+    if quick is not None and meter is not None:
+        meter.steps = (quick, step)
+    return step
+
+
+def general_step(worker: Worker, quick: Step) -> Step:
+    """The general way, in which the wrapped code is measured, until enough is; then `quick`."""
+    meter = worker.meter
+    general = firing.step
+
+    def step(worker: Worker) -> None:
+        if meter.left <= 0 and worker.step is step:
+            worker.step = quick
+            quick(worker)
+        else:
+            general(worker)
+
+    meter.steps = (quick, step)
     return step
 
 

@@ -395,3 +395,16 @@ def test_a_node_that_takes_the_place_of_another_is_measured_and_runs_its_own_cod
     assert seen == [0, 1, 2, 6, 8, 10]
     (path,) = [path for path in statistics.nodes if path not in ("source", "keep")]
     assert statistics.nodes[path].busy.count == 6
+
+
+def test_joins_and_forks_are_measured_without_losing_their_short_ways() -> None:
+    graph = hfg.Graph("diamond")
+    source, left, right, join = graph.add(numbers(count=500)), graph.add(twice()), graph.add(twice()), graph.add(add())
+    for node, port in ((left, join.left), (right, join.right)):
+        graph.connect(source.out, node.ports.inputs["value"])
+        graph.connect(node.out, port)
+    graph.connect(join.out, graph.add(end()).value)
+    statistics = final(graph)
+    node = statistics.nodes["add"]
+    assert node.processed == 500
+    assert BATCH <= node.busy.count == node.latency.count < 500
