@@ -16,7 +16,7 @@ from pathlib import Path
 
 from benchmarks.measure import Record, here, machine, measure, write
 
-SUITES = ("bench_kinds", "bench_shape", "bench_threads", "bench_virtual_day")
+SUITES = ("bench_kinds", "bench_live", "bench_observers", "bench_shape", "bench_threads", "bench_virtual_day")
 OTHERS = ("bench_peers",)
 
 

@@ -59,7 +59,8 @@ def parameters(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def _nodes(ctx: typer.Context) -> list[tuple[str, Node]]:
-    target = ctx.params.get("target")
+    # An option without its value yet, as here, keeps typer from sorting out what stands before it.
+    target = ctx.params.get("target") or next(iter(ctx.args), "")
     if not target:
         return []
     try:

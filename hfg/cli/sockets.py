@@ -149,13 +149,16 @@ def runs() -> list[Answer]:
     Sockets that dead processes have left are removed.
     """
     found = []
-    for file in sorted(folder().glob("*.sock"), key=lambda file: (len(file.stem), file.stem)):
-        if not file.stem.isdecimal():
-            continue
-        pid = int(file.stem)
+    for pid in sorted(_sockets(folder())):
         with contextlib.suppress(TargetError), Line(pid) as line:
-            found.append(line.ask("name") or Answer(pid=pid, graph="(does not answer)"))
+            answer = line.ask("name") or Answer(graph="(does not answer)")
+            found.append(msgspec.structs.replace(answer, pid=pid))
     return found
+
+
+def _sockets(place: Path) -> dict[int, Path]:
+    """What lies there for each process; nothing else in the folder is ours."""
+    return {int(file.stem): file for file in place.glob("*.sock") if file.stem.isdecimal() and file.is_socket()}
 
 
 class Door:
@@ -208,8 +211,8 @@ async def open_door(graph: str, target: str) -> AsyncIterator[Door]:
 def _listen() -> tuple[Path, socket.socket]:
     """A socket that listens, under its name only when it does: so who is refused there can be removed."""
     runs_here = folder()
-    for file in runs_here.glob("*.sock"):
-        _remove_if_dead(file)
+    for other in _sockets(runs_here).values():
+        _remove_if_dead(other)
     file = runs_here / f"{os.getpid()}.sock"
     new = file.with_suffix(".new")
     new.unlink(missing_ok=True)

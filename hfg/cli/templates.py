@@ -11,9 +11,8 @@ NODE: Final = '''\
 
 from __future__ import annotations
 
-from annotated_types import Ge
-
 import hfg
+from annotated_types import Ge
 
 __all__ = ["{Name}"]
 

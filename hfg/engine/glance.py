@@ -87,7 +87,7 @@ def glance(run: Run) -> Glance:
     return Glance(
         graph=run.graph.name,
         outcome="paused" if run.paused and engine.outcome == "running" else engine.outcome,
-        duration_s=now - (engine.started_at or now),
+        duration_s=now - engine.started_at if engine.core.started else 0.0,
         machine_s=time.monotonic(),
         nodes=nodes,
     )

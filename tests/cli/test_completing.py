@@ -1,0 +1,59 @@
+"""What the Tab key offers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Command
+
+Tab = Callable[[str], list[str]]
+
+
+@pytest.fixture
+def tab(command: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Tab:
+    """Press Tab at the end of a line, as zsh asks for it."""
+
+    def press(line: str) -> list[str]:
+        monkeypatch.setenv("_HFG_COMPLETE", "complete_fish")
+        monkeypatch.setenv("_TYPER_COMPLETE_FISH_ACTION", "get-args")
+        monkeypatch.setenv("_TYPER_COMPLETE_ARGS", line)
+        with pytest.raises(SystemExit):
+            command()
+        return [offer.partition("\t")[0] for offer in capsys.readouterr().out.split("\n") if offer]
+
+    return press
+
+
+def test_verbs_and_options(tab: Tab) -> None:
+    assert tab("hfg t") == ["tap", "top"]
+    assert "--trace" in tab("hfg run steps.py --t")
+
+
+def test_files_and_the_graphs_in_them_without_running_them(tab: Tab) -> None:
+    Path("loud.py").write_text("raise SystemExit('never run')\ngraph = hfg.Graph('loud')\n_own = Graph()\n")
+    Path("broken.py").write_text("def (")
+    Path("folder").mkdir()
+    assert tab("hfg run ") == ["broken.py", "folder/", "loud.py", "steps.py"]
+    assert tab("hfg run st") == ["steps.py"]
+    assert tab("hfg run steps.py") == ["steps.py:build"]
+    assert tab("hfg check loud.py:gr") == ["loud.py:graph"]
+    assert tab("hfg run broken.py") == []
+    assert tab("hfg run nowhere/x") == []
+
+
+def test_ports_and_parameters_of_the_target(tab: Tab) -> None:
+    assert tab("hfg tap steps.py:build st") == ["steps.out"]
+    assert tab("hfg tap steps.py:build ear.") == ["ear.rang", "ear.quiet", "ear.heard", "ear.begin"]
+    assert tab("hfg run steps.py:build --param st") == ["steps.count="]
+    assert tab("hfg tap nowhere.py x") == []
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_for_a_shell_can_be_shown(command: Command, capsys: pytest.CaptureFixture[str], shell: str) -> None:
+    with pytest.raises(SystemExit) as left:
+        command("--show-completion", shell)
+    assert not left.value.code
+    assert "_HFG_COMPLETE" in capsys.readouterr().out
