@@ -90,7 +90,11 @@ def _end(graph: Graph, path: str, kinds: tuple[str, ...]) -> Any:
     port, inner, rest = name.partition(".")
     if rest != ("inner" if inner else ""):
         raise GraphError(f'there is no "{path}": behind a port only ".inner" may follow')
-    node = node_at(graph, node_path)
+    try:
+        node = node_at(graph, node_path)
+    except GraphError:
+        find(graph, path)  # says the same of the whole path
+        raise
     found = candidates(node, port)
     if inner:
         relays = [one for one in found if is_box(node) and one.kind not in kinds and one.kind != "parameter"]
