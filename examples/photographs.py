@@ -5,8 +5,9 @@
 
 Shown: a library's functions as nodes, thread groups, a join, active edges in place of a state machine, and a gate on a
 subgraph: the expensive measure works only while `measuring` is active. `python examples/photographs.py [FOLDER]` runs
-it with the gate and without, tells what the gate saved, and draws the findings into FOLDER (default: out). As every
-graph, it also runs by `hfg run examples/photographs.py -v`. The photographs are those that come with scikit-image.
+it with the gate and without and tells what the gate saved, then once more and changes a parameter on the way. On a
+terminal a table shows what the nodes do; pictures of the findings and a timeline go into FOLDER (default: out). As
+every graph, it also runs by `hfg run examples/photographs.py -v`. The photographs come with scikit-image.
 """
 
 from __future__ import annotations
@@ -15,16 +16,21 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import cv2
 import numpy as np
 import skimage.data
 from annotated_types import Ge, Interval
+from reactivex import operators
 
 import hfg
+from hfg.cli.live import live_table
+from hfg.timeline import Timeline
 from hfg.trace import ActivityChanged, FiringStarted, TokenSent, TraceEvent
 from hfg.types import Image
+
+Clock = Literal["real", "virtual"]
 
 cv2.setNumThreads(1)  # the groups bring the parallelism
 
@@ -308,12 +314,12 @@ def summarize(looks: list[Measured]) -> Summary:
 
 
 def describe(summary: Summary) -> str:
-    found = []
+    found, means = [], "one look" if summary.looks == 1 else f"means of {summary.looks} looks"
     if summary.circles:
         found.append(f"{summary.circles} circles, {summary.diameter:.1f} px across on average")
     if summary.lines:
         found.append(f"{summary.lines} lines of text, {summary.spacing:.0f} px apart")
-    return f"{summary.name}: {' and '.join(found)}; sharpness {summary.sharpness:.0f} (means of {summary.looks} looks)"
+    return f"{summary.name}: {' and '.join(found)}; sharpness {summary.sharpness:.0f} ({means})"
 
 
 def draw(look: Measured, summary: Summary) -> Image:
@@ -328,19 +334,44 @@ def draw(look: Measured, summary: Summary) -> Image:
     return np.vstack([big, caption])
 
 
-# --- Two runs, and what happened in them.
+# --- Runs, and what happened in them.
 
 
-def watch(*, gated: bool, folder: str) -> tuple[int, float]:
-    """Run the graph and show what was active when; gives how often `clean` worked, and the CPU seconds of the run."""
-    graph = build(gated=gated, folder=folder)
+class Watched(NamedTuple):
+    """What a run found, everything that happened in it, and the CPU seconds it took."""
+
+    summaries: list[Summary]
+    events: list[TraceEvent]
+    cpu_s: float
+
+    @property
+    def cleaned(self) -> int:
+        """How often `clean` worked."""
+        firings = [one for one in self.events if isinstance(one, FiringStarted) and one.node == "measure/clean"]
+        return sum(one.kind == "process" for one in firings)
+
+
+def watch(graph: hfg.Graph, *, file: Path | None = None, hurry: bool = False, clock: Clock = "real") -> Watched:
+    """Run the graph under a table of its nodes.
+
+    With a file, write a timeline into it; in a hurry, let one look be enough after the first report: a parameter is
+    changed while the graph runs.
+    """
     events: list[TraceEvent] = []
-    began = time.process_time()
-    hfg.run(graph, trace=events.append)
-    cpu_s = time.process_time() - began
-    print(timeline(events))
-    firings = [event.kind for event in events if isinstance(event, FiringStarted) and event.node == "measure/clean"]
-    return firings.count("process"), cpu_s
+    with live_table(clock == "real") as live:
+
+        def begin(run: hfg.Run) -> None:
+            live.begin(run)
+            run.trace(events)
+            if file is not None:
+                run.trace(Timeline(file, graph))
+            if hurry:
+                first = graph["report"].done.pipe(operators.take(1))
+                first.subscribe(lambda _: run.set(graph["measuring.looks"], 1))
+
+        began = time.process_time()
+        report = hfg.run(graph, clock=clock, begin=begin)
+    return Watched(report.outputs["reports"], events, time.process_time() - began)
 
 
 def timeline(events: list[TraceEvent], columns: int = 80) -> str:
@@ -366,16 +397,24 @@ def timeline(events: list[TraceEvent], columns: int = 80) -> str:
 
 
 def main(folder: str = "out") -> None:
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    file = Path(folder, "photographs.json")
     print("With the gate: `measure` works only while `measuring` is active.\n")
-    firings, cpu_s = watch(gated=True, folder=folder)
+    gated = watch(build(folder=folder), file=file)
+    print(timeline(gated.events))
     print("\nWithout it: the same is found, but every picture is measured.\n")
-    firings_ungated, cpu_s_ungated = watch(gated=False, folder="")
+    free = watch(build(gated=False))
+    print(timeline(free.events))
+    print("\nWith it, and steered: after the first report `measuring.looks` is set to 1 while the graph runs.\n")
+    steered = watch(build(), hurry=True)
+    print(timeline(steered.events))
     print(f"""
-                         with the gate   without   saved
-  firings of clean       {firings:13}{firings_ungated:10}{1 - firings / firings_ungated:8.0%}
-  CPU seconds of the run {cpu_s:13.2f}{cpu_s_ungated:10.2f}{1 - cpu_s / cpu_s_ungated:8.0%}
+                         with the gate   without   saved    steered
+  firings of clean       {gated.cleaned:13}{free.cleaned:10}{1 - gated.cleaned / free.cleaned:8.0%}{steered.cleaned:11}
+  CPU seconds of the run {gated.cpu_s:13.2f}{free.cpu_s:10.2f}{1 - gated.cpu_s / free.cpu_s:8.0%}{steered.cpu_s:11.2f}
 
-Pictures of the findings are in {folder}/.""")
+Pictures of the findings are in {folder}/. Open {file} in https://ui.perfetto.dev:
+a timeline of the first run, with a row for each group, who was active, and the signals between them.""")
 
 
 if __name__ == "__main__":

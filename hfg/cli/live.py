@@ -21,9 +21,9 @@ EVERY_S: Final = 0.25
 
 
 class Live:
-    """Draws one run, from `begin` until `end`."""
+    """Draws one run, from `begin` until `end`; without a foot, nothing."""
 
-    def __init__(self, foot: Foot) -> None:
+    def __init__(self, foot: Foot | None) -> None:
         self._foot = foot
         self._view = View()
         self._run: Run | None = None
@@ -31,13 +31,15 @@ class Live:
 
     def begin(self, run: Run) -> None:
         """Draw this run from now on; to be called on its loop."""
-        self._run = run
-        self._view.look(glance(run))  # measuring begins, and rates have something to begin with
-        self._again()
+        if self._foot is not None:
+            self._run = run
+            self._view = View()
+            self._view.look(glance(run))  # measuring begins, and rates have something to begin with
+            self._again()
 
     def refresh(self) -> None:
         """Look and draw, unless the terminal takes nothing at the moment."""
-        if self._run is not None and self._foot.is_ready():
+        if self._run is not None and self._foot is not None and self._foot.is_ready():
             self._view.look(glance(self._run))
             columns, height = self._foot.size()
             self._foot.draw(self._view.lines(columns, height, coloured=self._foot.coloured))
@@ -56,10 +58,16 @@ class Live:
 
 
 @contextmanager
-def live_table(wanted: bool) -> Iterator[Live | None]:
-    """A table below what is printed inside the block; None where there is no terminal for it."""
+def live_table(wanted: bool = True) -> Iterator[Live]:
+    """Keep a table below what is printed inside the block; where there is no terminal for it, nothing happens.
+
+    Example:
+      >>> import hfg
+      >>> with live_table() as live:
+      ...     report = hfg.run(hfg.Graph(), begin=live.begin)
+    """
     if not wanted or not is_terminal(sys.stdout, sys.stderr):
-        yield None
+        yield Live(None)
         return
     foot = Foot(sys.stderr)
     live = Live(foot)

@@ -66,7 +66,7 @@ def run(
         live_table(table and not json and clock is Clock.real) as live,
     ):
         options = {"until_s": until, "debug": debug, "policy": policy, "seed": seed, "trace": write}
-        report, error = execute(graph, target, clock, interrupt, live.begin if live else None, **options)
+        report, error = execute(graph, target, clock, interrupt, live.begin, **options)
     if json and report is not None:
         show.json(report)
     if interrupt.count:

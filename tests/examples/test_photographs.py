@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
-import hfg
 from examples import photographs
-from hfg.trace import ActivityChanged, FiringStarted, TraceEvent
+from hfg.trace import ActivityChanged, FiringStarted, ParameterSet, TraceEvent
 
 EVERYTHING = {"coins": (24, 0), "page": (0, 7)}
 
 
 def watch(*, gated: bool, folder: str = "") -> tuple[list[photographs.Summary], list[TraceEvent]]:
-    events: list[TraceEvent] = []
-    report = hfg.run(photographs.build(gated=gated, folder=folder), clock="virtual", trace=events.append)
-    assert report.outcome == "done"
-    return report.outputs["reports"], events
+    watched = photographs.watch(photographs.build(gated=gated, folder=folder), clock="virtual")
+    return watched.summaries, watched.events
 
 
 def found(summaries: list[photographs.Summary]) -> dict[str, tuple[int, int]]:
@@ -25,8 +23,7 @@ def found(summaries: list[photographs.Summary]) -> dict[str, tuple[int, int]]:
 
 
 def cleaned(events: list[TraceEvent]) -> int:
-    firings = [event for event in events if isinstance(event, FiringStarted) and event.node == "measure/clean"]
-    return sum(event.kind == "process" for event in firings)
+    return photographs.Watched([], events, 0.0).cleaned
 
 
 def looked_at(events: list[TraceEvent]) -> int:
@@ -61,3 +58,16 @@ def test_timeline_shows_each_state_and_each_photograph() -> None:
     for row in (search, measuring, report):
         assert "━" in row
     assert seconds.split() == ["0", "s", "3.0", "s"]
+
+
+@pytest.mark.rule("P8")
+def test_in_a_hurry_one_look_is_enough_after_the_first_report_and_the_timeline_has_all_groups(tmp_path: Path) -> None:
+    file = tmp_path / "run.json"
+    steered = photographs.watch(photographs.build(), file=file, hurry=True, clock="virtual")
+    assert [summary.looks for summary in steered.summaries] == [3, 1]
+    assert found(steered.summaries) == EVERYTHING
+    assert "(one look)" in photographs.describe(steered.summaries[1])
+    (changed,) = [event for event in steered.events if isinstance(event, ParameterSet)]
+    assert (changed.node, changed.parameter, changed.value) == ("measuring", "looks", 1)
+    rows = {event["args"]["name"] for event in json.loads(file.read_text()) if event["name"] == "thread_name"}
+    assert {"camera", "circles", "lines", "measure", "loop"} <= rows
