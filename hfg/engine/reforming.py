@@ -79,6 +79,7 @@ class _Reforming:
         for edge, said in how.edges:
             flat.edges[edge.index] = said
             said.index = edge.index
+            edge.via = tuple(core.scopes[scope] for scope in said.via)
             self._say(edge, said)
         for edge in sorted(how.lost, key=lambda one: -one.index):
             del core.edges[edge.index], flat.edges[edge.index]
@@ -102,6 +103,9 @@ class _Reforming:
         for edge, flat_edge in new:
             plan.wire(edge, flat_edge)
             self.touched |= {edge.source: None, edge.target: None}
+        for scope in core.scopes:
+            if scope.watched:
+                scope.find_inner_edges()
         return new
 
     def _boundary(self) -> Worker:

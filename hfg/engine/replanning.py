@@ -7,30 +7,27 @@ only; `reforming` does it. Stands on `plan`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
 
 from hfg.engine.core import Core
+from hfg.engine.rerouting import reroute
 from hfg.engine.worker import Worker
 from hfg.errors import UsageError
 from hfg.graph import Graph
-from hfg.graph.boxes import is_box, iterated
+from hfg.graph.boxes import iterated
 from hfg.graph.changes import (
     Change,
     EdgeChange,
-    EdgeSwap,
     NodeChange,
     NodeSwap,
     OptionsChange,
     ParameterChange,
     Renaming,
 )
-from hfg.graph.edges import Edge as DrawnEdge
-from hfg.graph.edges import is_feed
-from hfg.graph.flat import ROOT, End, FlatEdge, FlatGraph, FlatNode, flatten
-from hfg.ports import InnerSource, InnerTarget
+from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode, flatten
 from hfg.ports.edges import SyncEdge
 
 __all__ = ["Replan", "closes_a_ring", "replan"]
@@ -82,9 +79,14 @@ def replan(core: Core, flat: FlatGraph, changes: Sequence[Change]) -> Replan:
     """
     for change in changes:
         _refuse_iterating(change)
-    found = _few_edges(core, flat, changes)
-    if found is None:
+    few = reroute(core, flat, changes)
+    if few is None:
         found = _whole(core, flat, changes)
+    else:
+        found = Replan(flat, whole=False, edges=few.edges, lost=few.lost, new=few.new, spots=few.spots)
+    for edge, said in found.edges:
+        if edge.active != said.active:
+            found.touched += [edge.source, edge.target]
     touched = dict.fromkeys(found.touched)
     for edge in found.lost:
         touched |= dict.fromkeys((edge.source, edge.target))
@@ -100,119 +102,6 @@ def replan(core: Core, flat: FlatGraph, changes: Sequence[Change]) -> Replan:
     touched |= dict.fromkeys((*found.gone, *(worker for worker, _ in found.swapped)))
     found.touched = [worker for worker in touched if worker.node is not None and worker.scope is None]
     return found
-
-
-# --- a few edges ---
-
-
-def _few_edges(core: Core, flat: FlatGraph, changes: Sequence[Change]) -> Replan | None:
-    """Edges between plain nodes, drawn or rubbed out, and what needs no new plan at all; else None."""
-    drawn: dict[DrawnEdge, bool] = {}  # whether it comes or goes
-    swaps: dict[DrawnEdge, DrawnEdge] = {}
-    for change in changes:
-        if isinstance(change, EdgeChange) and change.for_good and _is_plain(change.edge):
-            if drawn.pop(change.edge, change.added) is not change.added:
-                continue  # it came and went
-            drawn[change.edge] = change.added
-        elif isinstance(change, EdgeSwap) and _is_plain(change.new) and _is_plain(change.old):
-            if (change.old.source, change.old.target) != (change.new.source, change.new.target):
-                return None
-            if change.old in drawn:
-                return None
-            swaps[change.old] = change.new
-        elif isinstance(change, OptionsChange):
-            if change.before.group != change.after.group:
-                return None
-        elif not isinstance(change, ParameterChange):
-            return None
-    found = Replan(flat, whole=False)
-    at = {edge.segments[0]: edge.index for edge in flat.edges} if drawn or swaps else {}
-    for old, new in _final(swaps):
-        index = at.get(old)
-        if index is None or len(flat.edges[index].segments) > 1:
-            return None
-        said = msgspec.structs.replace(flat.edges[index], active=new.active, segments=(new,))
-        found.edges.append((core.edges[index], said))
-        at[new] = index
-        found.touched += [core.edges[index].source, core.edges[index].target]
-    for edge, comes in drawn.items():
-        if comes:
-            continue
-        index = at.get(edge)
-        if index is None or len(flat.edges[index].segments) > 1:
-            return None
-        found.lost.append(core.edges[index])
-    nodes = {node.node: node for node in flat.nodes} if any(drawn.values()) else {}
-    labels = {edge.label for edge in flat.edges} if core.scopes and any(drawn.values()) else set()
-    spots = []
-    for edge, comes in drawn.items():
-        if comes:
-            source, target = _end(edge.source, nodes, flat), _end(edge.target, nodes, flat)
-            spot = _spot(edge, flat, at)
-            if source is None or target is None or spot is None or edge.label in labels:
-                return None
-            spots.append((*spot, _flat_edge(edge, source, target)))
-    spots.sort(key=lambda one: one[:2])
-    found.new = [edge for _, _, edge in spots]
-    found.spots = [spot for spot, _, _ in spots]
-    return found
-
-
-def _final(swaps: dict[DrawnEdge, DrawnEdge]) -> Iterable[tuple[DrawnEdge, DrawnEdge]]:
-    """An edge that was exchanged twice is exchanged for the last."""
-    seconds = set(swaps.values())
-    for old, first in swaps.items():
-        if old in seconds:
-            continue
-        new = first
-        while new in swaps and swaps[new] is not old:
-            new = swaps[new]
-        yield old, new
-
-
-def _is_plain(edge: DrawnEdge) -> bool:
-    """Whether it is one edge of the flat graph: both ends at nodes that are no subgraphs, or at the whole graph."""
-    return not any(
-        is_feed(end) or isinstance(end, InnerSource | InnerTarget) or is_box(end.node)
-        for end in (edge.source, edge.target)
-    )
-
-
-def _end(port: Any, nodes: dict[Any, FlatNode], flat: FlatGraph) -> End | None:
-    if port.node is flat.graph:
-        return End(ROOT, port.kind, port.name, port)
-    node = nodes.get(port.node)
-    return None if node is None else End(node.index, port.kind, port.name, port)
-
-
-def _flat_edge(edge: DrawnEdge, source: End, target: End) -> FlatEdge:
-    options = edge.options
-    return FlatEdge(
-        0,
-        edge.label,
-        source,
-        target,
-        edge.active,
-        options.capacity,
-        options.overflow,
-        options.capacity_limit,
-        options.through,
-        options.initial,
-        (),
-        (edge,),
-    )
-
-
-def _spot(edge: DrawnEdge, flat: FlatGraph, at: dict[DrawnEdge, int]) -> tuple[int, int] | None:
-    """Before which edge of the flat graph a new one comes: behind that drawn before it in the same graph."""
-    home: Graph = edge.target.graph if edge.target.node is not flat.graph else edge.source.graph
-    if edge not in home.edges:
-        home = flat.graph
-    drawn = home.edges.index(edge)
-    for before in reversed(home.edges[:drawn]):
-        if before in at:
-            return at[before] + 1, drawn
-    return (0, drawn) if home is flat.graph else None
 
 
 # --- the whole ---
@@ -275,8 +164,6 @@ def _compare_edges(
             edge = same.pop(0)
             kept.add(edge)
             found.edges.append((edge, new))
-            if edge.active != new.active:
-                found.touched += [edge.source, edge.target]
         else:
             found.new.append(new)
     found.lost = [edge for edge, _ in zip(core.edges, before.edges, strict=False) if edge not in kept]

@@ -25,6 +25,7 @@ from hfg.problem import Problem
 
 __all__ = [
     "ROOT",
+    "EdgeFollower",
     "End",
     "EndKind",
     "FlatEdge",
@@ -49,7 +50,7 @@ def flatten(graph: Graph) -> FlatGraph:
                 inside = node.node._graph
                 node.iteration = FlatGraph([], [], [], graph.groups, [], inside, flat.findings)
                 waiting.append((node.iteration, f"{node.path}/", node.options.group or "loop"))
-        _Edges(flat, levels).collect()
+        EdgeFollower(flat, levels).collect()
     return whole
 
 
@@ -92,8 +93,8 @@ def _collect_nodes(flat: FlatGraph, prefix: str, group: str) -> list[_Level]:
     return levels
 
 
-class _Edges:
-    """Follows edges from end to end."""
+class EdgeFollower:
+    """Follows drawn edges from end to end."""
 
     def __init__(self, flat: FlatGraph, levels: list[_Level]) -> None:
         self.flat = flat
@@ -113,7 +114,7 @@ class _Edges:
             self._find_relays()
         for level in self.levels:
             for edge in level.graph.edges:
-                self._begin(edge)
+                self.begin(edge)
         for level in self.levels:
             for gate in level.graph.gates:
                 self._gate(gate)
@@ -122,11 +123,11 @@ class _Edges:
         for level in self.levels:
             for edge in level.graph.edges:
                 self.depth_of[edge] = level.depth
-                relay = self._relay(edge.source)
+                relay = self.relay(edge.source)
                 if relay is not None:
                     self.behind.setdefault(relay, []).append(edge)
 
-    def _relay(self, end: Any) -> Any:
+    def relay(self, end: Any) -> Any:
         """Give the port of a dissolved subgraph that an end is a side of; None if edges really begin or end there."""
         if isinstance(end, InnerSource | InnerTarget):
             return end.outer if end.node in self.scope_of else None
@@ -135,12 +136,12 @@ class _Edges:
             return None
         return end if end.name in getattr(node._type, f"{end.kind}s") else None
 
-    def _begin(self, edge: Edge) -> None:
+    def begin(self, edge: Edge) -> None:
         """Follow an edge unless it begins at a relay; those are met on the way."""
         if not self.scope_of:
             self._finish(edge.source, edge.target, (edge,), ())
             return
-        if self._relay(edge.source) is not None:
+        if self.relay(edge.source) is not None:
             return
         source: Any = edge.source
         via: tuple[int, ...] = ()
@@ -154,7 +155,7 @@ class _Edges:
         while stack:
             segments, relays = stack.pop()
             target = segments[-1].target
-            relay = self._relay(target)
+            relay = self.relay(target)
             if relay is None:
                 passed = (*via, *(self.scope_of[one.node] for one in relays))
                 if isinstance(target, ParameterPort):
