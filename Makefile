@@ -14,7 +14,7 @@ PEERS   := .venv-peers
 .PHONY: help demo test lint bench bench-peers bench-docs soak setup clean
 
 help:
-	@echo "make demo    search, measure and report on real photographs, with a gate"
+	@echo "make demo    search, measure and report on real photographs, watched and steered"
 	@echo "make test    run all tests (without the long ones)"
 	@echo "make lint    ruff and mypy"
 	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md)"

@@ -63,8 +63,12 @@ def _streams() -> Iterator[None]:
         try:
             yield
             sys.stdout.flush()
-        except BrokenPipeError:
+        except OSError as error:
+            if error.filename is not None:  # of a file, not of a stream
+                raise
             os.dup2(nowhere.fileno(), sys.stdout.fileno())  # Python flushes it once more as it leaves
+            if not isinstance(error, BrokenPipeError):
+                show.sentence(f"standard output cannot be written: {error.strerror}")
             sys.exit(1)
 
 

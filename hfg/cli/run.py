@@ -5,11 +5,13 @@ Stands on `execute`, `live`, `target`, `settings`, `interrupt` and `show`.
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -86,7 +88,7 @@ def _writing(file: Path | None, graph: Graph, interrupt: Interrupt) -> Iterator[
         yield None
         return
     try:
-        stream = file.open("wb")
+        stream = _Stream(file)
     except OSError as error:
         raise TargetError(f"the trace cannot be written to {file}: {error.strerror}") from None
     with stream:
@@ -97,6 +99,35 @@ def _writing(file: Path | None, graph: Graph, interrupt: Interrupt) -> Iterator[
             return
         interrupt.before_leaving.append(stream.flush)
         yield lambda event: _write(stream.write, event)
+
+
+class _Stream(io.BufferedWriter):
+    """A file whose disk may become full: that is told once, and the run goes on."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__(io.FileIO(file, "wb"))
+        self._file = file
+        self._is_broken = False
+
+    def write(self, data: Any, /) -> int:
+        return self._try(partial(super().write, data)) or len(data)
+
+    def flush(self) -> None:
+        self._try(super().flush)
+
+    def close(self) -> None:
+        with suppress(OSError):  # told by now: it flushes first
+            super().close()
+
+    def _try(self, call: Callable[[], int | None]) -> int | None:
+        if self._is_broken:
+            return None
+        try:
+            return call()
+        except OSError as error:
+            self._is_broken = True
+            show.sentence(f"the trace in {self._file} is not whole: {error.strerror}")
+            return None
 
 
 def _write(write: Callable[[bytes], object], event: TraceEvent) -> None:

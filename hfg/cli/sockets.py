@@ -67,7 +67,7 @@ def folder() -> Path:
     if not hasattr(socket, "AF_UNIX") or not hasattr(os, "geteuid"):
         raise TargetError("runs cannot be looked at from other processes here: that needs Unix domain sockets")
     own = os.environ.get("XDG_RUNTIME_DIR")
-    place = Path(own, "hfg") if own else Path(tempfile.gettempdir(), f"hfg-{os.geteuid()}")
+    place = Path(own, "hfg") if own and Path(own).is_dir() else Path(tempfile.gettempdir(), f"hfg-{os.geteuid()}")
     try:
         with contextlib.suppress(FileExistsError):
             place.mkdir(mode=0o700)

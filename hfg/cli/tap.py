@@ -74,7 +74,7 @@ class _Printer:
     Attributes:
       seen: how many tokens have passed; known when the run is over.
       skipped: how many of them were not printed, but for those behind the limit.
-      broken: nobody reads any more.
+      broken: why nothing can be printed any more.
     """
 
     def __init__(self, path: str, limit: int | None, rate_hz: float | None, json: bool) -> None:
@@ -85,7 +85,7 @@ class _Printer:
         self._out = sys.stdout
         self.seen = 0
         self.skipped = 0
-        self.broken: BrokenPipeError | None = None
+        self.broken: OSError | None = None
 
     def begin(self, run: Run) -> Awaitable[None]:
         """Look from now on."""
@@ -106,7 +106,7 @@ class _Printer:
                     break
             else:
                 self.skipped = looking.skipped
-        except BrokenPipeError as error:  # whoever read has had enough, as in hfg tap ... | head
+        except OSError as error:  # whoever read has had enough, as in hfg tap ... | head, or the disk is full
             self.broken = error
         self.seen = looking.seen
         looking.close()

@@ -203,6 +203,16 @@ def test_trace_that_cannot_be_written(hfg: Command) -> None:
     assert (shown.code, shown.err.count("\n")) == (2, 1)
 
 
+@pytest.mark.parametrize("name", ["run.jsonl", "run.json"])
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full is needed")
+def test_trace_on_a_full_disk_is_told_once_and_the_run_goes_on(hfg: Command, name: str) -> None:
+    Path(name).symlink_to("/dev/full")
+    shown = hfg("run", TARGET, *VIRTUAL, "--trace", name)
+    assert (shown.code, shown.out) == (0, "half 0\nhalf 1\nhalf 2\n")
+    assert shown.err.startswith(f"hfg: the trace in {name} is not whole: No space left on device\n")
+    assert shown.err.count("not whole") == 1
+
+
 def test_a_node_that_fails_shows_the_users_frames_and_a_sentence(hfg: Command) -> None:
     shown = hfg("run", TARGET, *VIRTUAL, "--param", "half.divisor=0")
     assert shown.code == 1
