@@ -20,7 +20,8 @@ from hfg.engine import ports as engine_ports
 from hfg.engine.code import answer
 from hfg.engine.reforming import reform
 from hfg.engine.replanning import Replan, closes_a_ring, replan
-from hfg.engine.worker import ENDED, UNREADY, Worker
+from hfg.engine.sending import flush_automatic
+from hfg.engine.worker import ENDED, REMOVED, UNREADY, Worker
 from hfg.errors import HfgError, NodeError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.changes import Change, OptionsChange, ParameterChange, undo_all
@@ -321,6 +322,9 @@ class _Held:
         self._given_up = True
         if not self.done and self._said and core.trace is not None and not core.over:
             core.trace(StructureChanged(core.now(), ""))
+        for worker in self._workers if self.done else ():
+            if not worker.blocked & REMOVED:
+                flush_automatic(worker)  # what activity that went back has raised (A8, A9)
         letting_go, self._letting_go = self._letting_go, []
         for over in letting_go:
             over()

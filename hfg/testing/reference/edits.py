@@ -119,8 +119,9 @@ class Editing(Calling):
         for station in before.values():
             if id(station) not in here:
                 self._remove(station)
-        for change in changes:
-            self._set(change)
+        for of_boxes in (False, True):  # nodes first: then subgraphs find out who is to start afresh
+            for change in changes:
+                self._set(change, of_boxes)
         for station in self.stations:
             self._process_what_is_pipelined_now(station)
 
@@ -237,12 +238,12 @@ class Editing(Calling):
         if station.resting_until is None:  # else its back-off does it
             self.set_up(station)
 
-    def _set(self, change: Change) -> None:
+    def _set(self, change: Change, of_boxes: bool) -> None:
         """Parameters, and what is enabled (F10)."""
         if not isinstance(change, ParameterChange | OptionsChange):
             return
         owner = self._owner_of(change.node)
-        if owner is None:
+        if owner is None or is_box(owner) is not of_boxes:
             return
         if isinstance(change, ParameterChange):
             if owner >= 0:
