@@ -117,6 +117,7 @@ class Engine:
         self.holds = 0
         self.readers: list[Worker] = []
         self.read_out: set[Worker] = set()
+        self.senders: list[Worker] = []  # feeds for which somebody outside has a token, once for each
         self._quiet_waiters: list[asyncio.Future[None]] = []
         self.ended_how: tuple[str, HfgError | None] | None = None
         self.ending: asyncio.Event = asyncio.Event()
@@ -374,6 +375,8 @@ class Engine:
     def quiet(self) -> None:
         """Nothing runs, nothing can start, no timer is pending (F8, P9, F13, R5)."""
         core = self.core
+        if any(not feed.outputs.missing for feed in self.senders):
+            return  # a token is about to come
         if quiet.grow(core) or core.timers:
             return
         self._answer_quiet()

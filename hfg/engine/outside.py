@@ -75,12 +75,17 @@ class Feed:
                 f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got '
                 f"{describe(type(value))}: {value!r:.80}"
             )
-        async with self._lock:
-            await self._free()
-            _check_running(self._engine)
-            self._check_not_ended()
-            self._put(value, activity, stamp)
-            await self._free()
+        waiting = _Waiting(self._engine, self._worker)
+        try:
+            async with self._lock:
+                await self._free()
+                _check_running(self._engine)
+                self._check_not_ended()
+                self._put(value, activity, stamp)
+                waiting.over()
+                await self._free()
+        finally:
+            waiting.over()
         _check_running(self._engine)
 
     def send_from_thread(
@@ -125,6 +130,23 @@ class Feed:
             await until(self._engine, self._worker.outputs.when_complete)
             if not self._worker.outputs.missing or self._engine.core.over:
                 return
+
+
+class _Waiting:
+    """Somebody has a token for a feed: while there is a place for it, the graph is not quiet."""
+
+    def __init__(self, engine: Engine, feed: Worker) -> None:
+        self._engine = engine
+        self._feed = feed
+        engine.senders.append(feed)
+        self._is_over = False
+
+    def over(self) -> None:
+        """It was sent, or never will be."""
+        if not self._is_over:
+            self._is_over = True
+            self._engine.senders.remove(self._feed)
+            self._engine.kick()
 
 
 def need_sendable(activity: int | None, stamp: float | None) -> None:

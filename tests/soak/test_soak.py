@@ -12,7 +12,10 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis.stateful import run_state_machine_as_test
 
+from hfg.testing.machines import EngineAgainstOracle
 from hfg.testing.making import Allowed, random_plan
 
 GRAPHS = int(os.environ.get("HFG_SOAK_GRAPHS", "20000"))
@@ -53,3 +56,17 @@ def test_the_short_ways_do_the_same_as_the_general_way(block: int) -> None:
         plan = random_plan(seed, Allowed(max_nodes=5 + seed % 6))
         if suite.reference(plan, seed) is not None:
             suite.check(plan, seed, suite.short_ways_differ)
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(1800)
+def test_what_comes_from_outside_has_the_same_effect() -> None:
+    run_state_machine_as_test(  # type: ignore[no-untyped-call]
+        EngineAgainstOracle,
+        settings=settings(
+            max_examples=max(1, GRAPHS // 40),
+            stateful_step_count=12,
+            deadline=None,
+            suppress_health_check=list(HealthCheck),
+        ),
+    )
