@@ -29,6 +29,7 @@ __all__ = ["Interrupt"]
 _ALIKE = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 _BREAK_IN_AFTER_S = 0.6
 _LEAVE_AFTER_S = 1.8
+_LEAVE_WITHIN_S = 0.3
 
 
 class Interrupt:
@@ -130,6 +131,9 @@ class Interrupt:
         self._leave("interrupted: something did not come back in time and was left behind, not everything is torn down")
 
     def _leave(self, sentence: str) -> None:
+        deadline = threading.Timer(_LEAVE_WITHIN_S, os._exit, (1,))  # should a terminal or disk not take what we write
+        deadline.daemon = True
+        deadline.start()
         for call in self.before_leaving:
             with suppress(ValueError, OSError):  # closed already, or the disk is full: nothing keeps us here
                 call()

@@ -49,6 +49,11 @@ class Live:
         if self._timer is not None:
             self._timer.cancel()
 
+    def leave(self) -> None:
+        """The process is about to be left: take the table away, from whatever thread."""
+        if self._foot is not None:
+            self._foot.leave()
+
     def _again(self) -> None:
         self._timer = asyncio.get_running_loop().call_later(EVERY_S, self._tick)
 

@@ -67,6 +67,7 @@ def run(
         _writing(trace, graph, interrupt) as write,
         live_table(table and not json and clock is Clock.real) as live,
     ):
+        interrupt.before_leaving.append(live.leave)
         options = {"until_s": until, "debug": debug, "policy": policy, "seed": seed, "trace": write}
         report, error = execute(graph, target, clock, interrupt, live.begin, **options)
     if json and report is not None:

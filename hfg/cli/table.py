@@ -118,7 +118,7 @@ class View:
     def _head(self, rows: list[Row], paint: _Paint) -> list[str]:
         glance = self._glances[-1][0]
         errors = sum(row.errors for row in rows)
-        told = [glance.graph, glance.outcome, f"{glance.duration_s:.1f} s", f"{len(rows)} nodes"]
+        told = [glance.graph, glance.outcome, f"{glance.duration_s:.1f} s", _count(len(rows), "node")]
         lines = [paint("  ".join([*told, *([_count(errors, "error")] if errors else [])]), _BOLD)]
         active = [row.path for row in rows if row.active]
         if active:

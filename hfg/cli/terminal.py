@@ -84,6 +84,15 @@ class Foot:
                 self._write(f"{self._up()}\x1b[J")
                 self._lines = ()
 
+    def leave(self) -> None:
+        """Take the lines away for good; waits for nobody who draws at the moment."""
+        if self._lock.acquire(timeout=0.1):
+            try:
+                self.clear()
+            finally:
+                self._lock.release()
+        self._gone = True
+
     @contextmanager
     def beneath(self) -> Iterator[None]:
         """Inside the block, keep the lines below what is written to standard output and standard error."""

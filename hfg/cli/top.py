@@ -106,7 +106,9 @@ def _watch(line: Line) -> None:
                 glance = newest
             elif glance is not None:
                 glance = msgspec.structs.replace(glance, outcome="does not answer: a node blocks its loop")
-            if glance is not None and foot.is_ready():
+            if glance is None:
+                foot.draw(["no answer yet: a node blocks its loop"])
+            elif foot.is_ready():
                 view.look(glance)
                 columns, height = foot.size()
                 foot.draw(view.lines(columns, height, coloured=foot.coloured))

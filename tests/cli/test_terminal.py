@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -130,3 +131,28 @@ def test_no_color_is_heeded(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> 
     assert not Foot(screen).coloured
     monkeypatch.setenv("NO_COLOR", "")
     assert Foot(screen).coloured
+
+
+def test_whoever_leaves_at_once_leaves_no_lines_and_waits_for_nobody(screen: Screen) -> None:
+    with table_on(screen) as foot:
+        drawing, done = threading.Event(), threading.Event()
+
+        def draw() -> None:
+            with foot._lock:
+                drawing.set()
+                done.wait(10)
+
+        thread = threading.Thread(target=draw)
+        thread.start()
+        drawing.wait(10)
+        foot.leave()  # somebody draws at the moment, and the terminal does not take it
+        done.set()
+        thread.join()
+        foot.draw(["again"])
+        assert screen.shown == ["table"]
+    other = Screen()
+    foot = Foot(other)
+    foot.draw(["table"])
+    foot.leave()
+    foot.draw(["again"])
+    assert other.shown == [""]
