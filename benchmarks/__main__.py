@@ -16,7 +16,15 @@ from pathlib import Path
 
 from benchmarks.measure import Record, here, machine, measure, write
 
-SUITES = ("bench_kinds", "bench_live", "bench_observers", "bench_shape", "bench_threads", "bench_virtual_day")
+SUITES = (
+    "bench_edits",
+    "bench_kinds",
+    "bench_live",
+    "bench_observers",
+    "bench_shape",
+    "bench_threads",
+    "bench_virtual_day",
+)
 OTHERS = ("bench_peers",)
 
 

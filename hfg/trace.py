@@ -213,7 +213,8 @@ class EditWaits(TraceEvent, frozen=True):
 class StructureChanged(TraceEvent, frozen=True):
     """The graph is another from now on (R4); what comes of it follows.
 
-    `change`: the commands as JSON, "undo" or "redo"; "" if an edit that waited was given up.
+    `change`: the commands as JSON (as they are shown, if a parameter's value is no data), "undo" or "redo"; "" if an
+    edit that waited was given up.
     """
 
     change: str

@@ -22,7 +22,7 @@ from hfg.engine.reforming import reform
 from hfg.engine.replanning import Replan, closes_a_ring, replan
 from hfg.engine.sending import flush_automatic
 from hfg.engine.worker import ENDED, REMOVED, UNREADY, Worker
-from hfg.errors import HfgError, NodeError, NotRunning
+from hfg.errors import GraphError, HfgError, NodeError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.changes import Change, OptionsChange, ParameterChange, undo_all
 from hfg.graph.checks import check_flat
@@ -59,7 +59,7 @@ class Edits:
 
     async def _edit(self, commands: Sequence[Command]) -> None:
         self._need_run()
-        what = encode(commands)
+        what = _told(commands)
         transaction = prepare(self._graph, commands, check=False)
         await self._follow(transaction.changes, what, check=may_break(commands))
         history_of(self._graph).note(transaction)
@@ -258,6 +258,14 @@ class Edits:
         engine.lifetime.forget(worker)
         if worker.carrier is not None:
             worker.carrier.drop()
+
+
+def _told(commands: Sequence[Command]) -> str:
+    """What the trace says; a parameter may have a value that is no data, an array, and is shown then."""
+    try:
+        return encode(commands)
+    except GraphError:
+        return ", ".join(map(repr, commands))
 
 
 class _Held:

@@ -10,7 +10,7 @@
     checks      what only the whole shows: of edges, flow, nodes
     order       rings in directed graphs
     picture     what is to be seen of a graph       drawing     the same as Mermaid or DOT
-    commands    edits as data                  performing  what carries them out: pointing, copying, enclosing
+    commands    edits as data                  performing  what carries them out: pointing, making, copying, enclosing
     changes     their steps, to be taken back  editing     transactions, undo and redo        reloading  of modules
     members     what `add` refuses      gates, promotions     the same for theirs
     refusals    kept instead of raised, so that a check tells all

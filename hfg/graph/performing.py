@@ -11,7 +11,6 @@ from typing import Any
 
 import msgspec
 
-from hfg import registry
 from hfg.errors import ConnectionError as EdgeRefused
 from hfg.errors import GraphError, HfgError
 from hfg.graph import commands as c
@@ -34,6 +33,7 @@ from hfg.graph.copying import copy_of
 from hfg.graph.edges import Edge, refuse
 from hfg.graph.enclosing import dissolve, enclose
 from hfg.graph.gates import Gate
+from hfg.graph.making import fitting, kept, made
 from hfg.graph.naming import need_name
 from hfg.graph.options import edge_options
 from hfg.graph.pointing import graph_and_name, node_at, parameter_at, source_at, target_at
@@ -93,7 +93,7 @@ class _Hand:
 
     def _add(self, command: c.Add) -> None:
         around, name = graph_and_name(self.graph, command.path)
-        node = _made(command.type, command.parameters, command.path)
+        node = made(command.type, command.parameters, command.path)
         try:
             around.add(node, name=name, **command.options)
         except TypeError as error:
@@ -140,7 +140,7 @@ class _Hand:
 
     def _replace(self, command: c.Replace) -> None:
         old = node_at(self.graph, command.path)
-        new = _made(command.type, _kept(old, command), command.path)
+        new = made(command.type, kept(old, command), command.path)
         if is_box(old) or is_box(new):
             self._replace_box(old, new)
             return
@@ -221,7 +221,7 @@ class _Hand:
         reached = list(_stands_for(port))
         before = [(one.node, one.name, one.value) for one in reached]
         try:
-            port.node._set_parameter(port.name, _fitting(port.spec, command.value))
+            port.node._set_parameter(port.name, fitting(port.spec, command.value))
         except ValueError as error:
             raise GraphError(str(error)) from error
         self.changes += [ParameterChange(node, name, value, node._parameters[name]) for node, name, value in before]
@@ -304,54 +304,6 @@ def _level_of(graph: Graph, source: Any, target: Any) -> Graph:
         if isinstance(home, Graph) and getattr(end, "node", None) is not graph:
             return home
     return graph
-
-
-def _made(reference: str, parameters: dict[str, Any], path: str) -> Any:
-    """Make a node of a type that is found by name.
-
-    Raises:
-      GraphError: there is no such type, or a parameter is refused.
-    """
-    if not isinstance(reference, str):
-        raise GraphError(
-            f'node "{path}": a command names a node type by reference, "module:name", got {reference!r}; '
-            "hfg.registry.reference_of gives it"
-        )
-    try:
-        kind: Any = registry.find(reference)
-    except HfgError as error:
-        raise GraphError(f'node "{path}": {error}') from error
-    specs = kind._type.parameters
-    fitting = {name: _fitting(specs[name], value) if name in specs else value for name, value in parameters.items()}
-    try:
-        return kind(**fitting)
-    except (TypeError, ValueError) as error:
-        raise GraphError(f'node "{path}": {error}') from error
-
-
-def _fitting(spec: Any, value: Any) -> Any:
-    """What came over a wire may have lost its type: a list stands for a tuple, a text for an enum's member."""
-    if spec.check(value) is None:
-        return value
-    try:
-        converted = msgspec.convert(value, spec.type)
-    except Exception:
-        return value  # the parameter says what is wrong with it
-    return value if spec.check(converted) is not None else converted
-
-
-def _kept(old: Node, command: c.Replace) -> dict[str, Any]:
-    """The parameters of the new node: those that are given, and of the old one what the new one takes."""
-    try:
-        specs: Any = registry.find(command.type)._type.parameters
-    except HfgError as error:
-        raise GraphError(f'node "{command.path}": {error}') from error
-    kept = {
-        name: value
-        for name, value in old._parameters.items()
-        if name in specs and not specs[name].trigger and specs[name].check(value) is None
-    }
-    return kept | command.parameters
 
 
 def _counterpart(end: Any, old: Node, new: Node) -> Any:

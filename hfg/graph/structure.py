@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from types import ModuleType
 from typing import Any, TypeVar, overload
 
 from reactivex import Observable
@@ -18,8 +17,8 @@ from hfg import errors
 from hfg.errors import GraphError, UsageError
 from hfg.graph.boundary import GraphInput, GraphOutput, lifecycle_ports
 from hfg.graph.boxes import is_box
-from hfg.graph.commands import Command
 from hfg.graph.edges import Edge, end_path, is_single, refuse
+from hfg.graph.editable import Editable
 from hfg.graph.gates import Gate, refuse_gate
 from hfg.graph.members import iterated_inputs, need_new, need_subgraph_options, refuse_move
 from hfg.graph.naming import default_name, find, need_name, path_of
@@ -51,7 +50,7 @@ N = TypeVar("N", bound=Node)
 T = TypeVar("T")
 
 
-class Graph:
+class Graph(Editable):
     """An activity flow graph; inside a subgraph, the part of it that lies there.
 
     While it runs its structure is changed by commands alone (`run.edit`): whatever else would raises `UsageError`.
@@ -423,58 +422,6 @@ class Graph:
                     f'"{outer.path}" cannot stand for "{inner.path}": {error}; change its default or the limits'
                 ) from error
             self._promoted.setdefault(outer.name, []).append(inner)
-
-    # --- editing by commands ---
-
-    def edit(self, *commands: Command) -> None:
-        """Carry commands out, all of them or, when one is refused, none; a graph that runs is edited by `run.edit`.
-
-        Raises:
-          GraphError: one cannot be; the message says which and why.
-          UsageError: the graph runs, or is the inside of a subgraph.
-
-        Example:
-          >>> from hfg import commands
-          >>> graph = Graph()
-          >>> graph.edit(commands.Add("hfg.testing.nodes:double", "double", options={"max_rate_hz": 5}))
-          >>> graph.undo()
-          >>> graph.nodes
-          {}
-        """
-        from hfg.graph.editing import edit
-
-        edit(self, commands)
-
-    def undo(self) -> None:
-        """Take the last edit back: everything is exactly as before it.
-
-        Raises:
-          UsageError: there is none, or the graph was changed by hand since, or runs.
-        """
-        from hfg.graph.editing import undo
-
-        undo(self)
-
-    def redo(self) -> None:
-        """Carry the edit out again that was undone last.
-
-        Raises:
-          UsageError: there is none, or the graph was changed since, or runs.
-        """
-        from hfg.graph.editing import redo
-
-        redo(self)
-
-    def reload(self, module: str | ModuleType) -> None:
-        """Run a changed module again; its node types replace those of its nodes, parameters are kept.
-
-        Raises:
-          GraphError: the module fails, or a new type does not fit the edges; nothing was changed.
-          UsageError: the graph runs: `run.reload` is for that.
-        """
-        from hfg.graph.editing import reload
-
-        reload(self, module)
 
     # --- finding and checking ---
 
