@@ -24,7 +24,8 @@ TYPE = "benchmarks.nodes:through"
 
 
 def chain(length: int) -> hfg.Graph:
-    """A chain with a spare node, and a subgraph of ten nodes in the middle."""
+    """A chain with a spare node, and a subgraph of some nodes in the middle."""
+    length = max(length, 8)
     graph = hfg.Graph("chain")
     previous = graph.add(through(), name="n0")
     for number in range(1, length):
@@ -33,7 +34,7 @@ def chain(length: int) -> hfg.Graph:
         previous = node
     graph.add(through(), name="spare")
     middle = length // 2
-    graph.edit(commands.Enclose(tuple(f"n{number}" for number in range(middle, middle + 10)), "box"))
+    graph.edit(commands.Enclose(tuple(f"n{number}" for number in range(middle, min(middle + 10, length - 1))), "box"))
     return graph
 
 
@@ -55,10 +56,10 @@ def edit(edits: Sequence[commands.Command], length: int) -> float:
 
 
 EDITS = {
-    "connect": [commands.Connect("n5.out", "spare.value")],
-    "disconnect": [commands.Disconnect("n5.out", "n6.value")],
+    "connect": [commands.Connect("n1.out", "spare.value")],
+    "disconnect": [commands.Disconnect("n1.out", "n2.value")],
     "connect behind a subgraph": [commands.Connect("box.out", "spare.value")],
-    "make active": [commands.MakeActive("n5.out", "n6.value")],
+    "make active": [commands.MakeActive("n1.out", "n2.value")],
     "add a node": [commands.Add(TYPE, "another")],
 }
 CASES = {
