@@ -289,10 +289,11 @@ class _Held:
         waiter: asyncio.Future[None] = engine.loop.create_future()
         left = [len(self._workers)]
 
-        def rests(_worker: Worker, over: Callable[[], None]) -> None:
+        def rests(worker: Worker, over: Callable[[], None]) -> None:
             if self._given_up:
                 over()
                 return
+            worker.busy = "edit"
             self._letting_go.append(over)
             left[0] -= 1
             if not left[0]:

@@ -47,7 +47,7 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
         released = [upstream for upstream in worker.taken if upstream.sequential]
     if worker.outputs.waiters is not None:
         worker.outputs.notify()
-    if worker.pending_end and not worker.busy:
+    if worker.pending_end and worker.busy in ("", "edit"):
         send_end(worker)
     else:
         consider(worker)

@@ -83,7 +83,7 @@ class Worker:
       placed, ahead: a firing is enabled and has its place in the agenda, behind `ahead` slot calls (F9).
       calls: edges whose oldest token waits for a slot call, in order of arrival; None until there is one.
       queued: it stands in its group's run queue.
-      busy: "" or what is under way: "firing", "call", "asking", "ending", "setup".
+      busy: "" or what is under way: "firing", "call", "asking", "ending", "setup"; "edit": an edit holds it.
       special: something about the next firing is not ordinary (a marker lies on an input ...): the fast step steps
         aside.
       step: runs its next piece of work; chosen for its shape by `steps.choose`.
