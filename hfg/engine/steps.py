@@ -480,7 +480,6 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
             or core.current is not worker  # perhaps a thread, while the loop is at work
             or not core.plain
             or port._observers is not None
-            or event.tap is not None
             or not edge.live
             or type(value) is Token
         ):
@@ -505,7 +504,7 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
             edge.deepest = max(edge.deepest, len(queue))
             note_full(edge)
         calls.append(edge)
-        if not target.queued and not target.busy:  # if it is blocked its step does nothing
+        if not target.queued and not target.busy and not target.blocked & CALLS_BLOCKED:
             target.queued = True
             target.push(target)
         if core.current is not worker:  # a thread was here after all, and perhaps the loop has gone to rest

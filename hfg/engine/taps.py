@@ -207,6 +207,8 @@ class Taps:
     def _tell_event(self, event: RunningEvent) -> None:
         looks = tuple(self._looks.get(event, ()))
         event.tap = looks if looks or any(edge.tap is not None for edge in event.edges) else None
+        if event.tap is not None and event.port is not None and event.port._observers is None:
+            event.port._observers = []  # the short way of `trigger` asks for no more
 
     # --- finding ----------------------------------------------------------------------------------------------------
 

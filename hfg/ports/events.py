@@ -31,7 +31,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
 
     kind: ClassVar[Kind] = "event"
 
-    # Subscribers in order of subscription, or None; the runner looks here before it calls `_notify`.
+    # Subscribers in order of subscription; None if nobody ever looked, which is all that a short way asks.
     _observers: list[abc.ObserverBase[Token[T]]] | None = None
     _inner: InnerTarget[T] | None = None
 
@@ -89,7 +89,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         return Disposable(lambda: self._drop(observer))
 
     def _drop(self, observer: abc.ObserverBase[Token[T]]) -> None:
-        self._observers = [one for one in self._observers or () if one is not observer] or None
+        self._observers = [one for one in self._observers or () if one is not observer]
 
     def _notify(self, token: Token[T]) -> None:
         """Hand a signal to every subscriber; for the runner."""

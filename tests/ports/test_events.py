@@ -69,7 +69,7 @@ def test_nobody_listens_until_somebody_subscribes(event: EventPort[int]) -> None
     subscription = event.subscribe(print)
     assert event._observers
     subscription.dispose()
-    assert event._observers is None
+    assert not event._observers
 
 
 def test_a_subscriber_that_raises_is_logged_with_the_path_and_dropped(
