@@ -16,7 +16,15 @@ from hfg.errors import GraphError, NodeError, NotRunning, UsageError
 from hfg.testing import Recorder, recorder, replay
 from hfg.testing.edits import drawn
 from hfg.testing.nodes import Waiting, add, double, script, sink
-from hfg.trace import ActivityLost, EditWaits, FiringStarted, StructureChanged, TokenDropped
+from hfg.trace import (
+    ActivityLost,
+    EditWaits,
+    EventTriggered,
+    FiringStarted,
+    NodeEnded,
+    StructureChanged,
+    TokenDropped,
+)
 
 LOG: list[str] = []
 
@@ -53,6 +61,27 @@ class Careful(hfg.Node):
 
     def teardown(self) -> None:
         LOG.append("close")
+
+
+class Last(hfg.Node):
+    """Speaks at the end only."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> None:
+        """Keep quiet."""
+
+    def end(self) -> None:
+        self.out.send(7)
+
+
+class Slow(hfg.Node):
+    """Takes its time."""
+
+    @hfg.slot
+    async def take(self, value: int) -> None:
+        await asyncio.sleep(0.01)
 
 
 class Broken(hfg.Node):
@@ -292,6 +321,42 @@ def test_a_parameter_changes_between_firings() -> None:
 
     drive(graph, body)
     assert seen == [(1, 1), (2, 2)]
+
+
+@pytest.mark.rule("R4", "T5")
+def test_signals_of_a_node_that_was_moved_into_a_thread_keep_their_stamps() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.group("work", threads=1)
+        graph.connect(graph.add(Mouth()).said, graph.add(Ear()).hear)
+        return graph
+
+    graph = build()
+
+    async def body(run: hfg.Run) -> None:
+        await run.edit(c.Move("mouth", "work"))
+        await asyncio.sleep(0.5)
+        await run.trigger(graph["mouth"].say, 1, stamp=0.25)
+        await run.wait_quiet()
+
+    trace = drive(graph, body)
+    assert [event.token.stamp for event in trace if isinstance(event, EventTriggered)] == [0.25]
+
+
+@pytest.mark.rule("R4", "F4")
+def test_an_edit_that_waits_does_not_hold_back_the_end_of_a_stream() -> None:
+    graph = hfg.Graph()
+    graph.connect(graph.add(script(values=(1,))).out, graph.add(Last()).value)
+    graph.connect(graph["last"].out, graph.add(Slow()).ports.slots["take"])
+
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.001)  # it has ended, and its END waits for the slot call
+        await run.edit(c.Disconnect("last.out", "slow.take"))
+        await run.wait_finished()
+
+    trace = drive(graph, body)
+    order = [type(event).__name__ for event in trace if isinstance(event, EditWaits | NodeEnded | StructureChanged)]
+    assert order[1:] == ["EditWaits", "NodeEnded", "StructureChanged"]  # the first is the script's
 
 
 # --- what goes wrong ---
