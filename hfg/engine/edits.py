@@ -22,7 +22,7 @@ from hfg.engine.reforming import reform
 from hfg.engine.replanning import Replan, closes_a_ring, replan
 from hfg.engine.sending import flush_automatic
 from hfg.engine.worker import ENDED, REMOVED, UNREADY, Worker
-from hfg.errors import GraphError, HfgError, NodeError, NotRunning
+from hfg.errors import GraphError, HfgError, NodeError, NotRunning, UsageError
 from hfg.graph import Graph
 from hfg.graph.changes import Change, OptionsChange, ParameterChange, undo_all
 from hfg.graph.checks import check_flat
@@ -100,6 +100,7 @@ class Edits:
             how = replan(engine.core, engine.flat, changes)
             if check:
                 self._refuse_errors(how)
+            _refuse_waiting_for_oneself(how.touched)
             undo_all(values)  # nodes work with the old values until their firings are over
             await self._set_up(how, come)
             async with _Held(engine, how.touched) as held:
@@ -258,6 +259,17 @@ class Edits:
         engine.lifetime.forget(worker)
         if worker.carrier is not None:
             worker.carrier.drop()
+
+
+def _refuse_waiting_for_oneself(touched: Sequence[Worker]) -> None:
+    """Code of a node may edit the graph, but not wait for the end of its own firing."""
+    task = asyncio.current_task()
+    for worker in touched:
+        if worker.carrier is not None and worker.carrier.task is task:
+            raise UsageError(
+                f'"{worker.path}" edits itself in the middle of a firing and would wait for the end of that for ever: '
+                "do it in a task, asyncio.create_task(run.edit(...))"
+            )
 
 
 def _told(commands: Sequence[Command]) -> str:

@@ -425,6 +425,27 @@ def test_an_edit_that_is_given_up_while_it_waits_changes_nothing() -> None:
     assert trace.values("middle.out -> sink.value") == undisturbed.values("middle.out -> sink.value")
 
 
+def test_a_node_that_would_wait_for_itself_is_told() -> None:
+    graph = hfg.Graph()
+    runs: list[hfg.Run] = []
+    later: list[asyncio.Task[None]] = []
+
+    @hfg.node
+    async def vain(value: int) -> None:
+        with pytest.raises(UsageError, match='"vain" edits itself in the middle of a firing.*asyncio.create_task'):
+            await runs[0].edit(c.Rename("vain", "modest"))
+        later.append(asyncio.create_task(runs[0].edit(c.Rename("vain", "modest"))))
+
+    graph.connect(graph.add(script(values=(1,)), max_rate_hz=1.0).out, graph.add(vain()).ports.inputs["value"])
+
+    async def body(run: hfg.Run) -> None:
+        runs.append(run)
+        await run.wait_finished()
+
+    drive(graph, body)
+    assert list(graph.nodes) == ["script", "modest"]
+
+
 def test_edits_come_one_after_the_other() -> None:
     graph = pipeline(1, 2, 3, pause_s=0.008)
 
