@@ -293,7 +293,8 @@ class _Held:
         self._letting_go: list[Callable[[], None]] = []
         self._given_up = False
         self.done = False
-        self._said = False
+        self._said = False  # that it waits
+        self._counts = False  # among what is in flight
 
     async def __aenter__(self) -> _Held:
         engine = self._engine
@@ -309,13 +310,16 @@ class _Held:
             self._letting_go.append(over)
             left[0] -= 1
             if not left[0]:
+                if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)
+                    core.in_flight += 1
+                    self._counts = True
                 answer(waiter, None)
 
         for worker in self._workers:
             lifecycle.when_idle(worker, rests, _nothing)
         if left[0]:
+            self._said = True
             if core.trace is not None:
-                self._said = True
                 core.trace(EditWaits(core.now(), tuple(worker.path for worker in self._workers)))
             try:
                 await self._or_end(waiter)
@@ -332,6 +336,8 @@ class _Held:
             await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
         finally:
             ending.cancel()
+            engine.core.in_flight -= self._counts
+            self._counts = False
         if engine.core.over:
             raise NotRunning("the run ended before the edit could take effect; the graph is as it was")
 
