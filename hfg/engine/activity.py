@@ -29,7 +29,7 @@ def changed(worker: Worker, active: bool) -> None:
         touch(core, worker.scopes)
     if worker.has_hooks:
         _call_hook(worker, "on_activated" if active else "on_deactivated")
-    if not worker.busy:
+    if worker.busy in ("", "edit"):
         flush_automatic(worker)
 
 

@@ -140,7 +140,7 @@ def _drained_act(core: Core) -> None:
         receive(target, (modifier,))
     derive_scopes(core)
     for target, _ in drained:
-        if not target.busy:  # else it follows the firing or call under way
+        if target.busy in ("", "edit"):  # else it follows the firing or call under way
             flush_automatic(target)
 
 
