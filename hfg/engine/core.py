@@ -160,9 +160,9 @@ class Core:
         self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
         self.timers = 0
         self.pumping = False
-        self.plain = False  # pumping, and nobody listens: what is triggered may take the short way
         self.futile = False  # the sources left feed only ended nodes (R5)
         self.current: Worker | None = None
+        self.speaker: Worker | None = None  # whose short step runs: what it triggers may take a short way too
         self.started = False
         self.over = False
         self.errors: list[HfgError] = []

@@ -240,7 +240,6 @@ class Engine:
             return
         policy: Any = self._loop_group.policy
         core.pumping = True
-        core.plain = core.trace is None
         try:
             self._drain(policy, self._loop_group.take, self._ready_groups)
         except Halt:
@@ -250,10 +249,10 @@ class Engine:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            self.misused(core.current, error)
+            self.misused(core.current or core.speaker, error)
         finally:
-            core.pumping = core.plain = False
-            core.current = None
+            core.pumping = False
+            core.current = core.speaker = None
         if self.measuring is not None:
             self.measuring.pumped()
         if self.ended_how is not None:
@@ -302,7 +301,7 @@ class Engine:
         except Exception as error:
             self.internal_fault(error)
         except BaseException as error:
-            self.misused(self.core.current, error)
+            self.misused(self.core.current or self.core.speaker, error)
 
     def _drain(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
         """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock."""
@@ -490,7 +489,7 @@ class Engine:
         """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""
         core = self.core
         core.trace = take
-        core.plain = core.pumping and take is None
+        core.speaker = None
         if core.started:
             for worker in core.workers:
                 steps.choose(worker)

@@ -108,7 +108,7 @@ def operator_failed(edge: EventEdge, error: BaseException) -> None:
     target: Worker = edge.target
     problem = NodeError(target.path, f'an operator on edge "{edge.label}"', error)
     problem.__cause__ = error
-    if target.core.current is target:  # it has triggered into itself: its own firing or call is over first
+    if target in (target.core.current, target.core.speaker):  # it has triggered into itself: that is over first
         target.core.after(0.0, lambda: apply_policy(target, problem, answer=False))
     else:
         apply_policy(target, problem, answer=False)

@@ -55,7 +55,7 @@ def join_step(worker: Worker, taken: tuple[SyncEdge, ...], given: tuple[SyncEdge
             edge.token = None
         inputs.missing = count
         worker.firings += 1
-        core.current = worker
+        core.speaker = worker
         worker.taken = taken
         if not silent_code:
             worker.busy = "firing"
@@ -115,7 +115,7 @@ def handle_step(worker: Worker, taken: EventEdge, given: tuple[SyncEdge, ...]) -
         if taken.full:
             freed(taken)
         worker.firings += 1
-        core.current = worker
+        core.speaker = worker
         worker.taken = ()
         worker.busy = "firing"
         worker.stamp = token.stamp
@@ -165,7 +165,7 @@ def fork_step(worker: Worker, given: tuple[SyncEdge, ...]) -> Step:
             generator = worker.generator = process()
         worker.queued = worker.placed = False
         worker.firings += 1
-        core.current = worker
+        core.speaker = worker
         stamp = worker.stamp = now()
         worker.busy = "firing"
         try:

@@ -134,7 +134,7 @@ def release_ports(worker: Worker) -> None:
             port.__dict__.pop("trigger", None)
             port._emit = port._refuse
             port._emit_wait = port._refuse_wait
-            port._scheduler = port._thread = None
+            port._scheduler = port._thread = port._look = None
             port._complete()
     if node is not None and not worker.silent_code:
         for name in worker.type.outputs:

@@ -15,12 +15,12 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.engine import ending, errors, firing, joins, watched
-from hfg.engine.agenda import consider, freed, note_full
+from hfg.engine.agenda import add_call, consider, freed, note_full
 from hfg.engine.calls import await_call
 from hfg.engine.core import OF_ITS_OWN_KIND, PENDING
 from hfg.engine.modifiers import derive_scopes, touch
 from hfg.engine.releasing import outputs_done, release
-from hfg.engine.sending import flush_automatic, trigger
+from hfg.engine.sending import trigger
 from hfg.engine.worker import CALLS_BLOCKED, ENDED, RunningEvent, Worker
 from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge, SyncEdge
@@ -175,7 +175,7 @@ def _through_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> St
         if token.activity:
             worker.active = node._active = token.activity > 0
         worker.firings += 1
-        core.current = worker
+        core.speaker = worker
         if not silent_code:
             worker.busy = "firing"
             worker.stamp = token.stamp
@@ -301,7 +301,7 @@ def _async_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step
         if token.activity:
             worker.active = node._active = token.activity > 0
         worker.firings += 1
-        core.current = worker
+        core.speaker = worker
         worker.busy = "firing"
         worker.stamp = token.stamp
         worker.taken = only
@@ -337,7 +337,7 @@ def _generator_step(worker: Worker, given: SyncEdge) -> Step:
             return
         worker.queued = worker.placed = False
         worker.firings += 1
-        core.current = worker
+        core.speaker = worker
         stamp = worker.stamp = now()
         worker.busy = "firing"
         try:
@@ -398,6 +398,7 @@ def _call_step(worker: Worker, edge: EventEdge) -> Step:
     general = firing.step
     calls: Any = worker.calls
     queue = edge.queue
+    gives = any(one.active for one in worker.event_edges())  # else it has no activity to give away
 
     def step(worker: Worker) -> None:
         if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
@@ -411,7 +412,7 @@ def _call_step(worker: Worker, edge: EventEdge) -> Step:
             freed(edge)
         if token.activity:
             worker.active = node._active = token.activity > 0
-        core.current = worker
+        core.speaker = worker
         worker.stamp = token.stamp
         try:
             result = handler(token.value)
@@ -424,9 +425,8 @@ def _call_step(worker: Worker, edge: EventEdge) -> Step:
             await_call(worker, edge.port_name, result)
             return
         worker.stamp = None
-        worker.right = False
-        if worker.events_due:
-            flush_automatic(worker)
+        if gives:
+            worker.right = False
         if calls and not worker.blocked & CALLS_BLOCKED:
             worker.push(worker)
         else:
@@ -467,19 +467,19 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
     if edge.target_kind != "slot" or edge.overflow != "wait" or edge.pipeline is not None or worker.watched:
         return emit_general
     port = event.port
-    port._observers = port._observers  # an attribute of its own is found faster than the class's
+    watched = port._observers is not None
     queue = edge.queue
     calls: Any = target.calls
     carries = edge.active
     scopes = target.scopes
+    tight = edge.capacity == 1
 
     # (parameters by keyword alone would cost 20 ns; who gives them by position is refused by the type checker)
     def emit(value: Any = None, activity: int | None = None, stamp: float | None = None) -> None:
         if (
             activity is not None
-            or core.current is not worker  # perhaps a thread, while the loop is at work
-            or not core.plain
-            or port._observers is not None
+            or core.speaker is not worker  # not out of a short step; perhaps a thread, while the loop is at work
+            or watched
             or not edge.live
             or type(value) is Token
         ):
@@ -490,7 +490,9 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
             if stamp is None:
                 stamp = core.now()
         edge.sent = number = edge.sent + 1
-        if carries and (worker.active or worker.right):
+        if not carries:
+            queue.append(Token(value, 0, stamp, number))
+        elif worker.active or worker.right:
             queue.append(Token(value, 1, stamp, number))
             if worker.active:
                 worker.active = node._active = False
@@ -500,14 +502,21 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
                 derive_scopes(core)
         else:
             queue.append(Token(value, 0, stamp, number))
-        if calls or target.busy or edge.capacity == 1:  # else it is the only one that waits
+        if calls or tight or target.busy:  # else it is the only one that waits
             edge.deepest = max(edge.deepest, len(queue))
             note_full(edge)
-        calls.append(edge)
-        if not target.queued and not target.busy and not target.blocked & CALLS_BLOCKED:
-            target.queued = True
-            target.push(target)
-        if core.current is not worker:  # a thread was here after all, and perhaps the loop has gone to rest
+            add_call(target, edge)
+        else:
+            calls.append(edge)
+            if not target.queued:  # if it is blocked its step does nothing
+                target.queued = True
+                target.push(target)
+        if core.speaker is not worker:  # a thread was here after all, and perhaps the loop has gone to rest
             host.from_any_thread(host.kick)
 
+    def look() -> None:
+        nonlocal watched
+        watched = port._observers is not None
+
+    port._look = look
     return emit

@@ -30,7 +30,7 @@ class Watch:
 
     def look(self, now: float) -> None:
         """Compare with the last look; any thread."""
-        worker = self.core.current
+        worker = self.core.current or self.core.speaker
         if worker is None:
             self.seen = None
             return

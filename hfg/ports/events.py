@@ -33,6 +33,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
 
     # Subscribers in order of subscription; None if nobody ever looked, which is all that a short way asks.
     _observers: list[abc.ObserverBase[Token[T]]] | None = None
+    _look: Callable[[], None] | None = None  # tells the short way that somebody observes now
     _inner: InnerTarget[T] | None = None
 
     def __init__(self, node: Owner, name: str, type: Any = None) -> None:  # noqa: A002
@@ -83,10 +84,15 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
     def _subscribe_core(
         self, observer: abc.ObserverBase[Token[T]], scheduler: abc.SchedulerBase | None = None
     ) -> abc.DisposableBase:
-        self._observers = [*(self._observers or ()), observer]
+        self._observe([*(self._observers or ()), observer])
         if self._thread is None and self.graph is not None and self.graph._root._run is not None:
             self.graph._root._run._adopt(self)  # an automatic event that nobody was interested in until now
         return Disposable(lambda: self._drop(observer))
+
+    def _observe(self, observers: list[abc.ObserverBase[Token[T]]]) -> None:
+        self._observers = observers
+        if self._look is not None:
+            self._look()
 
     def _drop(self, observer: abc.ObserverBase[Token[T]]) -> None:
         self._observers = [one for one in self._observers or () if one is not observer]
