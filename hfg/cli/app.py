@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -68,8 +68,14 @@ def _streams() -> Iterator[None]:
                 raise
             os.dup2(nowhere.fileno(), sys.stdout.fileno())  # Python flushes it once more as it leaves
             if not isinstance(error, BrokenPipeError):
-                show.sentence(f"standard output cannot be written: {error.strerror}")
+                with suppress(OSError):  # the terminal of both may be gone
+                    show.sentence(f"standard output cannot be written: {error.strerror}")
             sys.exit(1)
+        finally:
+            try:
+                sys.stderr.flush()
+            except OSError:
+                os.dup2(nowhere.fileno(), sys.stderr.fileno())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -35,8 +35,9 @@ def refresh(worker: Worker) -> None:
     for edge in worker.all_out_edges():
         edge.live = is_live(edge)
         touched[edge.target.index] = edge.target
-    for edge in worker.event_edges():
-        note_full(edge)
+    for edge in (*worker.edges_in(), *worker.event_edges()):
+        if type(edge) is EventEdge:
+            note_full(edge)
     for neighbour in touched.values():
         rewire(neighbour)
 
@@ -48,6 +49,8 @@ def refresh_via(scope: Scope) -> None:
     for edge in scope.worker.core.edges:
         if scope in edge.via:
             edge.live = is_live(edge)
+            if type(edge) is EventEdge:
+                note_full(edge)
             rewire(edge.source)
             rewire(edge.target)
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 
 import pytest
 
 import hfg
+from hfg.testing import recorder, replay
+from hfg.testing.nodes import Pulse, Script
 from hfg.trace import NodeEnabled, TokenDropped, TraceEvent
 from tests.semantics.nodes import (
     Both,
@@ -290,3 +293,17 @@ class Resettable(hfg.Node):
     @hfg.slot
     def begin(self) -> None:
         pass
+
+
+@pytest.mark.rule("F8", "F10", "P7")
+@pytest.mark.parametrize("seed", range(12))
+def test_a_queue_that_is_full_when_its_consumer_is_enabled_holds_its_source(seed: int) -> None:
+    graph = hfg.Graph()
+    script, pulse, node = graph.add(Script(count=3)), graph.add(Pulse()), graph.add(add(), enabled=False)
+    graph.connect(script.ports.events["seen"], pulse.value)
+    graph.connect(pulse.pulse, node.b, capacity=1, initial=[0])
+    graph.connect(graph.start, node.enable)
+    trace = recorder()
+    with contextlib.suppress(hfg.errors.RunError):  # it stalls, for nothing feeds the other input
+        hfg.run(graph, clock="virtual", policy="random", seed=seed, trace=trace)
+    replay(graph, trace)
