@@ -309,8 +309,9 @@ def _handler(target: Worker, name: str) -> None:
         target.handlers, target.plain_handlers = {}, {}
     target.handlers[name] = target.node._slot_call(name)
     spec = target.type.slots[name]
-    if spec.takes_value and not spec.token and not inspect.iscoroutinefunction(target.node._handler(name)):
-        target.plain_handlers[name] = target.node._handler(name)
+    handler = target.node._handler(name)
+    if handler is not None and not spec.token and not inspect.iscoroutinefunction(handler):
+        target.plain_handlers[name] = handler if spec.takes_value else lambda _value: handler()
 
 
 def lead_in(edge: Any) -> None:
