@@ -187,7 +187,9 @@ def main() -> int:
     found = sorted(folder.glob("*.jsonl"))
     if not found:
         parser.error(f'there is no .jsonl in "{folder}": run `make bench` first')
-    fresh = [line for file in found for line in file.read_text(encoding="utf-8").splitlines()]
+    shown = {suite for suite, _ in TABLES.values()}
+    lines = [line for file in found for line in file.read_text(encoding="utf-8").splitlines()]
+    fresh = [line for line in lines if json.loads(line)["suite"] in shown]
     replaced = {json.loads(line)["suite"] for line in fresh}
     before = SOURCE.read_text(encoding="utf-8").splitlines() if SOURCE.exists() else []
     kept = [line for line in before if json.loads(line)["suite"] not in replaced]
