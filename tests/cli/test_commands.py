@@ -6,12 +6,12 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from hfg.cli import main, nodes
+from tests.cli.conftest import Command, Shown
 
 GRAPH = '''
 """A graph for tests of the command line."""
@@ -58,27 +58,6 @@ def aborting() -> hfg.Graph:
     graph.connect(graph.add(numbers()).processed, graph.abort)
     return graph
 '''
-
-
-@dataclass
-class Shown:
-    """What a command left behind."""
-
-    code: int
-    out: str
-    err: str
-
-
-class Command:
-    """Runs the command in this process."""
-
-    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
-        self._capsys = capsys
-
-    def __call__(self, *arguments: str) -> Shown:
-        code = main(arguments)
-        out, err = self._capsys.readouterr()
-        return Shown(code, out, err)
 
 
 @pytest.fixture

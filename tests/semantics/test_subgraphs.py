@@ -55,7 +55,7 @@ def test_streams_that_converge_in_a_box_do_not_reach_an_input() -> None:
     assert "has an edge already" in graph.check()[0].what
 
 
-class Work(hfg.Subgraph):
+class Works(hfg.Subgraph):
     """All four kinds of port as relays."""
 
     value = hfg.Input(int)
@@ -103,7 +103,7 @@ class Nested(hfg.Subgraph):
 
     def build(self, graph: hfg.Graph) -> None:
         depth = self.depth.value
-        box: Any = graph.add(Nested(depth=depth - 1) if depth > 1 else Work())
+        box: Any = graph.add(Nested(depth=depth - 1) if depth > 1 else Works())
         graph.promote(self.factor, box.ports.parameters["factor"])
         graph.connect(self.value.inner, box.value)
         graph.connect(box.out, self.out.inner, active=True)
@@ -196,11 +196,11 @@ class Delayed(hfg.Subgraph):
 @pytest.mark.rule("G1")
 def test_a_relay_without_an_edge_on_one_side_is_no_edge_at_all(fast: bool) -> None:
     graph = hfg.Graph()
-    source, box, sink = graph.add(numbers(count=3)), graph.add(Work()), graph.add(Keep())
+    source, box, sink = graph.add(numbers(count=3)), graph.add(Works()), graph.add(Keep())
     graph.connect(source.out, box.value)  # its output leads nowhere, its slot and event neither
     report = run(graph, fast)
-    assert report.nodes["work/times"].firings == 4
-    assert list(report.edges) == ["numbers.out -> work/times.value"]
+    assert report.nodes["works/times"].firings == 4
+    assert list(report.edges) == ["numbers.out -> works/times.value"]
     assert sink.values == []
 
 
@@ -238,7 +238,7 @@ def test_from_outside_the_ports_of_a_box_stand_for_those_behind_them(fast: bool)
             looking = asyncio.create_task(look())
             await run.wait_finished()
             await looking
-        return [story, tapped, graph["nested/nested/nested/work/ear"].heard]
+        return [story, tapped, graph["nested/nested/nested/works/ear"].heard]
 
     story, tapped, heard = drive(main)
     assert sorted(story) == [7, 8, 8]  # type: ignore[type-var]
@@ -250,11 +250,11 @@ def test_from_outside_the_ports_of_a_box_stand_for_those_behind_them(fast: bool)
 def test_what_a_box_has_only_inside_is_refused_with_the_remedy() -> None:
     async def main() -> None:
         graph = hfg.Graph()
-        box = graph.add(Work())
+        box = graph.add(Works())
         async with hfg.running(graph) as run:
-            with pytest.raises(hfg.errors.UsageError, match='"work.rang" is the event of a subgraph'):
+            with pytest.raises(hfg.errors.UsageError, match='"works.rang" is the event of a subgraph'):
                 await run.trigger(box.rang, 1)
-            with pytest.raises(hfg.errors.UsageError, match='"work" is a subgraph'):
+            with pytest.raises(hfg.errors.UsageError, match='"works" is a subgraph'):
                 await run.wait_inputs(box)
 
     drive(main)
@@ -266,10 +266,10 @@ def test_inner_ports_have_paths_and_parameters_are_promoted(fast: bool) -> None:
     source, box, sink = graph.add(numbers(count=2)), graph.add(Nested(depth=3, factor=5)), graph.add(Keep())
     graph.connect(source.out, box.value)
     graph.connect(box.out, sink.value)
-    assert graph["nested/nested/nested/work/times.out"].path == "nested/nested/nested/work/times.out"
+    assert graph["nested/nested/nested/works/times.out"].path == "nested/nested/nested/works/times.out"
     report = run(graph, fast)
     assert sink.values == [5, 10]
-    assert "nested/nested/nested/work/times" in report.nodes
+    assert "nested/nested/nested/works/times" in report.nodes
 
 
 @pytest.mark.rule("G3", "P8")
