@@ -217,12 +217,12 @@ NOT_ACCEPTED = [
 ]
 
 
-@pytest.mark.parametrize(("value", "hint"), ACCEPTED, ids=lambda item: str(item)[:30])
+@pytest.mark.parametrize(("value", "hint"), ACCEPTED, ids=lambda item: str(item).partition(" at 0x")[0][:30])
 def test_values_of_a_type_are_accepted(value: Any, hint: Any) -> None:
     assert accepts(value, hint)
 
 
-@pytest.mark.parametrize(("value", "hint"), NOT_ACCEPTED, ids=lambda item: str(item)[:30])
+@pytest.mark.parametrize(("value", "hint"), NOT_ACCEPTED, ids=lambda item: str(item).partition(" at 0x")[0][:30])
 def test_values_of_another_type_are_not(value: Any, hint: Any) -> None:
     assert not accepts(value, hint)
 

@@ -68,7 +68,8 @@ def _time_out(worker: Worker) -> None:
     if worker.scope is not None and before and not worker.active:
         deactivate_inside(worker.scope)
     scopes_changed(worker.core)
-    flush_automatic(worker)
+    if worker.busy in ("", "edit"):  # else after the firing (A9)
+        flush_automatic(worker)
 
 
 def gate_changed(gates: Any) -> None:

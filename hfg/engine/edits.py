@@ -21,10 +21,10 @@ from hfg.engine.code import answer
 from hfg.engine.reforming import reform
 from hfg.engine.replanning import Replan, closes_a_ring, replan
 from hfg.engine.sending import flush_automatic
-from hfg.engine.worker import ENDED, REMOVED, UNREADY, Worker
+from hfg.engine.worker import BACKOFF, DISABLED, ENDED, REMOVED, UNREADY, Worker
 from hfg.errors import GraphError, HfgError, NodeError, NotRunning, UsageError
 from hfg.graph import Graph
-from hfg.graph.changes import Change, OptionsChange, ParameterChange, undo_all
+from hfg.graph.changes import Change, NodeSwap, OptionsChange, ParameterChange, undo_all
 from hfg.graph.checks import check_flat
 from hfg.graph.commands import Command, encode
 from hfg.graph.editing import Transaction, history_of, may_break, prepare, refuse_new_errors
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from hfg.engine.engine import Engine
 
 __all__ = ["Edits"]
+
+_Switched = list[tuple[Worker, bool]]
+"""Nodes and subgraphs, and whether they are enabled or disabled."""
 
 
 class Edits:
@@ -102,16 +105,19 @@ class Edits:
                 self._refuse_errors(how)
             _refuse_waiting_for_oneself(how.touched)
             undo_all(values)  # nodes work with the old values until their firings are over
+            switched = self._switched(changes)
             await self._set_up(how, come)
-            async with _Held(engine, how.touched) as held:
+            async with _Held(engine, _touched(how, switched)) as held:
                 await self._exchange_nodes(how)
+                fresh = await self._start_afresh(switched)
                 self._need_run()
                 for value in values:
                     value.do()
                 took_effect = held.done = True
-                self._take_effect(how, come, changes, what)
-                await self._enable(changes, of_subgraphs=False)
-            await self._enable(changes, of_subgraphs=True)  # which hold their nodes themselves
+                if engine.core.trace is not None:
+                    engine.core.trace(StructureChanged(engine.core.now(), what))
+                self._switch(switched, fresh)
+                self._take_effect(how, come, changes)
         except BaseException:
             if not took_effect:
                 undo_all(changes)
@@ -184,12 +190,10 @@ class Edits:
         self._engine.lifetime.carry(worker)
         await self._hook(worker, lifecycle.set_up)
 
-    def _take_effect(self, how: Replan, come: list[Worker], changes: Sequence[Change], what: str) -> None:
+    def _take_effect(self, how: Replan, come: list[Worker], changes: Sequence[Change]) -> None:
         """From one moment to the next the run is another."""
         engine = self._engine
         core = engine.core
-        if core.trace is not None:
-            core.trace(StructureChanged(core.now(), what))
         engine.flat = how.flat
         for edge, flat in reform(core, how, come, engine.groups):
             if flat.source.kind == "observable":
@@ -209,30 +213,50 @@ class Edits:
         for worker in come:
             core.upstairs.idle_again(worker)
 
-    async def _enable(self, changes: Sequence[Change], *, of_subgraphs: bool) -> None:
-        """Nodes and subgraphs that are enabled or disabled (F10)."""
-        core = self._engine.core
+    def _switched(self, changes: Sequence[Change]) -> _Switched:
+        """The nodes, then the subgraphs, that are enabled or disabled, and which of both."""
+        by_node = {worker.node: worker for worker in self._engine.core.workers}
+        found = []
         for change in changes:
-            if not isinstance(change, OptionsChange) or change.before.group != change.after.group:
+            if isinstance(change, NodeSwap) and change.old in by_node:
+                by_node[change.new] = by_node[change.old]
+            elif isinstance(change, OptionsChange) and change.before.group == change.after.group:
+                worker = by_node.get(change.node)
+                if worker is not None:
+                    found.append((worker, change.after.enabled))
+        return sorted(found, key=lambda one: one[0].scope is not None)
+
+    async def _start_afresh(self, switched: _Switched) -> set[Worker]:
+        """Tear down and set up what is going to be enabled (F10), so that it all takes effect at one moment.
+
+        Raises:
+          NodeError: one of them failed; they stay disabled.
+        """
+        on = {worker for worker, enabled in switched if enabled}
+        scopes = {worker.scope for worker in on}
+        fresh: set[Worker] = set()
+        for worker in self._engine.core.workers:
+            meant = worker in on or (worker.own_enabled and not scopes.isdisjoint(worker.around))
+            if not meant or worker.scope is not None or not worker.blocked & DISABLED or worker.blocked & BACKOFF:
                 continue
-            worker = next((one for one in core.workers if one.node is change.node), None)
-            if worker is None or of_subgraphs is not (worker.scope is not None):
-                continue
-            self._note_options(worker, change.after.enabled)
-            waiter: asyncio.Future[None] = self._engine.loop.create_future()
-            then = partial(answer, waiter, None)
-            if worker.scope is not None and change.after.enabled:
-                subgraphs.enable_scope(worker.scope, then)
+            if all(scope.enabled or scope in scopes for scope in worker.around):
+                await self._hook(worker, lifecycle.tear_down)
+                await self._hook(worker, lifecycle.set_up)
+                fresh.add(worker)
+        return fresh
+
+    def _switch(self, switched: _Switched, fresh: set[Worker]) -> None:
+        """Enable and disable nodes and subgraphs (F10)."""
+        for worker, enabled in switched:
+            self._note_options(worker, enabled)
+            if worker.scope is not None and enabled:
+                subgraphs.enable_scope(worker.scope, _nothing, fresh)
             elif worker.scope is not None:
                 subgraphs.disable_scope(worker.scope)
-                then()
-            elif change.after.enabled:
-                lifecycle.enable(worker, then)
+            elif enabled:
+                lifecycle.enable(worker, _nothing, fresh=worker in fresh)
             else:
                 lifecycle.disable(worker)
-                then()
-            if not waiter.done():
-                await waiter
 
     def _note_options(self, worker: Worker, enabled: bool) -> None:
         flat = self._engine.flat
@@ -270,6 +294,12 @@ def _refuse_waiting_for_oneself(touched: Sequence[Worker]) -> None:
                 f'"{worker.path}" edits itself in the middle of a firing and would wait for the end of that for ever: '
                 "do it in a task, asyncio.create_task(run.edit(...))"
             )
+
+
+def _touched(how: Replan, switched: _Switched) -> list[Worker]:
+    """Those who must rest: also all inside a subgraph that is enabled."""
+    scopes = [worker.scope for worker, enabled in switched if worker.scope is not None and enabled]
+    return list(dict.fromkeys([*how.touched, *(member for scope in scopes for member in scope.members)]))
 
 
 def _told(commands: Sequence[Command]) -> str:
@@ -359,4 +389,4 @@ class _Held:
 
 
 def _nothing() -> None:
-    """Nobody waits for a node to be let go."""
+    """Nobody waits for it."""

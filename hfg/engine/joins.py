@@ -18,7 +18,7 @@ from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import Marker, Token
 
-__all__ = ["fork_step", "handle_step", "join_step"]
+__all__ = ["generator_step", "handle_step", "join_step"]
 
 Step = Callable[[Worker], None]
 
@@ -147,22 +147,19 @@ def handle_step(worker: Worker, taken: EventEdge, given: tuple[SyncEdge, ...]) -
     return step
 
 
-def fork_step(worker: Worker, given: tuple[SyncEdge, ...]) -> Step:
-    """A generator whose values go to several."""
+def generator_step(worker: Worker, given: tuple[SyncEdge, ...]) -> Step:
+    """A generator with one output; its first firing, in which it begins, goes the general way."""
     core = worker.core
-    process: Any = worker.process
     general = firing.step
     now = core.now
     carries = any(edge.active for edge in given)
     leave = _leaving(worker, given)
 
     def step(worker: Worker) -> None:
-        if not worker.placed or worker.special or worker.busy or (worker.active and carries):
+        generator = worker.generator
+        if generator is None or not worker.placed or worker.special or worker.busy or (worker.active and carries):
             general(worker)
             return
-        generator = worker.generator
-        if generator is None:
-            generator = worker.generator = process()
         worker.queued = worker.placed = False
         worker.firings += 1
         core.speaker = worker

@@ -22,12 +22,13 @@ from hfg.trace import NodeEnabled
 __all__ = [
     "Then",
     "disable",
+    "disable_around",
     "enable",
+    "enable_around",
     "not_ended",
     "reset",
     "restart",
     "set_up",
-    "settle_disabled",
     "tear_down",
     "when_idle",
 ]
@@ -121,12 +122,25 @@ def disable(worker: Worker) -> None:
     block(worker, DISABLED)
     if core.trace is not None:
         core.trace(NodeEnabled(core.now(), worker.path, False))
-    settle_disabled(worker)
+    _settle_disabled(worker)
     derive_scopes(core)
 
 
-def settle_disabled(worker: Worker) -> None:
-    """The node, or a subgraph around it, was disabled: empty its edges and rewire its neighbours."""
+def disable_around(worker: Worker) -> None:
+    """A subgraph around the node is disabled; its own flag stays (G2)."""
+    if not worker.blocked & DISABLED:
+        block(worker, DISABLED)
+        _settle_disabled(worker)
+
+
+def enable_around(owner: Worker) -> None:
+    """The subgraphs around the worker of one are enabled; it has nothing to set up."""
+    owner.blocked &= ~DISABLED
+    wiring.refresh(owner)
+
+
+def _settle_disabled(worker: Worker) -> None:
+    """Empty the edges of a node that was disabled and rewire its neighbours."""
     incoming = [edge for edge in worker.edges_in() if not (edge.port_name == "enable" and edge.target_kind == "slot")]
     outgoing = [edge for edges in worker.wired_out for edge in edges]
     untaken = [edge for edge in outgoing if edge.untaken]
@@ -138,8 +152,11 @@ def settle_disabled(worker: Worker) -> None:
     release([edge for edge in (*incoming, *untaken) if type(edge) is not EventEdge and edge.held])
 
 
-def enable(worker: Worker, then: Callable[[], None]) -> None:
-    """F10: the node starts afresh; A(v) is kept. In the back-off of a restart that sets it up, when it is over."""
+def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> None:
+    """F10: the node starts afresh, unless it is `fresh` already; A(v) is kept.
+
+    In the back-off of a restart that sets it up, when it is over.
+    """
     core = worker.core
     itself, worker.own_enabled = not worker.own_enabled, True
     if not worker.blocked & DISABLED or not all(scope.enabled for scope in worker.around):
@@ -159,7 +176,10 @@ def enable(worker: Worker, then: Callable[[], None]) -> None:
         _sources_matter_again(core)
         then()
 
-    _afresh(worker, up)
+    if fresh:
+        up()
+    else:
+        _afresh(worker, up)
 
 
 def _afresh(worker: Worker, then: Callable[[], None]) -> None:

@@ -51,7 +51,9 @@ def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Gro
         core.by_path[worker.path] = worker
     core.workers = list(workers)
     for flat_scope, scope in zip(flat.scopes, core.scopes, strict=True):
-        core.workers.append(add_scope(core, flat_scope, scope, loop))
+        owner = add_scope(core, flat_scope, scope, loop)
+        owner.around = scope.and_around()
+        core.workers.append(owner)
         scope.members = [workers[index] for index in flat_scope.members]
         for member in scope.members:
             member.around += (scope,)
@@ -83,7 +85,6 @@ def add_scope(core: Core, flat_scope: FlatScope, scope: Scope, loop: Group) -> W
     owner.scope = scope
     owner.silent_code = True
     owner.active_for_s = flat_scope.options.active_for_s
-    owner.own_enabled = flat_scope.options.enabled
     scope.enabled = flat_scope.options.enabled
     scope.worker = owner
     core.by_path[owner.path] = owner

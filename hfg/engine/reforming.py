@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from hfg.engine import plan, ports, quiet, steps, wiring
+from hfg.engine import lifecycle, plan, ports, quiet, steps, wiring
 from hfg.engine.activity import rest
 from hfg.engine.agenda import block, note_full
 from hfg.engine.core import Core
@@ -64,6 +64,7 @@ class _Reforming:
             self.touched |= {edge.source: None, edge.target: None}
         for worker in self.how.gone:
             worker.blocked |= TORN_DOWN | REMOVED
+            worker.pending_end = False
             block(worker, REMOVED)
             if worker.queued:
                 worker.group.policy.remove(worker)
@@ -169,6 +170,11 @@ class _Reforming:
         present = {scope.worker.node: scope for scope in core.scopes if scope.worker is not None}
         owners = []
         scopes: list[Scope] = []
+        stay = {flat_scope.subgraph for flat_scope in flat.scopes}
+        for node, gone in present.items():
+            if node not in stay and not gone.enabled:  # without it they stay as disabled as they were (G1)
+                for member in gone.members:
+                    member.own_enabled = False
         for worker in workers:
             worker.around = worker.scopes = ()
         core.by_path = {worker.path: worker for worker in workers}
@@ -185,6 +191,7 @@ class _Reforming:
                 core.by_path[flat_scope.path] = scope.worker
                 owners.append(scope.worker)
             scopes.append(scope)
+            owners[-1].around = scope.and_around()
             scope.members = [workers[index] for index in flat_scope.members]
             for member in scope.members:
                 member.around += (scope,)
@@ -310,6 +317,8 @@ class _Reforming:
         for worker in touched:
             if not worker.busy:
                 flush_automatic(worker)
+            if any(not scope.enabled for scope in worker.around):
+                lifecycle.disable_around(worker)
         quiet.judge_sources(core)
 
     def _bind(self, worker: Worker) -> None:

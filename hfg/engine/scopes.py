@@ -38,6 +38,10 @@ class Scope:
         self.watched = False
         self.gates: list[Gate] = []
 
+    def and_around(self) -> tuple[Scope, ...]:
+        """Give it and those around it, outermost first."""
+        return (*(self.parent.and_around() if self.parent is not None else ()), self)
+
     def find_inner_edges(self) -> None:
         """Note the edges with both ends inside; left until somebody asks, since most subgraphs are just boxes."""
         inside = {member.index for member in self.members}

@@ -14,7 +14,7 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
-from hfg.engine import ending, errors, firing, joins, watched
+from hfg.engine import errors, firing, joins, watched
 from hfg.engine.agenda import add_call, consider, freed, note_full
 from hfg.engine.calls import await_call
 from hfg.engine.core import OF_ITS_OWN_KIND, PENDING
@@ -22,7 +22,6 @@ from hfg.engine.modifiers import derive_scopes, touch
 from hfg.engine.releasing import outputs_done, release
 from hfg.engine.sending import trigger
 from hfg.engine.worker import CALLS_BLOCKED, ENDED, RunningEvent, Worker
-from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import Token
 
@@ -82,11 +81,10 @@ def _choose(worker: Worker) -> None:
     if worker.is_source:
         if worker.type.process_kind != "generator" or worker.process is None or not outs:
             return
-        if len(outs) > 1:
-            if not traced:
-                worker.step = joins.fork_step(worker, tuple(outs))
-        else:
-            worker.step = watched.generator_step(worker, outs[0]) if traced else _generator_step(worker, outs[0])
+        if not traced:
+            worker.step = joins.generator_step(worker, tuple(outs))
+        elif len(outs) == 1:
+            worker.step = watched.generator_step(worker, outs[0])
         return
     if len(outs) > 1 or len(worker.in_edges) > 1 or any(type(edge) is EventEdge for edge in worker.in_edges):
         if not traced:
@@ -315,59 +313,6 @@ def _async_step(worker: Worker, taken: SyncEdge, given: SyncEdge | None) -> Step
         else:
             leave(result, None)
 
-    return step
-
-
-def _generator_step(worker: Worker, given: SyncEdge) -> Step:
-    """A generator with one output edge."""
-    core = worker.core
-    node = worker.node
-    outputs = worker.outputs
-    target: Worker = given.target
-    target_inputs = target.inputs
-    general = firing.step
-    now = core.now
-    carries = given.active
-    of_its_own_kind = OF_ITS_OWN_KIND
-
-    def step(worker: Worker) -> None:
-        generator = worker.generator
-        if generator is None or not worker.placed or worker.special or worker.busy or (worker.active and carries):
-            general(worker)
-            return
-        worker.queued = worker.placed = False
-        worker.firings += 1
-        core.speaker = worker
-        stamp = worker.stamp = now()
-        worker.busy = "firing"
-        try:
-            value = next(generator)
-        except (StopIteration, EndOfStream):
-            ending.source_ended(worker)
-            return
-        except Exception as error:
-            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
-            return
-        if (
-            type(value) in of_its_own_kind
-            or worker.written is not None
-            or worker.active
-            or worker.right
-            or worker.calls
-        ):
-            firing.complete_firing(worker, value)
-            return
-        worker.busy = ""
-        worker.stamp = None
-        given.sent = number = given.sent + 1
-        given.token = Token(value, 0, stamp, number)
-        given.held = True
-        outputs.missing = 1
-        target_inputs.missing = missing = target_inputs.missing - 1
-        if not missing:
-            consider(target)
-
-    _ = node
     return step
 
 

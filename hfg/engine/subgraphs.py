@@ -7,14 +7,14 @@ Stands on `lifecycle` and `activity`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable
 
 from hfg.engine import lifecycle, wiring
 from hfg.engine.activity import deactivate_inside, scopes_changed
-from hfg.engine.agenda import block, consider
+from hfg.engine.agenda import consider
 from hfg.engine.lifecycle import when_idle
 from hfg.engine.scopes import Scope
-from hfg.engine.worker import DISABLED, Worker
+from hfg.engine.worker import Worker
 from hfg.trace import NodeEnabled
 
 __all__ = ["disable_scope", "enable_scope", "run_slot"]
@@ -35,11 +35,14 @@ def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
     elif name == "enable":
         enable_scope(scope, then)
     else:
-        _each(scope.members, lambda worker, done: when_idle(worker, lifecycle.reset, done), then)
+        _each(scope.members, lifecycle.reset, then)
 
 
-def _each(workers: Sequence[Worker], action: Action, then: Callable[[], None]) -> None:
-    """One after the other, in order of adding; without recursion, for there may be thousands."""
+def _each(workers: Iterable[Worker], action: Action, then: Callable[[], None]) -> None:
+    """Do it to those at rest, one after the other in order of adding; who is amid a firing or call follows after it.
+
+    Without recursion, for there may be thousands.
+    """
     rest = iter(workers)
     inside = done_inside = False
 
@@ -50,14 +53,21 @@ def _each(workers: Sequence[Worker], action: Action, then: Callable[[], None]) -
             return
         inside = True
         for worker in rest:
+            if worker.busy:
+                when_idle(worker, action, _nothing)
+                continue
             done_inside = False
-            action(worker, step)
+            when_idle(worker, action, step)
             if not done_inside:
                 inside = False
                 return
         then()
 
     step()
+
+
+def _nothing() -> None:
+    """Nobody waits for it."""
 
 
 def disable_scope(scope: Scope) -> None:
@@ -68,11 +78,15 @@ def disable_scope(scope: Scope) -> None:
     core = scope.worker.core
     if core.trace is not None and _is_alone_in_it(scope):
         core.trace(NodeEnabled(core.now(), scope.path, False))
-    for worker in scope.members:
-        if not worker.blocked & DISABLED:
-            block(worker, DISABLED)
-            lifecycle.settle_disabled(worker)
+    for worker in (*scope.members, *_owners(scope)):
+        lifecycle.disable_around(worker)
     wiring.refresh_via(scope)
+
+
+def _owners(scope: Scope) -> list[Worker]:
+    """The workers of the subgraph itself and of those inside: their slots and events are disabled with them (F10)."""
+    owners = [one.worker for one in scope.worker.core.scopes] if scope.worker is not None else []
+    return [owner for owner in owners if owner is not None and scope in owner.around]
 
 
 def _is_alone_in_it(scope: Scope) -> bool:
@@ -85,8 +99,8 @@ def _is_alone_in_it(scope: Scope) -> bool:
     return True
 
 
-def enable_scope(scope: Scope, then: Callable[[], None]) -> None:
-    """Enable the subgraph: the nodes that were not disabled themselves start afresh."""
+def enable_scope(scope: Scope, then: Callable[[], None], fresh: Collection[Worker] = ()) -> None:
+    """Enable the subgraph: nodes that were not disabled themselves start afresh, unless they are `fresh` already."""
     if scope.enabled or scope.worker is None:
         then()
         return
@@ -95,16 +109,17 @@ def enable_scope(scope: Scope, then: Callable[[], None]) -> None:
     if core.trace is not None and _is_alone_in_it(scope):
         core.trace(NodeEnabled(core.now(), scope.path, True))
     wiring.refresh_via(scope)
-
-    def one(worker: Worker, done: Callable[[], None]) -> None:
-        if worker.own_enabled and all(around.enabled for around in worker.around):
-            when_idle(worker, lifecycle.enable, done)
-        else:
-            done()
+    for owner in _owners(scope):
+        if all(one.enabled for one in owner.around):
+            lifecycle.enable_around(owner)
 
     def finished() -> None:
         for worker in scope.members:
             consider(worker)
         then()
 
-    _each(scope.members, one, finished)
+    meant = [worker for worker in scope.members if worker.own_enabled and all(one.enabled for one in worker.around)]
+    for worker in meant:
+        if worker in fresh:
+            lifecycle.enable(worker, _nothing, fresh=True)
+    _each([worker for worker in meant if worker not in fresh], lifecycle.enable, finished)

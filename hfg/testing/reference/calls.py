@@ -93,7 +93,7 @@ class Calling(Firing):
             return
         self.flush_changes(station)
         self.observe(CallEnded(self.now, station.path, flight.number, "done" if error is None else "failed"))
-        station.flight, station.unready = None, False
+        self.be_idle(station)
         line = flight.line
         if line is not None and not line.edge.is_event and line.unprocessed:
             self.process(line)
@@ -133,12 +133,15 @@ class Calling(Firing):
         elif name == "deactivate":
             self.quench(-2 - owner, "slot")
         else:
-            for member in self.structure.boxes[-2 - owner].members:
-                self.restart(self.stations[member])
+            for station in self.members_of(owner):
+                if station.flight is None:
+                    self.restart(station)
+                else:
+                    station.afterwards = station.afterwards or "reset"
 
     def restart(self, station: Station) -> None:
-        """Teardown, setup, not ended; tokens and A(v) stay."""
-        if station.leaf.inside is None:
+        """Teardown, setup, not ended; tokens and A(v) stay. In a back-off that is done when it is over (X1)."""
+        if station.leaf.inside is None and station.resting_until is None:
             self.tear_down(station)
             self.set_up(station)
 
@@ -146,7 +149,6 @@ class Calling(Firing):
         """Make the node as new: state, generator, not ended."""
         station.iterator = None
         station.ending = station.ended = station.stops_itself = False
-        station.resting_until = None
         station.unready = False
         station.set_up = True
         if station.leaf.inside is None:
@@ -177,7 +179,11 @@ class Calling(Firing):
         before = [self.is_enabled(station.leaf.index) for station in members]
         if self._set_enabled(owner, True):
             for station, was in zip(members, before, strict=True):
-                if not was and self.is_enabled(station.leaf.index):
+                if was or not self.is_enabled(station.leaf.index):
+                    continue
+                if is_box(owner) and station.flight is not None:
+                    station.afterwards = "enable"
+                elif station.resting_until is None:
                     self.tear_down(station)
                     self.set_up(station)
             self.settle()
@@ -187,11 +193,14 @@ class Calling(Firing):
         members = self.members_of(owner)
         before = [self.is_enabled(station.leaf.index) for station in members]
         if self._set_enabled(owner, False):
+            for station in members:
+                station.afterwards = station.afterwards.replace("enable", "")
             for station, was in zip(members, before, strict=True):
                 if was and not self.is_enabled(station.leaf.index):
                     self._silence(station)
             if is_box(owner):
-                self._empty(lambda line: line.edge.target.owner == owner and line.edge.target.name != "enable")
+                shut = [-2 - box.index for box in self.structure.boxes if -2 - owner in (*box.boxes, box.index)]
+                self._empty(lambda line: line.edge.target.owner in shut and line.edge.target.name != "enable")
             self.settle()
 
     def _set_enabled(self, owner: int, enabled: bool) -> bool:

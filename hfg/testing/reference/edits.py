@@ -82,6 +82,7 @@ class Editing(Calling):
         return transaction.changes
 
     def _follow(self, changes: Sequence[Change]) -> None:
+        self._switch(changes)
         name_of = {owner: self._name_of(owner) for owner in self._owners()}  # by what it is, not by its number
         before = {id(station.leaf.node): station for station in self.stations}
         boxes = {id(box.node): box.index for box in self.structure.boxes}
@@ -94,6 +95,8 @@ class Editing(Calling):
         old_lines = [(name_of[line.edge.source.owner], name_of[line.edge.target.owner], line) for line in self.lines]
         senders = [(lying, name_of.get(lying.sender, "")) for line in self.lines for lying in line.queue]
         after = whole(self.graph)
+        enabled = [station for station in self.stations if self.is_enabled(station.leaf.index)]
+        self._disable_for_good(boxes, {id(box.node) for box in after.boxes})
         self._exchange_stations(after, before)
         self._exchange_boxes(after, boxes)
         number_of = {self._name_of(owner): owner for owner in self._owners()}
@@ -119,9 +122,10 @@ class Editing(Calling):
         for station in before.values():
             if id(station) not in here:
                 self._remove(station)
-        for of_boxes in (False, True):  # nodes first: then subgraphs find out who is to start afresh
-            for change in changes:
-                self._set(change, of_boxes)
+        self._set_parameters(changes)
+        for station in enabled:
+            if id(station) in here and not self.is_enabled(station.leaf.index) and station.enabled:
+                self._silence(station)
         for station in self.stations:
             self._process_what_is_pipelined_now(station)
 
@@ -238,27 +242,39 @@ class Editing(Calling):
         if station.resting_until is None:  # else its back-off does it
             self.set_up(station)
 
-    def _set(self, change: Change, of_boxes: bool) -> None:
-        """Parameters, and what is enabled (F10)."""
-        if not isinstance(change, ParameterChange | OptionsChange):
-            return
-        owner = self._owner_of(change.node)
-        if owner is None or is_box(owner) is not of_boxes:
-            return
-        if isinstance(change, ParameterChange):
-            if owner >= 0:
-                self.stations[owner].node._parameters[change.name] = change.after
-            self.observe(ParameterSet(self.now, self.path_of(owner), change.name, change.after))
-        elif change.before.group == change.after.group:
-            if change.after.enabled:
+    def _switch(self, changes: Sequence[Change]) -> None:
+        """Enable and disable what there was before (F10): nodes first, then subgraphs."""
+        number = {id(station.leaf.node): station.leaf.index for station in self.stations}
+        number |= {id(box.node): -2 - box.index for box in self.structure.boxes}
+        switched = []
+        for change in changes:
+            if isinstance(change, NodeSwap) and id(change.old) in number:
+                number[id(change.new)] = number[id(change.old)]
+            elif isinstance(change, OptionsChange) and id(change.node) in number and _is_switch(change):
+                switched.append((number[id(change.node)], change.after.enabled))
+        for owner, enabled in sorted(switched, key=lambda one: is_box(one[0])):
+            if enabled:
                 self.enable(owner)
             else:
                 self.disable(owner)
 
-    def _owner_of(self, node: Any) -> int | None:
-        """Whose a drawn node is; None if the same edit has removed it."""
-        stations = [index for index, station in enumerate(self.stations) if station.leaf.node is node]
-        return next(iter([*stations, *(-2 - box.index for box in self.structure.boxes if box.node is node)]), None)
+    def _disable_for_good(self, boxes: dict[int, int], stay: set[int]) -> None:
+        """What was in a disabled subgraph that is no more stays disabled (G1)."""
+        for node, index in boxes.items():
+            if node not in stay and not self.box_enabled[index]:
+                for member in self.structure.boxes[index].members:
+                    self.stations[member].enabled = False
+
+    def _set_parameters(self, changes: Sequence[Change]) -> None:
+        owner_of = {id(station.leaf.node): station.leaf.index for station in self.stations}
+        owner_of |= {id(box.node): -2 - box.index for box in self.structure.boxes}
+        for change in changes:
+            if isinstance(change, ParameterChange):
+                owner = owner_of.get(id(change.node))
+                if owner is not None:
+                    if owner >= 0:
+                        self.stations[owner].node._parameters[change.name] = change.after
+                    self.observe(ParameterSet(self.now, self.path_of(owner), change.name, change.after))
 
     def _process_what_is_pipelined_now(self, station: Station) -> None:
         """In its new group a node's mode may be another (F5)."""
@@ -268,6 +284,11 @@ class Editing(Calling):
                 self.process(line)
             else:
                 station.owed.append(line)
+
+
+def _is_switch(change: OptionsChange) -> bool:
+    """Whether it is about what is enabled, not about the group."""
+    return change.before.group == change.after.group
 
 
 def _kind(edge: Edge) -> tuple[Any, ...]:

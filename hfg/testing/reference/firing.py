@@ -273,7 +273,7 @@ class Firing(RunningCode):
         if flight.void and outcome == "done":
             outcome = "abandoned"
         self.observe(FiringEnded(self.now, station.path, flight.number, outcome))
-        station.flight, station.unready = None, False
+        self.be_idle(station)
         for line in flight.taken:
             if line.edge.is_event or line.delay:
                 continue
@@ -282,6 +282,17 @@ class Firing(RunningCode):
             else:
                 station.owed.append(line)
         self.settle()
+
+    def be_idle(self, station: Station) -> None:
+        """A firing or call is over; what a subgraph around the node wanted meanwhile is done now (F10, G2)."""
+        station.flight, station.unready = None, False
+        afterwards, station.afterwards = station.afterwards, ""
+        if afterwards:
+            self.restart(station)
+
+    def restart(self, station: Station) -> None:
+        """Teardown, setup, not ended."""
+        raise NotImplementedError
 
     def shipments(self, flight: Flight, *, silent: bool) -> list[tuple[Line, Any, int | None, float]]:
         """One token for every edge of every output (F3); parameters send theirs unless the firing is silent (P8)."""

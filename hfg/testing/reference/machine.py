@@ -441,6 +441,7 @@ class ReferenceMachine(Editing):
             if self.times_out(owner):
                 self.time_activity_out(owner)
             elif owner >= 0:
+                self.stations[owner].resting_until = None
                 self.restart(self.stations[owner])
         self.settle()
 

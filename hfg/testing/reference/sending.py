@@ -57,7 +57,7 @@ class Sending(State):
 
     def put_together(self, sender: int, shipments: Iterable[Shipment], flight: Flight | None = None) -> None:
         """Put all tokens of one sending; nothing comes of it yet."""
-        ordered = sorted(shipments, key=lambda shipment: shipment[0].edge.target.kind != "slot")
+        ordered = sorted(shipments, key=lambda shipment: not self.is_called(shipment[0]))
         gives = self.is_active(sender) or (flight is not None and flight.right)
         gave = False
         for line, value, explicit, stamp in ordered:
@@ -233,11 +233,7 @@ class Sending(State):
             target = line.edge.target
             if not line.queue or self.is_outside(target.owner):
                 continue
-            marker = (
-                target.kind in ("slot", "parameter")
-                and line in self.lines_called(target.owner)
-                and line.queue[0].token.is_marker
-            )
+            marker = self.is_called(line) and line.queue[0].token.is_marker
             ended = target.owner >= 0 and self.stations[target.owner].ending and line in self.lines_joined(target.owner)
             if not marker and not ended:
                 continue

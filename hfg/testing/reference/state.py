@@ -96,6 +96,7 @@ class Station:
     owed: list[Line] = field(default_factory=list)  # taken by the last firing, processed when the outputs are (F5)
     hold_until: float = float("-inf")  # F11
     last_function: float = float("-inf")  # for the idle rate of a gate
+    afterwards: str = ""  # "enable" or "reset": what a subgraph around it wants as soon as its firing or call is over
     resting_until: float | None = None  # the back-off of a restart
     restarts: int = 0
     iterator: Any = None
@@ -166,13 +167,13 @@ class State:
         ]
 
     def lines_called(self, owner: int) -> list[Line]:
-        """Edges whose tokens are worked on one by one: into slots, and signals into parameters."""
-        return [
-            line
-            for line in self.lines
-            if line.edge.target.owner == owner
-            and (line.edge.target.kind == "slot" or (line.edge.target.kind == "parameter" and line.edge.is_event))
-        ]
+        """Edges whose tokens are worked on one by one."""
+        return [line for line in self.lines if line.edge.target.owner == owner and self.is_called(line)]
+
+    def is_called(self, line: Line) -> bool:
+        """Whether the edge leads into a slot, or a signal into a parameter."""
+        kind = line.edge.target.kind
+        return kind == "slot" or (kind == "parameter" and line.edge.is_event)
 
     def is_live(self, line: Line) -> bool:
         """A live edge: both ends are enabled, or the target port is an `enable` slot."""
@@ -201,6 +202,7 @@ class State:
         around = station.leaf.within
         return (
             station.enabled
+            and station.afterwards != "enable"
             and all(self._box_open(box) for box in station.leaf.boxes)
             and (around is None or self.is_enabled(around))
         )

@@ -1,0 +1,264 @@
+"""Enabling and disabling by edits and by subgraphs, also amid firings and back-offs (rules F10, G2, R4)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+
+import hfg
+from hfg import commands as c
+from hfg.errors import NodeError
+from hfg.testing import Recorder, recorder, replay
+from hfg.testing.nodes import Failing, Scaled, Waiting, add, ascript, double, script, sink
+from hfg.trace import (
+    CallStarted,
+    EventTriggered,
+    FiringEnded,
+    FiringStarted,
+    NodeEnabled,
+    StructureChanged,
+    TokenDropped,
+)
+
+
+class Pair(hfg.Subgraph):
+    """A slow node and a quick one, each with a source of its own."""
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.add(script(values=(1, 2)), name="some") >> graph.add(Waiting(pause_s=0.01), name="slow")
+        graph.add(ascript(values=(1, 2, 3, 4), pause_s=0.003), name="others") >> graph.add(double(), name="quick")
+
+
+class Last(hfg.Node):
+    """Speaks at the end only."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> None:
+        """Keep quiet."""
+
+    def end(self) -> None:
+        self.out.send(7)
+
+
+class Moody(hfg.Node):
+    """Takes its time to be set up, and may fail at it."""
+
+    fails = hfg.State(False)
+
+    async def setup(self) -> None:
+        await asyncio.sleep(0.005)
+        if REFUSES:
+            raise RuntimeError("no such device")
+
+    def process(self, value: int) -> int:
+        return value
+
+
+REFUSES: list[str] = []
+
+
+def pair(*, off_s: float | None = None, on_s: float | None = None) -> hfg.Graph:
+    graph = hfg.Graph()
+    box = graph.add(Pair(), name="pair")
+    if off_s is not None:
+        graph.connect(graph.add(ascript(values=(0,), pause_s=off_s), name="off").out, box.disable)
+    if on_s is not None:
+        graph.connect(graph.add(ascript(values=(0,), pause_s=on_s), name="on").out, box.enable)
+    return graph
+
+
+def drive(
+    build: Callable[[], hfg.Graph], body: Callable[[hfg.Run], Awaitable[Any]] | None = None, *, compare: bool = True
+) -> Recorder:
+    """Run a graph in virtual time, do something to it, and let the oracle judge it."""
+    trace = recorder()
+
+    async def main() -> None:
+        async with hfg.running(build(), trace=trace) as run:
+            if body is not None:
+                await body(run)
+            await run.wait_finished()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        runner.run(main())
+    if compare:
+        replay(build(), trace)
+    return trace
+
+
+def firings(trace: Recorder, node: str) -> list[float]:
+    return [round(event.time, 6) for event in trace if isinstance(event, FiringStarted) and event.node == node]
+
+
+@pytest.mark.rule("F10", "G2")
+def test_a_subgraph_enabled_amid_a_firing_inside_gets_that_node_back_when_it_is_over() -> None:
+    trace = drive(lambda: pair(off_s=0.002, on_s=0.004))
+    assert [event.time for event in trace if isinstance(event, NodeEnabled)] == [0.002, 0.004]
+    ends = [(round(e.time, 6), e.outcome) for e in trace if isinstance(e, FiringEnded) and e.node == "pair/slow"]
+    assert ends[0] == (0.01, "abandoned")
+    assert firings(trace, "pair/others")[1] == 0.004  # at once, and from its beginning
+
+
+@pytest.mark.rule("R4", "F10", "G2")
+def test_an_edit_that_enables_a_subgraph_waits_for_the_firings_inside() -> None:
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.002)
+        await run.edit(c.Disable("pair"))
+        await asyncio.sleep(0.002)
+        await run.undo()
+
+    trace = drive(pair, body)
+    assert [event.time for event in trace if isinstance(event, NodeEnabled)] == [0.002, 0.01]
+    assert firings(trace, "pair/others")[1] == 0.01
+
+
+@pytest.mark.rule("R4", "F10")
+def test_what_an_edit_enables_is_set_up_before_and_takes_part_from_one_moment_on() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source = graph.add(script(values=(1, 2, 3, 4)), max_rate_hz=250.0)
+        source >> graph.add(Moody(), name="moody", enabled=False) >> graph.add(sink())
+        source >> graph.add(sink(), name="free")
+        return graph
+
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.001)
+        await run.edit(c.Enable("moody"))
+        assert run.now() == 0.011  # of those, five for the setup at the beginning
+
+    trace = drive(build, body, compare=False)
+    events = list(trace)
+    at = next(number for number, event in enumerate(events) if isinstance(event, StructureChanged))
+    assert events[at + 1] == NodeEnabled(events[at].time, "moody", True)
+    assert firings(trace, "free") == [0.005, 0.009, 0.013, 0.017, 0.021]
+    assert trace.values("moody.out -> sink.value")[:-1] == [3, 4]
+
+
+@pytest.mark.rule("R4", "F10")
+def test_a_node_whose_setup_fails_stays_disabled_and_the_run_goes_on() -> None:
+    graph = hfg.Graph()
+    source = graph.add(script(values=(1, 2, 3)), max_rate_hz=100.0)
+    source >> graph.add(Moody(), name="moody") >> graph.add(sink())
+
+    async def body(run: hfg.Run) -> None:
+        await run.edit(c.Disable("moody"))
+        REFUSES.append("yes")
+        try:
+            with pytest.raises(NodeError, match='"moody" failed in setup.*no such device'):
+                await run.edit(c.Enable("moody"))
+        finally:
+            REFUSES.clear()
+        assert not graph["moody"]._options.enabled
+        await run.edit(c.Enable("moody"))
+
+    trace = drive(lambda: graph, body, compare=False)
+    assert [event.enabled for event in trace if isinstance(event, NodeEnabled)] == [False, True]
+
+
+@pytest.mark.rule("R4", "G1", "F10")
+def test_a_disabled_subgraph_that_is_dissolved_leaves_disabled_nodes() -> None:
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.003)  # its slot has disabled it by now
+        await run.edit(c.Disconnect("off.out", "pair.disable"))
+        await run.edit(c.Dissolve("pair"))
+        await asyncio.sleep(0.009)
+        await run.edit(c.Enable("others"), c.Enable("quick"))
+
+    def build() -> hfg.Graph:
+        graph = pair(off_s=0.002)
+        graph.add(script(values=(1, 2, 3)), name="clock", max_rate_hz=100.0) >> graph.add(sink())
+        return graph
+
+    trace = drive(build, body)
+    assert firings(trace, "others")[0] == 0.019  # removing waited for the firing of "slow"
+    assert firings(trace, "slow") == []
+
+
+@pytest.mark.rule("R4", "G1", "F10")
+def test_enabled_and_dissolved_in_one_edit_and_back_again() -> None:
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.001)
+        await run.edit(c.Disable("pair"))
+        await run.edit(c.Enable("pair"), c.Dissolve("pair"))
+        await asyncio.sleep(0.004)
+        await run.undo()
+        await run.redo()
+
+    trace = drive(pair, body)
+    assert len(firings(trace, "others")) > 4
+    told = [(event.node, event.enabled) for event in trace if isinstance(event, NodeEnabled)]
+    assert told[:2] == [("pair", False), ("pair", True)]
+
+
+@pytest.mark.rule("X1", "F10", "R4")
+def test_enabling_a_node_in_its_back_off_does_not_cut_that_short() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source = graph.add(script(values=(1, 2, 3)))
+        weak = graph.add(Failing(at=1), name="weak", on_error="restart", restart_backoff_s=0.05)
+        graph.connect(source.out, weak.value)
+        return graph
+
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.01)
+        await run.edit(c.Disable("weak"))
+        await run.edit(c.Enable("weak"))
+
+    assert firings(drive(build, body), "weak")[1] == 0.05
+
+
+@pytest.mark.rule("R4", "F12")
+def test_a_removed_node_that_waits_to_send_its_end_sends_nothing() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        last = graph.add(Last(), name="last")
+        graph.add(script(values=())) >> last
+        last >> graph.add(sink(), name="free")
+        join = graph.add(add(), name="join")
+        graph.connect(last.out, join.a)  # lies there: nothing comes to the other input
+        graph.connect(graph.add(script(), name="other", enabled=False).out, join.b)
+        return graph
+
+    async def body(run: hfg.Run) -> None:
+        await run.wait_quiet()
+        await run.edit(c.Remove("last"))
+
+    trace = drive(build, body)
+    assert trace.values("last.out -> free.value") == [7]
+    assert [event.edge for event in trace if isinstance(event, TokenDropped)] == ["last.out -> join.a"]
+
+
+@pytest.mark.rule("A9", "A12")
+def test_what_a_time_out_amid_a_firing_takes_away_is_told_behind_it() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        slow = graph.add(Waiting(pause_s=0.02), name="slow", active_for_s=0.005)
+        graph.add(script(values=(1,))) >> slow
+        graph.connect(slow.timeout, graph.add(Scaled(), name="next").activate, active=True)
+        graph.connect(slow.deactivated, graph.add(Scaled(), name="told").activate)
+        graph.start.activates(slow.activate)
+        return graph
+
+    trace = drive(build)
+    moments = {event.event: round(event.time, 6) for event in trace if isinstance(event, EventTriggered)}
+    assert (moments["slow.timeout"], moments["slow.deactivated"]) == (0.005, 0.02)
+
+
+@pytest.mark.rule("F9", "P8")
+def test_signals_into_slots_and_parameters_arrive_in_order_of_connecting() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        wait = graph.add(Waiting(pause_s=0.001), name="wait")
+        graph.add(script(values=(3,))) >> wait
+        scaled = graph.add(Scaled(), name="scaled")
+        graph.connect(wait.before, scaled.ports.parameters["factor"])
+        graph.connect(wait.before, scaled.ports.slots["ping"])
+        return graph
+
+    calls = [event.slot for event in drive(build) if isinstance(event, CallStarted) and event.node == "scaled"]
+    assert calls == ["factor", "ping"]
