@@ -7,7 +7,9 @@ Only workers marked `watched` come here. Stands on `sending`.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
+
+import msgspec
 
 from hfg.engine.agenda import block, consider, must_wait, unblock
 from hfg.engine.core import Core
@@ -16,7 +18,7 @@ from hfg.engine.scopes import Scope
 from hfg.engine.sending import flush_automatic, trigger
 from hfg.engine.worker import RATE, RESTING, Worker
 
-__all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed", "strip"]
+__all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
 
 
 def changed(worker: Worker, active: bool) -> None:
@@ -66,7 +68,7 @@ def _time_out(worker: Worker) -> None:
     trigger(event, stamp=worker.core.now(), extend_right=False)
     worker.right = False  # behind the sending, which may have given it (A3)
     if worker.scope is not None and before and not worker.active:
-        deactivate_inside(worker.scope)
+        deactivate_inside(worker.scope, "sent")
     scopes_changed(worker.core)
     if worker.busy in ("", "edit"):  # else after the firing (A9)
         flush_automatic(worker)
@@ -100,9 +102,10 @@ def rest(worker: Worker) -> None:
 
 
 def scopes_changed(core: Core) -> None:
-    """G2: derive A(subgraph) anew for all that were touched; inner ones first."""
+    """G2: derive A(subgraph) anew for all that were touched; inner ones first, the last of those side by side."""
     while core.dirty_scopes:
-        scope = core.dirty_scopes.pop()
+        scope = max(core.dirty_scopes, key=_index)
+        core.dirty_scopes.remove(scope)
         active = scope.derive()
         if active == scope.active:
             continue
@@ -119,6 +122,10 @@ def scopes_changed(core: Core) -> None:
             _flush_scope(scope)
 
 
+def _index(scope: Scope) -> int:
+    return scope.index
+
+
 def _flush_scope(scope: Scope) -> None:
     """Activity that leaves by these events is taken from everything inside (G2)."""
     owner = scope.worker
@@ -126,39 +133,48 @@ def _flush_scope(scope: Scope) -> None:
     before = owner.active
     flush_automatic(owner)
     if before and not owner.active:
-        deactivate_inside(scope)
+        deactivate_inside(scope, "sent")
 
 
-def deactivate_inside(scope: Scope) -> None:
+def deactivate_inside(scope: Scope, cause: Literal["sent", "slot"]) -> None:
     """Take all activity from the inside: of nodes, and of tokens under way."""
     if not scope.watched:
         scope.find_inner_edges()
+    assert scope.worker is not None
+    core = scope.worker.core
     for edge in scope.inner_edges:
-        strip(edge)
+        _strip(edge, also_taking=False)
+        touch(core, edge.target.scopes)
     for worker in scope.members:
-        worker.right = False
-        set_active(worker, False, "slot")
-    touch(scope.members[0].core, (scope,)) if scope.members else None
+        _forget(worker)
+        set_active(worker, False, cause)
+        touch(core, worker.scopes)
+    touch(core, (scope,))
 
 
-def strip(edge: Any) -> None:
-    """Set the modifiers of what lies on an edge to 0 (A14)."""
-    import msgspec
+def _forget(worker: Worker) -> None:
+    """Take the right of A3, and what the tokens that were drained are to do (F12)."""
+    worker.right = False
+    if worker.deferred:
+        worker.deferred = [0] * len(worker.deferred)
 
-    if hasattr(edge, "queue"):
-        for position, token in enumerate(edge.queue):
-            if token.activity:
-                edge.queue[position] = msgspec.structs.replace(token, activity=0)
-    elif edge.token is not None and edge.token.activity:
-        edge.token = msgspec.structs.replace(edge.token, activity=0)
+
+def _strip(edge: Any, *, also_taking: bool) -> None:
+    """Set the modifiers of what lies on an edge to 0 (A14): those of +1, also those of -1."""
+    queue = edge.queue if hasattr(edge, "queue") else [edge.token] if edge.token is not None else []
+    for position, token in enumerate(queue):
+        if token.activity > 0 or (also_taking and token.activity):
+            queue[position] = msgspec.structs.replace(token, activity=0)
+    if not hasattr(edge, "queue") and queue:
+        edge.token = queue[0]
 
 
 def reset_activity(core: Core) -> None:
     """A14: all A(v) := 0, modifiers := 0, the right of A3 ends, then `start` is triggered."""
     for edge in core.edges:
-        strip(edge)
+        _strip(edge, also_taking=True)
     for worker in core.workers:
-        worker.right = False
+        _forget(worker)
         if worker.scope is None:
             set_active(worker, False, "reset")
     touch(core, core.scopes)

@@ -7,7 +7,7 @@ from typing import Any
 
 from hfg.engine import builtin_slots
 from hfg.engine.agenda import freed, idle_again
-from hfg.engine.modifiers import derive_scopes, receive, touch
+from hfg.engine.modifiers import derive_scopes, lose, receive, touch
 from hfg.engine.releasing import release
 from hfg.engine.sending import flush_automatic
 from hfg.engine.worker import Worker
@@ -45,8 +45,10 @@ def call(worker: Worker) -> None:
     if token.activity:
         if worker.scopes:
             touch(core, worker.scopes)
-        receive(worker, (token.activity,))
-        derive_scopes(core)
+        if worker.scope is None:
+            receive(worker, (token.activity,))
+        elif token.activity > 0:  # a subgraph has no activity but that of its nodes (G2)
+            lose(edge)
     if edge.target_kind == "parameter":
         set_parameter(worker, name, token.value)
         finish_call(worker, "done")
@@ -54,7 +56,9 @@ def call(worker: Worker) -> None:
     handler = worker.handlers.get(name)
     if handler is None:
         builtin_slots.run(worker, name, token, lambda: finish_call(worker, "done"))
+        derive_scopes(core)  # behind what `activate` does (A7)
         return
+    derive_scopes(core)
     ticket = worker.ticket
 
     def done(result: Any, error: BaseException | None) -> None:
@@ -97,8 +101,10 @@ def refuse_coroutine(worker: Worker, coroutine: Any) -> TypeError:
 def finish_call(worker: Worker, outcome: Any) -> None:
     """The automatic events follow (A9), then the call is over: an O->S token is processed (F6)."""
     core = worker.core
-    derive_scopes(core)
     flush_automatic(worker)
+    if core.dirty_scopes:
+        derive_scopes(core)
+        flush_automatic(worker)  # activity that left by events of a subgraph around it
     if core.trace is not None:
         core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
     edge = worker.call_edge

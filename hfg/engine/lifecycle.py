@@ -6,7 +6,7 @@ Each setup is followed by a teardown before the next one, whatever happens to a 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from hfg.engine import wiring
@@ -122,15 +122,16 @@ def disable(worker: Worker) -> None:
     block(worker, DISABLED)
     if core.trace is not None:
         core.trace(NodeEnabled(core.now(), worker.path, False))
-    _settle_disabled(worker)
+    _settle_disabled([worker])
     derive_scopes(core)
 
 
-def disable_around(worker: Worker) -> None:
-    """A subgraph around the node is disabled; its own flag stays (G2)."""
-    if not worker.blocked & DISABLED:
+def disable_around(workers: Iterable[Worker]) -> None:
+    """A subgraph around them is disabled; their own flags stay (G2)."""
+    newly = [worker for worker in workers if not worker.blocked & DISABLED]
+    for worker in newly:
         block(worker, DISABLED)
-        _settle_disabled(worker)
+    _settle_disabled(newly)
 
 
 def enable_around(owner: Worker) -> None:
@@ -139,17 +140,20 @@ def enable_around(owner: Worker) -> None:
     wiring.refresh(owner)
 
 
-def _settle_disabled(worker: Worker) -> None:
-    """Empty the edges of a node that was disabled and rewire its neighbours."""
-    incoming = [edge for edge in worker.edges_in() if not (edge.port_name == "enable" and edge.target_kind == "slot")]
-    outgoing = [edge for edges in worker.wired_out for edge in edges]
-    untaken = [edge for edge in outgoing if edge.untaken]
-    wiring.refresh(worker)  # first: activity that is given back may trigger, but not over edges that are dead now
-    for edge in (*incoming, *outgoing):
-        discard(edge, "disabled")
-    # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
-    worker.taken = ()
-    release([edge for edge in (*incoming, *untaken) if type(edge) is not EventEdge and edge.held])
+def _settle_disabled(workers: Sequence[Worker]) -> None:
+    """Rewire the neighbours of nodes that were disabled, then empty their edges."""
+    untaken = {edge for worker in workers for edges in worker.wired_out for edge in edges if edge.untaken}
+    for worker in workers:  # first: activity that is given back may trigger, but not over edges that are dead now
+        wiring.refresh(worker)
+    for worker in workers:
+        incoming = [one for one in worker.edges_in() if not (one.port_name == "enable" and one.target_kind == "slot")]
+        outgoing = [edge for edges in worker.wired_out for edge in edges]
+        for edge in (*incoming, *outgoing):
+            discard(edge, "disabled")
+        # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
+        worker.taken = ()
+        free = (*incoming, *(edge for edge in outgoing if edge in untaken))
+        release([edge for edge in free if type(edge) is not EventEdge and edge.held])
 
 
 def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> None:

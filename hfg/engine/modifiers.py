@@ -23,6 +23,7 @@ __all__ = [
     "discard",
     "drop",
     "give_back",
+    "lose",
     "receive",
     "report_error",
     "set_active",
@@ -106,13 +107,18 @@ def drop(edge: Edge, token: Token[Any], reason: Any) -> None:
 def give_back(edge: Edge) -> None:
     """A8: activity is never lost unseen: the sender has it again, or its loss is counted."""
     sender: Worker = edge.source
+    if sender.node is None or sender.scope is not None or sender.blocked & REMOVED:
+        lose(edge)
+    else:
+        set_active(sender, True, "returned")
+
+
+def lose(edge: Edge) -> None:
+    """Nobody can have the activity that came over the edge."""
     core: Core = edge.target.core
-    if sender.node is None or sender.blocked & REMOVED:
-        core.lost_activity += 1
-        if core.trace is not None:
-            core.trace(ActivityLost(core.now(), edge.label))
-        return
-    set_active(sender, True, "returned")
+    core.lost_activity += 1
+    if core.trace is not None:
+        core.trace(ActivityLost(core.now(), edge.label))
 
 
 def report_error(worker: Worker, what: str, error: str, policy: str) -> None:

@@ -385,7 +385,7 @@ def watch_scope(scope: Scope) -> None:
     scope.watched = True
     scope.find_inner_edges()
     scope.active = scope.derive()
-    for member in scope.members:
+    for member in scope.inside():
         member.scopes += (scope,)
         watch(member)
         if member.core.started:

@@ -191,7 +191,7 @@ class _Reforming:
                 core.by_path[flat_scope.path] = scope.worker
                 owners.append(scope.worker)
             scopes.append(scope)
-            owners[-1].around = scope.and_around()
+            owners[-1].around, owners[-1].scopes = scope.and_around(), ()
             scope.members = [workers[index] for index in flat_scope.members]
             for member in scope.members:
                 member.around += (scope,)
@@ -271,7 +271,7 @@ class _Reforming:
         for scope in core.scopes:
             if scope.watched:
                 scope.find_inner_edges()
-                for member in scope.members:
+                for member in scope.inside():
                     member.scopes += (scope,)
         plan.mark_scopes(core)
 
@@ -317,8 +317,7 @@ class _Reforming:
         for worker in touched:
             if not worker.busy:
                 flush_automatic(worker)
-            if any(not scope.enabled for scope in worker.around):
-                lifecycle.disable_around(worker)
+        lifecycle.disable_around(worker for worker in touched if any(not scope.enabled for scope in worker.around))
         quiet.judge_sources(core)
 
     def _bind(self, worker: Worker) -> None:

@@ -42,15 +42,24 @@ class Scope:
         """Give it and those around it, outermost first."""
         return (*(self.parent.and_around() if self.parent is not None else ()), self)
 
+    def inside(self) -> list[Worker]:
+        """Give the workers of all nodes and subgraphs inside."""
+        assert self.worker is not None
+        owners = [scope.worker for scope in self.worker.core.scopes if scope is not self]
+        return [*self.members, *(owner for owner in owners if owner is not None and self in owner.around)]
+
     def find_inner_edges(self) -> None:
         """Note the edges with both ends inside; left until somebody asks, since most subgraphs are just boxes."""
-        inside = {member.index for member in self.members}
-        edges = self.members[0].core.edges if self.members else []
-        self.inner_edges = [edge for edge in edges if edge.source.index in inside and edge.target.index in inside]
+        assert self.worker is not None
+        inside = set(self.inside())
+        self.inner_edges = [edge for edge in self.worker.core.edges if edge.source in inside and edge.target in inside]
 
     def derive(self) -> bool:
-        """Whether an inner node is active or a token with +1 lies untaken inside (G2)."""
-        return any(worker.active for worker in self.members) or any(
+        """Whether an inner node is active, or a token with +1 lies untaken inside or was drained and has yet to act.
+
+        (G2, F12).
+        """
+        return any(worker.active or (worker.deferred and 1 in worker.deferred) for worker in self.members) or any(
             token.activity > 0 for edge in self.inner_edges for token in edge.contents()
         )
 

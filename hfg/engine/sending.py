@@ -56,8 +56,7 @@ def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float |
         unplace(worker)
     if carried:
         _activity_left(worker)
-    if worker.core.drained:
-        _drained_act(worker.core)
+    _sent(worker.core)
 
 
 def _activity_left(worker: Worker) -> None:
@@ -70,7 +69,6 @@ def _activity_left(worker: Worker) -> None:
     elif worker.active:
         worker.right = worker.stamp is not None  # in a firing or call
         set_active(worker, False, "sent")
-    derive_scopes(worker.core)
 
 
 def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
@@ -129,16 +127,21 @@ def _drain(edge: Edge, token: Token[Any]) -> None:
     if token.activity:
         if target.deferred is not None and not into_slot:
             target.deferred.append(token.activity)
+            if target.scopes:
+                touch(core, target.scopes)
         else:
             core.drained.append((target, token.activity))
 
 
-def _drained_act(core: Core) -> None:
+def _sent(core: Core) -> None:
     """The sending is on its edges: the modifiers of what was drained act; then what arose by that leaves."""
-    drained, core.drained = core.drained, []
-    for target, modifier in drained:
-        receive(target, (modifier,))
-    derive_scopes(core)
+    drained = core.drained
+    if drained:
+        core.drained = []
+        for target, modifier in drained:
+            receive(target, (modifier,))
+    if core.dirty_scopes:
+        derive_scopes(core)
     for target, _ in drained:
         if target.busy in ("", "edit"):  # else it follows the firing or call under way
             flush_automatic(target)
@@ -157,6 +160,8 @@ def send_end(worker: Worker) -> None:
     deferred, worker.deferred = worker.deferred, None
     for modifier in deferred or ():
         receive(worker, (modifier,))
+    if deferred and worker.scopes:
+        touch(core, worker.scopes)
     derive_scopes(core)
     flush_automatic(worker)
     core.upstairs.node_ended(worker)
@@ -220,8 +225,7 @@ def trigger(
             _append(edge, value, modifier, stamp)
     if carried:
         _activity_left(worker)
-    if core.drained:
-        _drained_act(core)
+    _sent(core)
     if not core.pumping:
         core.host.kick()
 
@@ -238,9 +242,7 @@ def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
 def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
     """One token on one event edge, a sending of its own."""
     _append(edge, value, modifier, stamp)
-    core = edge.target.core
-    if core.drained:
-        _drained_act(core)
+    _sent(edge.target.core)
 
 
 def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:

@@ -13,6 +13,7 @@ from hfg.engine import lifecycle, wiring
 from hfg.engine.activity import deactivate_inside, scopes_changed
 from hfg.engine.agenda import consider
 from hfg.engine.lifecycle import when_idle
+from hfg.engine.modifiers import derive_scopes
 from hfg.engine.scopes import Scope
 from hfg.engine.worker import Worker
 from hfg.trace import NodeEnabled
@@ -25,9 +26,9 @@ Action = Callable[[Worker, Callable[[], None]], None]
 def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
     """Do to everything inside what the slot says."""
     if name == "deactivate":
-        deactivate_inside(scope)
-        if scope.members:
-            scopes_changed(scope.members[0].core)
+        deactivate_inside(scope, "slot")
+        if scope.worker is not None:
+            scopes_changed(scope.worker.core)
         then()
     elif name == "disable":
         then()
@@ -78,15 +79,9 @@ def disable_scope(scope: Scope) -> None:
     core = scope.worker.core
     if core.trace is not None and _is_alone_in_it(scope):
         core.trace(NodeEnabled(core.now(), scope.path, False))
-    for worker in (*scope.members, *_owners(scope)):
-        lifecycle.disable_around(worker)
     wiring.refresh_via(scope)
-
-
-def _owners(scope: Scope) -> list[Worker]:
-    """The workers of the subgraph itself and of those inside: their slots and events are disabled with them (F10)."""
-    owners = [one.worker for one in scope.worker.core.scopes] if scope.worker is not None else []
-    return [owner for owner in owners if owner is not None and scope in owner.around]
+    lifecycle.disable_around((*scope.inside(), scope.worker))
+    derive_scopes(core)
 
 
 def _is_alone_in_it(scope: Scope) -> bool:
@@ -109,8 +104,8 @@ def enable_scope(scope: Scope, then: Callable[[], None], fresh: Collection[Worke
     if core.trace is not None and _is_alone_in_it(scope):
         core.trace(NodeEnabled(core.now(), scope.path, True))
     wiring.refresh_via(scope)
-    for owner in _owners(scope):
-        if all(one.enabled for one in owner.around):
+    for owner in (*scope.inside(), scope.worker):
+        if owner.scope is not None and all(one.enabled for one in owner.around):
             lifecycle.enable_around(owner)
 
     def finished() -> None:

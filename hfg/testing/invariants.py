@@ -176,14 +176,23 @@ def one_thing_at_a_time(events: list[TraceEvent]) -> list[str]:
 def ended_nodes_rest(events: list[TraceEvent]) -> list[str]:
     """A node that has ended fires no more, unless it is set up afresh (F12)."""
     ended: set[str] = set()
+    busy: set[str] = set()
+    afresh: set[str] = set()  # as soon as what they are amid is over, for a subgraph around them was meant
     found = []
     for event in events:
-        if isinstance(event, NodeEnded):
+        if isinstance(event, NodeEnded) and event.node not in afresh:
             ended.add(event.node)
         elif isinstance(event, NodeEnabled) or (isinstance(event, CallStarted) and event.slot in ("reset", "enable")):
-            ended = {node for node in ended if not (node == event.node or node.startswith(f"{event.node}/"))}
+            meant = f"{event.node}/"
+            ended = {node for node in ended if not (node == event.node or node.startswith(meant))}
+            afresh |= {node for node in busy if node.startswith(meant)}
         elif isinstance(event, FiringStarted) and event.node in ended:
             found.append(f'"{event.node}" fired after its end')
+        if isinstance(event, FiringStarted | CallStarted):
+            busy.add(event.node)
+            afresh.discard(event.node)
+        elif isinstance(event, FiringEnded | CallEnded):
+            busy.discard(event.node)
     return found
 
 

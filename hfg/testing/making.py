@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
 
 from hfg.testing import nodes as types
@@ -61,6 +61,7 @@ class Allowed:
     cycles: bool = True
     failures: bool = True
     boxes: bool = True
+    box_ports: bool = True  # subgraphs are meant themselves: their automatic ports, gates on them and by them
     gates: bool = True
     rates: bool = True
     waiting: bool = True
@@ -343,6 +344,45 @@ class _Making:
         by = choose.one_of([node for node in self.nodes if node is not target])
         return [GatePlan(target.name, by.name, choose.one_of([None, 100.0, 20.0]))]
 
+    def mean_boxes(self, boxes: list[BoxPlan], gates: list[GatePlan]) -> tuple[list[BoxPlan], list[GatePlan]]:
+        """Connect the automatic ports of subgraphs, limit how long they are active, gate them."""
+        choose, allowed = self.choose, self.allowed
+        inside: dict[str, set[str]] = {}
+        found = []
+        for box in boxes:
+            members = inside[box.name] = set().union(*({one, *inside.get(one, ())} for one in box.members))
+            first = min(index for index, node in enumerate(self.nodes) if node.name in members)
+            if allowed.events and choose.chance(25):
+                self._call_box(box.name, self.nodes[:first])
+            if allowed.events and allowed.activity and choose.chance(25):
+                self._hear_box(box.name)
+            if allowed.activity and choose.chance(10):
+                box = replace(box, options=box.options | {"active_for_s": choose.one_of([0.02, 0.005])})
+            others = [node.name for node in self.nodes if node.name not in members]
+            if allowed.gates and others and not gates and choose.chance(10):
+                pair = [box.name, choose.one_of(others)]
+                target, by = pair if choose.chance(50) else pair[::-1]
+                gates = [GatePlan(target, by, choose.one_of([None, 100.0, 20.0]))]
+            found.append(box)
+        return found, gates
+
+    def _call_box(self, name: str, before: Sequence[NodePlan]) -> None:
+        choose, allowed = self.choose, self.allowed
+        slots = ["disable", "enable", "reset"] if allowed.disabling else []
+        slots += ["deactivate"] if allowed.activity else []
+        if slots:
+            slot = choose.one_of(slots)
+            nearby = self.nodes if slot in ("disable", "deactivate") else before
+            self._edge(choose.one_of(self.events(nearby) + self.signals(nearby)), (name, "slot", slot))
+
+    def _hear_box(self, name: str) -> None:
+        choose = self.choose
+        slots = [(node.name, "slot", port) for node in self.nodes for port in self.type_of(node.name).slots]
+        slots = [slot for slot in slots if slot[2] in _ANY_SLOTS]
+        slots += [(node.name, "slot", port) for node in self.nodes for port in ("activate", "deactivate")]
+        event = choose.one_of(["activated", "deactivated", "timeout"])
+        self._edge((name, "event", event), choose.one_of(slots))
+
 
 def _description(kind: str) -> Any:
     made: Any = getattr(types, kind)
@@ -357,6 +397,8 @@ def make_plan(choose: Chooser, allowed: Allowed | None = None) -> GraphPlan:
     making.make_edges()
     boxes = making.make_boxes() if allowed.boxes else []
     gates = making.make_gates() if allowed.gates else []
+    if allowed.box_ports:
+        boxes, gates = making.mean_boxes(boxes, gates)
     groups = ("left", "right") if allowed.threads else ()
     feeds = tuple(name for name in FEEDS if any(edge.source == ("", "output", name) for edge in making.edges))
     return GraphPlan(tuple(making.nodes), tuple(making.edges), tuple(boxes), tuple(gates), groups, feeds)

@@ -72,8 +72,14 @@ class GraphPlan:
     __call__ = build
 
     def flat(self) -> GraphPlan:
-        """The same without boxes."""
-        return replace(self, boxes=())
+        """The same without boxes, and without what is said about them."""
+        boxes = {box.name for box in self.boxes}
+        return replace(
+            self,
+            edges=tuple(edge for edge in self.edges if boxes.isdisjoint((edge.source[0], edge.target[0]))),
+            boxes=(),
+            gates=tuple(gate for gate in self.gates if boxes.isdisjoint((gate.target, gate.by))),
+        )
 
     def without(self, *, nodes: frozenset[str] = frozenset(), edges: frozenset[int] = frozenset()) -> GraphPlan:
         """A smaller plan, for those who look for the smallest."""

@@ -26,6 +26,8 @@ class Calling(Firing):
         self.observe(TokenTaken(self.now, line.edge.label, lying.token))
         if not line.edge.is_event:
             line.unprocessed += 1
+        if is_box(owner) and lying.token.activity == 1:  # it has no activity but that of its nodes (G2)
+            self.lose_activity(line.edge.label)
         if owner < 0:
             self.call_of_whole(owner, name)
             self.observe(CallEnded(self.now, self.path_of(owner), number, "done"))
@@ -36,8 +38,10 @@ class Calling(Firing):
         station = self.stations[owner]
         flight = Flight(station, "call", number, "call", lying.token.stamp, slot=name, line=line)
         station.flight = flight
-        self.settle()  # a queue may have room again
+        self.note_places()  # a queue may have room again
         self.receive_activity(owner, [lying.token.activity])
+        if name in station.type.slots:  # else behind what the automatic slot does (A7)
+            self.settle()
         self.launch_call(flight, self.handler_of(station, name, lying.token))
         self.settle()
 
@@ -93,11 +97,11 @@ class Calling(Firing):
             return
         self.flush_changes(station)
         self.observe(CallEnded(self.now, station.path, flight.number, "done" if error is None else "failed"))
-        self.be_idle(station)
+        station.flight, station.unready = None, False
         line = flight.line
         if line is not None and not line.edge.is_event and line.unprocessed:
             self.process(line)
-        self.settle()
+        self.be_idle(station)
 
     def fail_call_of(self, station: Station, what: str, error: BaseException) -> bool:
         """A failed slot call is only counted, unless the policy is to stop; False if the run is over."""

@@ -17,7 +17,7 @@ from hfg.testing.reference.calls import Calling
 from hfg.testing.reference.state import Line, Lying, Station, fresh
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of, is_box, whole
 from hfg.token import Token
-from hfg.trace import ActivityLost, ParameterSet, TokenDropped, TokenProcessed
+from hfg.trace import ParameterSet, TokenDropped, TokenProcessed
 
 __all__ = ["Editing"]
 
@@ -214,8 +214,7 @@ class Editing(Calling):
                 if lying.sender >= 0:
                     self.set_active(lying.sender, True, "returned")
                 else:
-                    self.lost_activity += 1
-                    self.observe(ActivityLost(self.now, line.edge.label))
+                    self.lose_activity(line.edge.label)
         if not line.edge.is_event and (len(line.queue) > line.delay or line.unprocessed):
             self.observe(TokenProcessed(self.now, line.edge.label))
         line.queue.clear()
@@ -226,8 +225,7 @@ class Editing(Calling):
 
     def _remove(self, station: Station) -> None:
         if station.active:
-            self.lost_activity += 1
-            self.observe(ActivityLost(self.now, station.path))
+            self.lose_activity(station.path)
         for line in station.owed:
             if line in self.lines:
                 self.process(line)

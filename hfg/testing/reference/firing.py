@@ -273,7 +273,7 @@ class Firing(RunningCode):
         if flight.void and outcome == "done":
             outcome = "abandoned"
         self.observe(FiringEnded(self.now, station.path, flight.number, outcome))
-        self.be_idle(station)
+        station.flight, station.unready = None, False
         for line in flight.taken:
             if line.edge.is_event or line.delay:
                 continue
@@ -281,14 +281,15 @@ class Firing(RunningCode):
                 self.process(line)
             else:
                 station.owed.append(line)
-        self.settle()
+        self.be_idle(station)
 
     def be_idle(self, station: Station) -> None:
-        """A firing or call is over; what a subgraph around the node wanted meanwhile is done now (F10, G2)."""
-        station.flight, station.unready = None, False
-        afterwards, station.afterwards = station.afterwards, ""
-        if afterwards:
+        """A firing or call is over; what a subgraph around the node wanted meanwhile is done then (F10, G2)."""
+        self.settle()
+        if station.afterwards:
+            station.afterwards = ""
             self.restart(station)
+            self.settle()
 
     def restart(self, station: Station) -> None:
         """Teardown, setup, not ended."""

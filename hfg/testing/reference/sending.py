@@ -92,6 +92,7 @@ class Sending(State):
             flight = self.stations[member].flight
             if flight is not None:
                 flight.right = False
+            self.stations[member].drained_modifiers = [0 for _ in self.stations[member].drained_modifiers]
             self.set_active(member, False, cause)
 
     def put(self, line: Line, token: Token[Any], sender: int) -> None:
@@ -213,8 +214,12 @@ class Sending(State):
             if lying.sender >= 0:
                 self.set_active(lying.sender, True, "returned")
             else:
-                self.lost_activity += 1
-                self.observe(ActivityLost(self.now, line.edge.label))
+                self.lose_activity(line.edge.label)
+
+    def lose_activity(self, where: str) -> None:
+        """Nobody can have it: that is counted (A8)."""
+        self.lost_activity += 1
+        self.observe(ActivityLost(self.now, where))
 
     # --- what follows by itself
 
@@ -277,8 +282,7 @@ class Sending(State):
         """END follows on all outputs as soon as they are free (F4); then drained modifiers act (F12)."""
         for station in self.stations:
             index = station.leaf.index
-            firing = station.flight is not None and station.flight.what == "firing"
-            if station.ending and not station.ended and not firing and self.outputs_are_free(index):
+            if station.ending and not station.ended and station.flight is None and self.outputs_are_free(index):
                 lines = self.in_order_of_outputs(station)
                 self.put_together(index, [(line, END, None, station.stamp) for line in lines])
                 while self.drain_once():  # the own END too, if it comes round
@@ -314,7 +318,7 @@ class Sending(State):
             _, name, value = first.changes.pop(0)
             self.trigger(first.leaf.index, name, value)
             return True
-        for box in self.structure.boxes:
+        for box in reversed(self.structure.boxes):  # inner ones first
             active = self.is_active(-2 - box.index)
             if active != self.box_active[box.index] and not self.is_amid(box.index):
                 self.box_active[box.index] = active
@@ -356,6 +360,7 @@ class Sending(State):
         return (
             station.place is not None
             and station.flight is None
+            and not station.afterwards
             and (line is None or line.queue[0].place > station.place)
         )
 

@@ -249,13 +249,14 @@ class State:
     # --- activity
 
     def is_active(self, owner: int) -> bool:
-        """A(v); of a subgraph by G2: a node inside is active, or +1 is under way between two of them."""
+        """A(v); of a subgraph by G2: a node inside is active, or +1 is under way inside or was drained (F12)."""
         if owner >= 0:
             return self.stations[owner].active
         if not is_box(owner):
             return False
         members = self.structure.boxes[-2 - owner].members
-        return any(self.stations[member].active for member in members) or any(
+        stations = [self.stations[member] for member in members]
+        return any(station.active or 1 in station.drained_modifiers for station in stations) or any(
             lying.token.activity == 1 for line in self.lines_inside(-2 - owner) for lying in line.queue
         )
 
