@@ -101,10 +101,8 @@ def refuse_coroutine(worker: Worker, coroutine: Any) -> TypeError:
 def finish_call(worker: Worker, outcome: Any) -> None:
     """The automatic events follow (A9), then the call is over: an O->S token is processed (F6)."""
     core = worker.core
+    derive_scopes(core)
     flush_automatic(worker)
-    if core.dirty_scopes:
-        derive_scopes(core)
-        flush_automatic(worker)  # activity that left by events of a subgraph around it
     if core.trace is not None:
         core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
     edge = worker.call_edge

@@ -95,6 +95,7 @@ class Calling(Firing):
         station = flight.station
         if error is not None and not self.fail_call_of(station, f"slot {flight.slot}, call {flight.number}", error):
             return
+        self.settle()  # subgraphs around the node come first
         self.flush_changes(station)
         self.observe(CallEnded(self.now, station.path, flight.number, "done" if error is None else "failed"))
         station.flight, station.unready = None, False
