@@ -29,6 +29,9 @@ def changed(worker: Worker, active: bool) -> None:
     gate_changed(worker.gates)
     if worker.scopes:
         touch(core, worker.scopes)
+        for scope in worker.scopes:
+            if scope.gates:
+                _look_at(scope)
     if worker.has_hooks:
         _call_hook(worker, "on_activated" if active else "on_deactivated")
     if worker.busy in ("", "edit"):
@@ -102,24 +105,34 @@ def rest(worker: Worker) -> None:
 
 
 def scopes_changed(core: Core) -> None:
-    """G2: derive A(subgraph) anew for all that were touched; inner ones first, the last of those side by side."""
+    """G2: derive A(subgraph) anew for all that were touched, then tell it.
+
+    Inner ones first, the last of those side by side.
+    """
     while core.dirty_scopes:
+        for scope in core.dirty_scopes:
+            _look_at(scope)
         scope = max(core.dirty_scopes, key=_index)
         core.dirty_scopes.remove(scope)
-        active = scope.derive()
-        if active == scope.active:
+        if scope.told == scope.active:
             continue
-        scope.active = active
+        scope.told = active = scope.active
         owner = scope.worker
-        if owner is not None:
-            # the scope's worker shows A(subgraph), but nothing is transferred by itself
-            owner.active = active
-            owner.node._active = active
-            automatic(owner, "activated" if active else "deactivated")
-            _time_out_later(owner, active)
+        assert owner is not None
+        # the scope's worker shows A(subgraph), but nothing is transferred by itself
+        owner.active = active
+        owner.node._active = active
+        automatic(owner, "activated" if active else "deactivated")
+        _time_out_later(owner, active)
+        _flush_scope(scope)
+
+
+def _look_at(scope: Scope) -> None:
+    """Derive A(subgraph); what it gates follows at once."""
+    active = scope.derive()
+    if active != scope.active:
+        scope.active = active
         gate_changed(scope.gates)
-        if owner is not None:
-            _flush_scope(scope)
 
 
 def _index(scope: Scope) -> int:

@@ -40,8 +40,6 @@ def call(worker: Worker) -> None:
         now = core.now()
         core.trace(CallStarted(now, worker.path, worker.call_number, name, edge.label))
         core.trace(TokenTaken(now, edge.label, token))
-    if type(edge) is EventEdge:
-        freed(edge)
     if token.activity:
         if worker.scopes:
             touch(core, worker.scopes)
@@ -49,6 +47,8 @@ def call(worker: Worker) -> None:
             receive(worker, (token.activity,))
         elif token.activity > 0:  # a subgraph has no activity but that of its nodes (G2)
             lose(edge)
+    if type(edge) is EventEdge:
+        freed(edge)
     if edge.target_kind == "parameter":
         set_parameter(worker, name, token.value)
         finish_call(worker, "done")

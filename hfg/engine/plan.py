@@ -384,7 +384,7 @@ def watch_scope(scope: Scope) -> None:
         return
     scope.watched = True
     scope.find_inner_edges()
-    scope.active = scope.derive()
+    scope.active = scope.told = scope.derive()
     for member in scope.inside():
         member.scopes += (scope,)
         watch(member)

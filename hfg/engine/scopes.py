@@ -22,9 +22,22 @@ class Scope:
       members: the running nodes inside, nested ones too.
       inner_edges: the edges with both ends inside.
       active: A(subgraph) as last derived.
+      told: A(subgraph) as its events have told it last.
     """
 
-    __slots__ = ("active", "enabled", "gates", "index", "inner_edges", "members", "parent", "path", "watched", "worker")
+    __slots__ = (
+        "active",
+        "enabled",
+        "gates",
+        "index",
+        "inner_edges",
+        "members",
+        "parent",
+        "path",
+        "told",
+        "watched",
+        "worker",
+    )
 
     def __init__(self, index: int, path: str, parent: Scope | None) -> None:
         self.index = index
@@ -34,6 +47,7 @@ class Scope:
         self.inner_edges: list[Any] = []
         self.worker: Worker | None = None
         self.active = False
+        self.told = False
         self.enabled = True
         self.watched = False
         self.gates: list[Gate] = []

@@ -38,8 +38,8 @@ class Calling(Firing):
         station = self.stations[owner]
         flight = Flight(station, "call", number, "call", lying.token.stamp, slot=name, line=line)
         station.flight = flight
-        self.note_places()  # a queue may have room again
         self.receive_activity(owner, [lying.token.activity])
+        self.note_places()  # a queue may have room again
         if name in station.type.slots:  # else behind what the automatic slot does (A7)
             self.settle()
         self.launch_call(flight, self.handler_of(station, name, lying.token))
