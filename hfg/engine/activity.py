@@ -15,7 +15,7 @@ from hfg.engine.agenda import block, consider, must_wait, unblock
 from hfg.engine.core import Core
 from hfg.engine.modifiers import automatic, set_active, touch
 from hfg.engine.scopes import Scope
-from hfg.engine.sending import flush_automatic, trigger
+from hfg.engine.sending import flush_automatic, tell, trigger
 from hfg.engine.worker import RATE, RESTING, Worker
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
@@ -35,7 +35,7 @@ def changed(worker: Worker, active: bool) -> None:
     if worker.has_hooks:
         _call_hook(worker, "on_activated" if active else "on_deactivated")
     if worker.busy in ("", "edit"):
-        flush_automatic(worker)
+        tell(worker)
 
 
 def _call_hook(worker: Worker, name: str) -> None:
@@ -67,11 +67,8 @@ def _time_out(worker: Worker) -> None:
     event = worker.events.get("timeout")
     if event is None:
         return
-    before = worker.active
     trigger(event, stamp=worker.core.now(), extend_right=False)
     worker.right = False  # behind the sending, which may have given it (A3)
-    if worker.scope is not None and before and not worker.active:
-        deactivate_inside(worker.scope, "sent")
     scopes_changed(worker.core)
     if worker.busy in ("", "edit"):  # else after the firing (A9)
         flush_automatic(worker)
@@ -124,7 +121,7 @@ def scopes_changed(core: Core) -> None:
         owner.node._active = active
         automatic(owner, "activated" if active else "deactivated")
         _time_out_later(owner, active)
-        _flush_scope(scope)
+        flush_automatic(owner)
 
 
 def _look_at(scope: Scope) -> None:
@@ -137,16 +134,6 @@ def _look_at(scope: Scope) -> None:
 
 def _index(scope: Scope) -> int:
     return scope.index
-
-
-def _flush_scope(scope: Scope) -> None:
-    """Activity that leaves by these events is taken from everything inside (G2)."""
-    owner = scope.worker
-    assert owner is not None
-    before = owner.active
-    flush_automatic(owner)
-    if before and not owner.active:
-        deactivate_inside(scope, "sent")
 
 
 def deactivate_inside(scope: Scope, cause: Literal["sent", "slot"]) -> None:

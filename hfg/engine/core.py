@@ -119,6 +119,9 @@ class Upstairs(Protocol):
     def scopes_changed(self, core: Core) -> None:
         """What subgraphs derive their activity from has changed (G2)."""
 
+    def deactivate_inside(self, scope: Scope, cause: Any) -> None:
+        """Activity leaves everything inside a subgraph (G2)."""
+
     def rewire(self, worker: Worker) -> None:
         """What a worker waits for has changed."""
 
@@ -168,6 +171,7 @@ class Core:
         self.errors: list[HfgError] = []
         self.lost_activity = 0
         self.dirty_scopes: list[Scope] = []
+        self.late: list[Worker] | None = None  # those whose automatic events are told behind the change under way
         self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
         self.sources: list[Worker] = []
         self.feeds: list[Worker] = []  # the graph's own inputs (P10)

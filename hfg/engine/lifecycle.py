@@ -14,6 +14,7 @@ from hfg.engine.agenda import block, consider, unblock
 from hfg.engine.core import Core
 from hfg.engine.modifiers import derive_scopes, discard
 from hfg.engine.releasing import release
+from hfg.engine.sending import telling_behind
 from hfg.engine.worker import BACKOFF, DISABLED, ENDED, FUTILE, REMOVED, TORN_DOWN, Worker
 from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge
@@ -142,18 +143,23 @@ def enable_around(owner: Worker) -> None:
 
 def _settle_disabled(workers: Sequence[Worker]) -> None:
     """Rewire the neighbours of nodes that were disabled, then empty their edges."""
+    if not workers:
+        return
     untaken = {edge for worker in workers for edges in worker.wired_out for edge in edges if edge.untaken}
     for worker in workers:  # first: activity that is given back may trigger, but not over edges that are dead now
         wiring.refresh(worker)
-    for worker in workers:
-        incoming = [one for one in worker.edges_in() if not (one.port_name == "enable" and one.target_kind == "slot")]
-        outgoing = [edge for edges in worker.wired_out for edge in edges]
-        for edge in (*incoming, *outgoing):
-            discard(edge, "disabled")
-        # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
-        worker.taken = ()
-        free = (*incoming, *(edge for edge in outgoing if edge in untaken))
-        release([edge for edge in free if type(edge) is not EventEdge and edge.held])
+    with telling_behind(workers[0].core):
+        for worker in workers:
+            incoming = [
+                one for one in worker.edges_in() if not (one.port_name == "enable" and one.target_kind == "slot")
+            ]
+            outgoing = [edge for edges in worker.wired_out for edge in edges]
+            for edge in (*incoming, *outgoing):
+                discard(edge, "disabled")
+            # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
+            worker.taken = ()
+            free = (*incoming, *(edge for edge in outgoing if edge in untaken))
+            release([edge for edge in free if type(edge) is not EventEdge and edge.held])
 
 
 def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> None:

@@ -19,7 +19,7 @@ from hfg.engine.modifiers import derive_scopes, discard, touch
 from hfg.engine.releasing import release
 from hfg.engine.replanning import Replan
 from hfg.engine.scopes import Scope
-from hfg.engine.sending import flush_automatic
+from hfg.engine.sending import flush_automatic, telling_behind
 from hfg.engine.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
 from hfg.graph.flat import FlatEdge, FlatGraph
 from hfg.ports.automatic import AUTOMATIC_EVENTS
@@ -302,11 +302,12 @@ class _Reforming:
             wiring.rewire(worker)
             if worker.is_source and (worker.gates_over or worker.blocked & (RESTING | RATE)):
                 rest(worker)
-        for edge in how.lost:
-            untaken_or_held = edge.held if not isinstance(edge, EventEdge) else False
-            discard(edge, "removed")
-            if untaken_or_held:
-                release((edge,))
+        with telling_behind(core):
+            for edge in how.lost:
+                untaken_or_held = edge.held if not isinstance(edge, EventEdge) else False
+                discard(edge, "removed")
+                if untaken_or_held:
+                    release((edge,))
         for worker in how.gone:
             if worker.active and worker.scope is None:
                 core.lost_activity += 1

@@ -5,7 +5,8 @@ A sending is on all its edges before anything comes of it. Stands on `modifiers`
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from hfg.activity.rules import leaving
@@ -18,7 +19,7 @@ from hfg.ports.edges import Edge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenSent
 
-__all__ = ["enqueue", "flush_automatic", "put", "put_outputs", "send_end", "trigger"]
+__all__ = ["enqueue", "flush_automatic", "put", "put_outputs", "send_end", "tell", "telling_behind", "trigger"]
 
 
 def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float | None] | None] | None) -> None:
@@ -64,8 +65,9 @@ def _activity_left(worker: Worker) -> None:
 
     The right of A3 stays until the firing or call is over.
     """
-    if worker.scope is not None:
-        worker.active = worker.node._active = False  # whoever triggered takes it from everything inside (G2)
+    if worker.scope is not None:  # by its events it leaves everything inside (G2)
+        worker.active = worker.node._active = False
+        worker.core.upstairs.deactivate_inside(worker.scope, "sent")
     elif worker.active:
         worker.right = worker.stamp is not None  # in a firing or call
         set_active(worker, False, "sent")
@@ -144,7 +146,7 @@ def _sent(core: Core) -> None:
         derive_scopes(core)
     for target, _ in drained:
         if target.busy in ("", "edit"):  # else it follows the firing or call under way
-            flush_automatic(target)
+            tell(target)
 
 
 def send_end(worker: Worker) -> None:
@@ -163,7 +165,7 @@ def send_end(worker: Worker) -> None:
     if deferred and worker.scopes:
         touch(core, worker.scopes)
     derive_scopes(core)
-    flush_automatic(worker)
+    tell(worker)
     core.upstairs.node_ended(worker)
 
 
@@ -281,6 +283,32 @@ def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
         add_call(target, edge)
     if modifier > 0 and target.scopes:
         touch(core, target.scopes)
+
+
+def tell(worker: Worker) -> None:
+    """Send the automatic events of a node that is amid nothing: at once, or behind a change of several edges."""
+    late = worker.core.late
+    if late is None:
+        flush_automatic(worker)
+    else:
+        late.append(worker)
+
+
+@contextmanager
+def telling_behind(core: Core) -> Iterator[None]:
+    """What arises by a change of several edges is told when all of it is done (F10, R4)."""
+    if core.late is not None:
+        yield
+        return
+    late: list[Worker] = []
+    core.late = late
+    try:
+        yield
+    finally:
+        core.late = None
+    for worker in late:
+        if worker.busy in ("", "edit"):
+            flush_automatic(worker)
 
 
 def flush_automatic(worker: Worker) -> None:

@@ -19,6 +19,7 @@ class Deciders:
     node_ended = staticmethod(quiet.node_ended)
     activity_changed = staticmethod(activity.changed)
     scopes_changed = staticmethod(activity.scopes_changed)
+    deactivate_inside = staticmethod(activity.deactivate_inside)
     rewire = staticmethod(wiring.rewire)
     choose_step = staticmethod(steps.choose)
     bind_ports = staticmethod(ports.bind)
