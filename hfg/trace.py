@@ -162,7 +162,7 @@ class ActivityChanged(TraceEvent, frozen=True):
 
 
 class ActivityLost(TraceEvent, frozen=True):
-    """A token with +1 was discarded and its sender is gone (A8); or an active node was removed: its path."""
+    """A +1 that nobody can have (A8): its sender is gone, or a slot of a subgraph took it; or a removed node's path."""
 
     edge: str
 
