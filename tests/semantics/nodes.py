@@ -429,3 +429,16 @@ class Runner(hfg.Node):
     def process(self, value: int) -> int | None:
         self.seen.append(self.active)
         return value if value % 2 else None
+
+
+class Last(hfg.Node):
+    """Speaks at the end only."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> None:
+        """Keep quiet."""
+
+    def end(self) -> None:
+        self.out.send(7)

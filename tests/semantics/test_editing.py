@@ -25,6 +25,7 @@ from hfg.trace import (
     StructureChanged,
     TokenDropped,
 )
+from tests.semantics.nodes import Last
 
 LOG: list[str] = []
 
@@ -61,19 +62,6 @@ class Careful(hfg.Node):
 
     def teardown(self) -> None:
         LOG.append("close")
-
-
-class Last(hfg.Node):
-    """Speaks at the end only."""
-
-    value = hfg.Input(int)
-    out = hfg.Output(int)
-
-    def process(self, value: int) -> None:
-        """Keep quiet."""
-
-    def end(self) -> None:
-        self.out.send(7)
 
 
 class Slow(hfg.Node):

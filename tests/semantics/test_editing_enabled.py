@@ -22,6 +22,7 @@ from hfg.trace import (
     StructureChanged,
     TokenDropped,
 )
+from tests.semantics.nodes import Last
 
 
 class Pair(hfg.Subgraph):
@@ -30,19 +31,6 @@ class Pair(hfg.Subgraph):
     def build(self, graph: hfg.Graph) -> None:
         graph.add(script(values=(1, 2)), name="some") >> graph.add(Waiting(pause_s=0.01), name="slow")
         graph.add(ascript(values=(1, 2, 3, 4), pause_s=0.003), name="others") >> graph.add(double(), name="quick")
-
-
-class Last(hfg.Node):
-    """Speaks at the end only."""
-
-    value = hfg.Input(int)
-    out = hfg.Output(int)
-
-    def process(self, value: int) -> None:
-        """Keep quiet."""
-
-    def end(self) -> None:
-        self.out.send(7)
 
 
 class Moody(hfg.Node):
