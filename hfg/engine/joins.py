@@ -193,6 +193,21 @@ def _leaving(worker: Worker, given: tuple[SyncEdge, ...]) -> Callable[[Any, floa
     """Puts one value on every edge of an output that is free, without activity."""
     outputs = worker.outputs
     count = len(given)
+    if count == 1:
+        (only,) = given
+        target: Worker = only.target
+        waits = target.inputs
+
+        def leave_alone(value: Any, stamp: float) -> None:
+            only.sent = number = only.sent + 1
+            only.token = Token(value, 0, stamp, number)
+            only.held = True
+            outputs.missing = 1
+            waits.missing = missing = waits.missing - 1
+            if not missing:
+                consider(target)
+
+        return leave_alone
 
     def leave(value: Any, stamp: float) -> None:
         outputs.missing = count
