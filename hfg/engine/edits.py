@@ -215,6 +215,8 @@ class Edits:
 
     def _switched(self, changes: Sequence[Change]) -> _Switched:
         """The nodes, then the subgraphs, that are enabled or disabled, and which of both."""
+        if not any(isinstance(change, OptionsChange) for change in changes):
+            return []
         by_node = {worker.node: worker for worker in self._engine.core.workers}
         found = []
         for change in changes:
@@ -235,7 +237,7 @@ class Edits:
         on = {worker for worker, enabled in switched if enabled}
         scopes = {worker.scope for worker in on}
         fresh: set[Worker] = set()
-        for worker in self._engine.core.workers:
+        for worker in self._engine.core.workers if on else ():
             meant = worker in on or (worker.own_enabled and not scopes.isdisjoint(worker.around))
             if not meant or worker.scope is not None or not worker.blocked & DISABLED or worker.blocked & BACKOFF:
                 continue
