@@ -86,9 +86,11 @@ class Steering:
             breakpoint removed.
 
         Raises:
-          UsageError: there is no such place in the run, or `when` was given for a node.
+          UsageError: there is no such place in the run, or `when` was given for a node or cannot be called.
         """
         engine = self._engine
+        if when is not None and not callable(when):
+            raise UsageError(f"when= takes a function of the token, such as lambda token: token.value > 3; got {when!r}")
         if isinstance(place, str):
             place = engine.flat.graph[place]
         if not hasattr(place, "_place"):
