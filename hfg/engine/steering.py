@@ -90,7 +90,7 @@ class Steering:
         """
         engine = self._engine
         if when is not None and not callable(when):
-            raise UsageError(f"when= takes a function of the token, such as lambda token: token.value > 3; got {when!r}")
+            raise UsageError(f"when= takes a function of the token, like lambda token: token.value > 3; got {when!r}")
         if isinstance(place, str):
             place = engine.flat.graph[place]
         if not hasattr(place, "_place"):

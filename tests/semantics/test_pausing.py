@@ -219,7 +219,7 @@ def test_what_cannot_be_done_is_one_sentence_and_the_run_goes_on() -> None:
     async def act(run: Any) -> None:
         with pytest.raises(hfg.errors.UsageError, match="is no node of this run"):
             await run.step(Keep())
-        with pytest.raises(UsageError, match="when= takes a function of the token"):
+        with pytest.raises(hfg.errors.UsageError, match="when= takes a function of the token"):
             run.break_at(node.out, when=3)  # type: ignore[arg-type]
         with pytest.raises(hfg.errors.UsageError, match="look at a token|looks at a token"):
             run.break_at(node, when=bool)
