@@ -31,8 +31,8 @@ def run_slot(scope: Scope, name: str, then: Callable[[], None]) -> None:
             scopes_changed(scope.worker.core)
         then()
     elif name == "disable":
-        then()
         disable_scope(scope)
+        then()
     elif name == "enable":
         enable_scope(scope, then)
     else:

@@ -16,6 +16,7 @@ from hfg.trace import (
     EventTriggered,
     FiringEnded,
     FiringStarted,
+    NodeEnabled,
     TokenDropped,
     TraceEvent,
 )
@@ -41,6 +42,33 @@ class Outer(hfg.Subgraph):
         inner = graph.add(Inner(), name="inner")
         graph.connect(self.begin.inner, inner.begin, active=True)
         graph.connect(inner.activated, self.begun.inner)
+
+
+class Leaving(hfg.Subgraph):
+    """What is said in it switches it off."""
+
+    say = hfg.slot(type=int)
+    hush = hfg.slot(type=object)
+    said = hfg.Event(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        relay = graph.add(Relay(), name="relay")
+        graph.connect(self.say.inner, relay.say, active=True)
+        graph.connect(self.hush.inner, relay.deactivate)
+        graph.connect(relay.said, self.said.inner, active=True)
+
+
+class Left(hfg.Subgraph):
+    """Around such a one."""
+
+    say = hfg.slot(type=int)
+    hush = hfg.slot(type=object)
+
+    def build(self, graph: hfg.Graph) -> None:
+        inner = graph.add(Leaving(), name="inner")
+        graph.connect(self.say.inner, inner.say, active=True)
+        graph.connect(self.hush.inner, inner.hush)
+        graph.connect(inner.said, inner.disable, active=True)
 
 
 class Working(hfg.Subgraph):
@@ -112,6 +140,21 @@ def test_what_waits_for_the_slots_of_a_subgraph_that_is_disabled_is_dropped() ->
     trace = judged(build)
     assert len(of_kind(trace, CallStarted)) == 1
     assert [event.edge for event in trace if isinstance(event, TokenDropped)].count("pulse.pulse -> box.disable") == 2
+
+
+@pytest.mark.rule("F10", "G2")
+def test_a_subgraph_that_is_disabled_is_deaf_to_what_follows_from_that() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, box = graph.add(script(values=(1,)), name="source"), graph.add(Left(), name="box")
+        graph.connect(source.out, box.say, active=True)
+        graph.connect(box.deactivated, box.hush)
+        graph.start.activates(source.activate)
+        return graph
+
+    trace = judged(build)
+    assert [event.node for event in trace if isinstance(event, NodeEnabled)] == ["box/inner"]
+    assert [event.slot for event in trace if isinstance(event, CallStarted)] == ["activate", "say", "disable"]
 
 
 @pytest.mark.rule("A9", "G2")
