@@ -103,11 +103,12 @@ class Edits:
             how = replan(engine.core, engine.flat, changes)
             if check:
                 self._refuse_errors(how)
-            _refuse_waiting_for_oneself(how.touched)
-            undo_all(values)  # nodes work with the old values until their firings are over
             switched = self._switched(changes)
+            touched = _touched(how, switched)
+            _refuse_waiting_for_oneself(touched)
+            undo_all(values)  # nodes work with the old values until their firings are over
             await self._set_up(how, come)
-            async with _Held(engine, _touched(how, switched)) as held:
+            async with _Held(engine, touched) as held:
                 await self._exchange_nodes(how)
                 fresh = await self._start_afresh(switched)
                 self._need_run()
@@ -148,16 +149,28 @@ class Edits:
             engine.lifetime.came(worker)
 
     async def _hook(self, worker: Worker, hook: Callable[[Worker, lifecycle.Then], None]) -> None:
-        """Run a hook of a node to its end.
+        """Run a hook of a node to its end; if the edit is cancelled meanwhile, so is the hook, and waited for.
 
         Raises:
           NodeError: it failed.
         """
         waiter: asyncio.Future[NodeError | None] = self._engine.loop.create_future()
         hook(worker, partial(answer, waiter))
-        error = waiter.result() if waiter.done() else await waiter
-        if error is not None:
-            raise error
+        cancelled: asyncio.CancelledError | None = None
+        while not waiter.done():
+            try:
+                await asyncio.wait({waiter})
+            except asyncio.CancelledError as error:
+                if cancelled is not None or self._engine.core.over:
+                    raise
+                cancelled = error
+                if worker.carrier is not None:
+                    worker.carrier.cancel()
+        if cancelled is not None:
+            raise cancelled
+        failure = waiter.result()
+        if failure is not None:
+            raise failure
 
     async def _exchange_nodes(self, how: Replan) -> None:
         """Tear down the nodes that are replaced and set up the others in their place; back again if that fails."""

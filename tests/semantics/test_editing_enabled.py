@@ -11,7 +11,9 @@ import pytest
 import hfg
 from hfg import commands as c
 from hfg.errors import NodeError
+from hfg.registry import reference_of
 from hfg.testing import Recorder, recorder, replay
+from hfg.testing.edits import drawn
 from hfg.testing.nodes import Failing, Scaled, Waiting, add, ascript, double, script, sink
 from hfg.trace import (
     CallStarted,
@@ -36,18 +38,25 @@ class Pair(hfg.Subgraph):
 class Moody(hfg.Node):
     """Takes its time to be set up, and may fail at it."""
 
-    fails = hfg.State(False)
-
     async def setup(self) -> None:
-        await asyncio.sleep(0.005)
+        LOG.append("open")
+        try:
+            await asyncio.sleep(0.005)
+        except asyncio.CancelledError:
+            LOG.append("cancelled")
+            raise
         if REFUSES:
             raise RuntimeError("no such device")
+
+    def teardown(self) -> None:
+        LOG.append("close")
 
     def process(self, value: int) -> int:
         return value
 
 
 REFUSES: list[str] = []
+LOG: list[str] = []
 
 
 def pair(*, off_s: float | None = None, on_s: float | None = None) -> hfg.Graph:
@@ -146,6 +155,31 @@ def test_a_node_whose_setup_fails_stays_disabled_and_the_run_goes_on() -> None:
 
     trace = drive(lambda: graph, body, compare=False)
     assert [event.enabled for event in trace if isinstance(event, NodeEnabled)] == [False, True]
+
+
+@pytest.mark.rule("R4", "F10")
+@pytest.mark.parametrize("there", [True, False])
+def test_an_edit_that_is_cancelled_while_it_sets_up_cancels_that_and_can_be_done_again(*, there: bool) -> None:
+    graph = hfg.Graph()
+    source = graph.add(script(values=(1, 2, 3, 4)), max_rate_hz=100.0)
+    source >> graph.add(sink(), name="free")
+    edit: list[c.Command] = [c.Add(reference_of(Moody), "moody"), c.Connect("script.out", "moody.value")]
+    if there:
+        source >> graph.add(Moody(), name="moody", enabled=False)
+        edit = [c.Enable("moody")]
+    before = drawn(graph)
+
+    async def body(run: hfg.Run) -> None:
+        LOG.clear()
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(0.003):
+                await run.edit(*edit)
+        assert drawn(graph) == before
+        await run.edit(*edit)
+        assert [*(["close"] if there else []), "open", "cancelled", "close", "open"] == LOG
+
+    trace = drive(lambda: graph, body, compare=False)
+    assert trace.values("script.out -> moody.value")[:-1] == [2, 3, 4]
 
 
 @pytest.mark.rule("R4", "G1", "F10")
