@@ -129,6 +129,7 @@ def activity_problems(flat: FlatGraph) -> Iterator[Problem]:
     found = ActivityAnalysis(flat)
     yield from _never_active(found)
     yield from _idle_edges(found)
+    yield from _losing_edges(found)
     yield from _forks(found)
 
 
@@ -208,6 +209,20 @@ def _idle_edges(found: ActivityAnalysis) -> Iterator[Problem]:
             remedy=remedy,
             check="idle-active-edge",
         )
+
+
+def _losing_edges(found: ActivityAnalysis) -> Iterator[Problem]:
+    """Active edges into slots of a subgraph itself, which can keep no activity (G2)."""
+    for edge in found.flat.edges:
+        if edge.active and edge.target.node < ROOT and found.may_carry(edge):
+            yield Problem(
+                path=edge.label,
+                severity="warning",
+                what="activity that comes over this active edge is lost",
+                why="the slot belongs to the subgraph itself, which is active only by what is inside (rules A8, G2)",
+                remedy="leave out active=True, or lead it into a slot that the subgraph declares",
+                check="lost-activity",
+            )
 
 
 def _forks(found: ActivityAnalysis) -> Iterator[Problem]:
