@@ -89,11 +89,11 @@ def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     release(taken)
     worker.end_stamp = worker.stamp
     worker.right = False  # the firing is over; END is not part of it (A3)
+    worker.busy = ""
     if worker.outputs.missing:
         worker.pending_end = True
     else:
         send_end(worker)
-    flush_automatic(worker)
     worker.right = False
     worker.stamp = None
     idle_again(worker)

@@ -62,8 +62,11 @@ def touch(core: Core, scopes: Sequence[Scope]) -> None:
 
 
 def derive_scopes(core: Core) -> None:
-    """After a step that may have moved activity: derive A(subgraph) anew where it is watched (G2)."""
-    if core.dirty_scopes:
+    """After a step that may have moved activity: derive A(subgraph) anew where it is watched (G2).
+
+    Amid a change of several edges that is left to its end.
+    """
+    if core.dirty_scopes and core.late is None:
         core.upstairs.scopes_changed(core)
 
 

@@ -15,7 +15,7 @@ from hfg.engine.agenda import block, note_full
 from hfg.engine.core import Core
 from hfg.engine.ending import drain_left
 from hfg.engine.groups import Group
-from hfg.engine.modifiers import derive_scopes, discard, touch
+from hfg.engine.modifiers import discard, touch
 from hfg.engine.releasing import release
 from hfg.engine.replanning import Replan
 from hfg.engine.scopes import Scope
@@ -308,13 +308,12 @@ class _Reforming:
                 discard(edge, "removed")
                 if untaken_or_held:
                     release((edge,))
-        for worker in how.gone:
-            if worker.active and worker.scope is None:
-                core.lost_activity += 1
-                if core.trace is not None:
-                    core.trace(ActivityLost(core.now(), worker.path))
-        touch(core, [scope for scope in core.scopes if scope.watched])
-        derive_scopes(core)
+            for worker in how.gone:
+                if worker.active and worker.scope is None:
+                    core.lost_activity += 1
+                    if core.trace is not None:
+                        core.trace(ActivityLost(core.now(), worker.path))
+            touch(core, [scope for scope in core.scopes if scope.watched])
         for worker in touched:
             if not worker.busy:
                 flush_automatic(worker)

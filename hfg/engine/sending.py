@@ -22,13 +22,21 @@ from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenSent
 __all__ = ["enqueue", "flush_automatic", "put", "put_outputs", "send_end", "tell", "telling_behind", "trigger"]
 
 
-def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float | None] | None] | None) -> None:
+Written = Sequence[tuple[Any, int | None, float | None] | None] | None
+
+
+def put_outputs(worker: Worker, written: Written) -> None:
     """Put exactly one token on every live edge of every output, all together (F3), and let activity leave (A3, A5).
 
     Args:
       worker: whose firing is over.
       written: per output (value, explicit modifier, explicit stamp); None, or None in it, is NO_MESSAGE.
     """
+    _put_outputs(worker, written)
+    _sent(worker.core)
+
+
+def _put_outputs(worker: Worker, written: Written) -> None:
     may_carry = worker.active or worker.right
     stamp = worker.stamp
     if stamp is None:
@@ -57,7 +65,6 @@ def put_outputs(worker: Worker, written: Sequence[tuple[Any, int | None, float |
         unplace(worker)
     if carried:
         _activity_left(worker)
-    _sent(worker.core)
 
 
 def _activity_left(worker: Worker) -> None:
@@ -142,30 +149,29 @@ def _sent(core: Core) -> None:
         core.drained = []
         for target, modifier in drained:
             receive(target, (modifier,))
-    if core.dirty_scopes:
-        derive_scopes(core)
+    derive_scopes(core)
     for target, _ in drained:
         if target.busy in ("", "edit"):  # else it follows the firing or call under way
             tell(target)
 
 
 def send_end(worker: Worker) -> None:
-    """END leaves on all outputs; from here the node is over (F4, F12)."""
+    """END leaves on all outputs; from here the node, which is amid nothing, is over (F4, F12)."""
     core = worker.core
     worker.pending_end = False
     end = (END, None, None)
-    worker.stamp = worker.end_stamp
-    put_outputs(worker, [end] * len(worker.out_edges))
-    worker.stamp = None
-    if core.trace is not None:
-        core.trace(NodeEnded(core.now(), worker.path))
-    deferred, worker.deferred = worker.deferred, None
-    for modifier in deferred or ():
-        receive(worker, (modifier,))
-    if deferred and worker.scopes:
-        touch(core, worker.scopes)
-    derive_scopes(core)
-    tell(worker)
+    with telling_behind(core):
+        worker.stamp = worker.end_stamp
+        _put_outputs(worker, [end] * len(worker.out_edges))
+        worker.stamp = None
+        _sent(core)
+        if core.trace is not None:
+            core.trace(NodeEnded(core.now(), worker.path))
+        deferred, worker.deferred = worker.deferred, None
+        for modifier in deferred or ():
+            receive(worker, (modifier,))
+        if deferred and worker.scopes:
+            touch(core, worker.scopes)
     core.upstairs.node_ended(worker)
 
 
@@ -296,7 +302,7 @@ def tell(worker: Worker) -> None:
 
 @contextmanager
 def telling_behind(core: Core) -> Iterator[None]:
-    """What arises by a change of several edges is told when all of it is done (F10, R4)."""
+    """What arises by a change of several edges is told when all of it is done (F10, R4), by subgraphs last (G2)."""
     if core.late is not None:
         yield
         return
@@ -304,11 +310,12 @@ def telling_behind(core: Core) -> Iterator[None]:
     core.late = late
     try:
         yield
+        for worker in late:  # which grows by what these come to
+            if worker.busy in ("", "edit"):
+                flush_automatic(worker)
     finally:
         core.late = None
-    for worker in late:
-        if worker.busy in ("", "edit"):
-            flush_automatic(worker)
+    derive_scopes(core)
 
 
 def flush_automatic(worker: Worker) -> None:

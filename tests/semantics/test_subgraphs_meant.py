@@ -228,3 +228,18 @@ def test_what_goes_back_to_a_sender_is_told_behind_all_that_disabling_frees() ->
         if isinstance(e, FiringStarted | CallStarted) and e.node == "source" and e.time == 0.005
     ]
     assert did[:2] == ["FiringStarted", "CallStarted"]
+
+
+@pytest.mark.rule("A9", "F4", "G2")
+def test_what_the_end_of_a_node_brings_is_told_by_the_node_first_and_by_subgraphs_last() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, box, heard = graph.add(Script(count=0), name="source"), graph.add(Inner(), name="box"), Counter()
+        graph.start.activates(source.activate)
+        graph.connect(source.out, box.begin, active=True)
+        graph.connect(box.activated, graph.add(heard, name="heard").tell)
+        graph.connect(source.deactivated, heard.tell)
+        return graph
+
+    told = [event.event for event in judged(build) if isinstance(event, EventTriggered)]
+    assert told[1:3] == ["source.deactivated", "box.activated"]
