@@ -20,7 +20,8 @@ Which module stands on which; imports go down only:
 
 from hfg.engine.glance import Glance, NodeGlance, glance
 from hfg.engine.report import EdgeReport, NodeReport, Report
-from hfg.engine.run import Run, run, run_async, running
+from hfg.engine.run import Run
+from hfg.engine.running import run, run_async, running
 from hfg.engine.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
 from hfg.engine.virtual import VirtualTimeLoop
 

@@ -23,10 +23,10 @@ from hfg.engine.core import Core
 from hfg.engine.edits import Edits
 from hfg.engine.groups import Dispatching, Group, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.lifetime import Lifetime
+from hfg.engine.measuring import Measuring
 from hfg.engine.pausing import Halt, Pausing
 from hfg.engine.policies import make_policy
 from hfg.engine.settings import Settings
-from hfg.engine.statistics import Measuring
 from hfg.engine.taps import Taps
 from hfg.engine.upstairs import Deciders
 from hfg.engine.virtual import VirtualTimeLoop

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from hfg.engine.statistics import doing
+from hfg.engine.measuring import doing
 
 if TYPE_CHECKING:
     from hfg.engine.run import Run
