@@ -149,7 +149,8 @@ def _sent(core: Core) -> None:
         core.drained = []
         for target, modifier in drained:
             receive(target, (modifier,))
-    derive_scopes(core)
+    if core.dirty_scopes:
+        derive_scopes(core)
     for target, _ in drained:
         if target.busy in ("", "edit"):  # else it follows the firing or call under way
             tell(target)
