@@ -16,7 +16,7 @@ from hfg.engine.core import Core
 from hfg.engine.modifiers import automatic, set_active, touch
 from hfg.engine.scopes import Scope
 from hfg.engine.sending import flush_automatic, tell, trigger
-from hfg.engine.worker import RATE, RESTING, Worker
+from hfg.engine.worker import AMID_NOTHING, RATE, RESTING, Worker
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
 
@@ -34,7 +34,7 @@ def changed(worker: Worker, active: bool) -> None:
                 _look_at(scope)
     if worker.has_hooks:
         _call_hook(worker, "on_activated" if active else "on_deactivated")
-    if worker.busy in ("", "edit"):
+    if worker.busy in AMID_NOTHING:
         tell(worker)
 
 
@@ -70,7 +70,7 @@ def _time_out(worker: Worker) -> None:
     trigger(event, stamp=worker.core.now(), extend_right=False)
     worker.right = False  # behind the sending, which may have given it (A3)
     scopes_changed(worker.core)
-    if worker.busy in ("", "edit"):  # else after the firing (A9)
+    if worker.busy in AMID_NOTHING:  # else after the firing (A9)
         flush_automatic(worker)
 
 

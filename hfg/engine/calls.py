@@ -105,6 +105,7 @@ def finish_call(worker: Worker, outcome: Any) -> None:
     flush_automatic(worker)
     if core.trace is not None:
         core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
+    worker.busy = "over"
     edge = worker.call_edge
     worker.call_edge = None
     if type(edge) is SyncEdge:

@@ -84,12 +84,12 @@ def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     flush_automatic(worker)
     if core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended"))
+    worker.busy = "over"
     taken = worker.taken
     worker.taken = ()
     release(taken)
     worker.end_stamp = worker.stamp
     worker.right = False  # the firing is over; END is not part of it (A3)
-    worker.busy = ""
     if worker.outputs.missing:
         worker.pending_end = True
     else:

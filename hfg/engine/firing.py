@@ -367,6 +367,7 @@ def finish_firing(worker: Worker, outcome: Any) -> None:
         if outcome == "done" and worker.blocked & DISABLED:
             outcome = "abandoned"  # disabled meanwhile, with a subgraph around it: its outputs went nowhere (F10)
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, outcome))
+    worker.busy = "over"
     taken = worker.taken
     worker.written = None
     worker.tokens = []

@@ -13,7 +13,7 @@ from hfg.activity.rules import leaving
 from hfg.engine.agenda import add_call, arrived, note_full, remove_call, unplace
 from hfg.engine.core import Core
 from hfg.engine.modifiers import derive_scopes, drop, receive, set_active, touch
-from hfg.engine.worker import ENDED, RunningEvent, Worker
+from hfg.engine.worker import AMID_NOTHING, ENDED, RunningEvent, Worker
 from hfg.errors import EngineInternalError, QueueOverflow
 from hfg.ports.edges import Edge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
@@ -152,7 +152,7 @@ def _sent(core: Core) -> None:
     if core.dirty_scopes:
         derive_scopes(core)
     for target, _ in drained:
-        if target.busy in ("", "edit"):  # else it follows the firing or call under way
+        if target.busy in AMID_NOTHING:  # else it follows the firing or call under way
             tell(target)
 
 
@@ -312,7 +312,7 @@ def telling_behind(core: Core) -> Iterator[None]:
     try:
         yield
         for worker in late:  # which grows by what these come to
-            if worker.busy in ("", "edit"):
+            if worker.busy in AMID_NOTHING:
                 flush_automatic(worker)
     finally:
         core.late = None

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hfg.engine.scopes import Gate, Scope
 
 __all__ = [
+    "AMID_NOTHING",
     "BACKOFF",
     "CALLS_BLOCKED",
     "DISABLED",
@@ -52,6 +53,8 @@ REMOVED: Final = 2048  # an edit took it out of the graph (R4)
 
 CALLS_BLOCKED: Final = FULL | BACKOFF | TORN_DOWN
 
+AMID_NOTHING: Final = ("", "edit", "over")  # values of Worker.busy: automatic events leave at once (A9)
+
 NOTHING: Final[dict[str, Any]] = {}  # shared by the many that have none; never written
 
 
@@ -83,7 +86,8 @@ class Worker:
       placed, ahead: a firing is enabled and has its place in the agenda, behind `ahead` slot calls (F9).
       calls: edges whose oldest token waits for a slot call, in order of arrival; None until there is one.
       queued: it stands in its group's run queue.
-      busy: "" or what is under way: "firing", "call", "asking", "ending", "setup"; "edit": an edit holds it.
+      busy: "" or what is under way: "firing", "call", "asking", "ending", "setup"; "edit": an edit holds it;
+        "over": what was under way is over, but for what it releases.
       special: something about the next firing is not ordinary (a marker lies on an input ...): the fast step steps
         aside.
       step: runs its next piece of work; chosen for its shape by `steps.choose`.

@@ -243,3 +243,32 @@ def test_what_the_end_of_a_node_brings_is_told_by_the_node_first_and_by_subgraph
 
     told = [event.event for event in judged(build) if isinstance(event, EventTriggered)]
     assert told[1:3] == ["source.deactivated", "box.activated"]
+
+
+class Farewell(hfg.Node):
+    """A source that has nothing but a last word."""
+
+    out = hfg.Output(int)
+
+    def process(self) -> None:
+        raise hfg.EndOfStream
+
+    def end(self) -> None:
+        self.out.send(7)
+
+
+@pytest.mark.rule("A9", "F12")
+def test_activity_that_the_end_of_a_firing_lets_in_is_told_at_once() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, slow = graph.add(Farewell(), name="source"), graph.add(Waiting(pause_s=0.01), name="slow")
+        source >> slow  # END has to wait until the firing is over
+        graph.connect(source.out, slow.enable, active=True)
+        graph.connect(slow.activated, graph.add(Counter()).tell)
+        graph.connect(clock(graph, 0.005)[0], source.activate)
+        return graph
+
+    trace = judged(build)
+    told = next(number for number, event in enumerate(trace) if getattr(event, "event", "") == "slow.activated")
+    begun = [number for number, event in enumerate(trace) if isinstance(event, FiringStarted) and event.node == "slow"]
+    assert begun[0] < told < begun[1]
