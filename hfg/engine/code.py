@@ -27,11 +27,16 @@ from hfg.engine.worker import RunningEvent, Worker
 if TYPE_CHECKING:
     from hfg.engine.engine import Engine
 
-__all__ = ["CodeRunner", "answer"]
+__all__ = ["CodeRunner", "answer", "whose_code"]
 
 _code_of: contextvars.ContextVar[Worker | None] = contextvars.ContextVar("hfg.code_of", default=None)
 
 Done = Callable[[Any, BaseException | None], None]
+
+
+def whose_code() -> Worker | None:
+    """Give the async node in whose code, or in a task it has started, this is called."""
+    return _code_of.get()
 
 
 def answer(waiter: asyncio.Future[Any], value: Any) -> None:
@@ -224,7 +229,7 @@ class CodeRunner:
         trigger(event, value, activity, stamp)
         worker = event.worker
         core = worker.core
-        own = _code_of.get() is worker  # its own code waits for us, not we for it
+        own = whose_code() is worker  # its own code waits for us, not we for it
         while worker.full_edges and core.started and not core.over:
             waiter: asyncio.Future[None] = self.loop.create_future()
             if worker.room_waiters is None:

@@ -8,7 +8,8 @@ graph and run as they were. Stands on `reforming` and `lifecycle`.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+import contextlib
+from collections.abc import Callable, Collection, Coroutine, Iterable, Sequence
 from functools import partial
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -18,11 +19,12 @@ import msgspec
 from hfg.engine import lifecycle, plan, subgraphs
 from hfg.engine import ports as engine_ports
 from hfg.engine.code import answer
+from hfg.engine.holding import Held
 from hfg.engine.reforming import reform
 from hfg.engine.replanning import Replan, closes_a_ring, replan
-from hfg.engine.sending import flush_automatic
-from hfg.engine.worker import BACKOFF, DISABLED, ENDED, REMOVED, UNREADY, Worker
-from hfg.errors import GraphError, HfgError, NodeError, NotRunning, UsageError
+from hfg.engine.turns import Turns
+from hfg.engine.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
+from hfg.errors import GraphError, HfgError, NodeError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.changes import Change, NodeSwap, OptionsChange, ParameterChange, undo_all
 from hfg.graph.checks import check_flat
@@ -30,14 +32,14 @@ from hfg.graph.commands import Command, encode
 from hfg.graph.editing import Transaction, history_of, may_break, prepare, refuse_new_errors
 from hfg.graph.flat import flatten
 from hfg.graph.reloading import reloaded
-from hfg.trace import EditWaits, ParameterSet, StructureChanged
+from hfg.trace import ParameterSet, StructureChanged
 
 if TYPE_CHECKING:
     from hfg.engine.engine import Engine
 
 __all__ = ["Edits"]
 
-_Switched = list[tuple[Worker, bool]]
+_Switched = dict[Worker, bool]
 """Nodes and subgraphs, and whether they are enabled or disabled."""
 
 
@@ -47,44 +49,48 @@ class Edits:
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self._graph: Graph = engine.flat.graph
-        self._turn = asyncio.Lock()
+        self._turns = Turns()
+        self.leaving: set[asyncio.Task[None]] = set()  # nodes that are gone are torn down
 
     async def edit(self, commands: Sequence[Command]) -> None:
         """See `Run.edit`."""
-        async with self._turn:
-            await self._edit(commands)
+        async with self._turns.one():
+            gone = await self._edit(commands)
+        await self._leave(gone)
 
     async def reload(self, module: str | ModuleType) -> None:
         """See `Run.reload`."""
-        async with self._turn:
+        async with self._turns.one():
             with reloaded(self._graph, module) as commands:
-                await self._edit(commands)
+                gone = await self._edit(commands)
+        await self._leave(gone)
 
-    async def _edit(self, commands: Sequence[Command]) -> None:
+    async def _edit(self, commands: Sequence[Command]) -> list[Worker]:
         self._need_run()
         what = _told(commands)
         transaction = prepare(self._graph, commands, check=False)
-        await self._follow(transaction.changes, what, check=may_break(commands))
-        history_of(self._graph).note(transaction)
+        note = partial(history_of(self._graph).note, transaction)
+        return await self._follow(transaction.changes, what, note, check=may_break(commands))
 
     async def undo(self) -> None:
         """See `Run.undo`."""
-        async with self._turn:
+        async with self._turns.one():
             self._need_run()
             history = history_of(self._graph)
-            await self._follow(undo_all(history.next_undo().changes), "undo", check=False)
-            history.undo_done()
+            changes = undo_all(history.next_undo().changes)
+            gone = await self._follow(changes, "undo", history.undo_done, check=False)
+        await self._leave(gone)
 
     async def redo(self) -> None:
         """See `Run.redo`."""
-        async with self._turn:
+        async with self._turns.one():
             self._need_run()
             history = history_of(self._graph)
             transaction: Transaction = history.next_redo()
             for change in transaction.changes:
                 change.do()
-            await self._follow(transaction.changes, "redo", check=False)
-            history.redo_done()
+            gone = await self._follow(transaction.changes, "redo", history.redo_done, check=False)
+        await self._leave(gone)
 
     def _need_run(self) -> None:
         if self._engine.core.over:
@@ -92,11 +98,17 @@ class Edits:
 
     # --- following what was done to the drawn graph
 
-    async def _follow(self, changes: Sequence[Change], what: str, *, check: bool) -> None:
-        """Let the run be as the drawn graph is; if that fails, take back what was done to it."""
+    async def _follow(
+        self, changes: Sequence[Change], what: str, note: Callable[[], None], *, check: bool
+    ) -> list[Worker]:
+        """Let the run be as the drawn graph is, and note that; if it fails, take back what was done to the graph.
+
+        Returns:
+          the workers that are gone and have yet to be torn down, for which the next edit does not wait.
+        """
         engine = self._engine
-        values = [change for change in changes if isinstance(change, ParameterChange)]
         come: list[Worker] = []
+        waiting: list[ParameterChange] = []  # values with which nobody works yet
         took_effect = False
         engine.hold()
         try:
@@ -105,30 +117,47 @@ class Edits:
                 self._refuse_errors(how)
             switched = self._switched(changes)
             touched = _touched(how, switched)
-            _refuse_waiting_for_oneself(touched)
-            undo_all(values)  # nodes work with the old values until their firings are over
+            waiting = self._values_of_running_nodes(changes)
+            self._turns.wait_for(touched)
+            undo_all(waiting)  # they work with the old ones until their firings are over
             await self._set_up(how, come)
-            async with _Held(engine, touched) as held:
+            self._turns.wait_for(touched)
+            async with Held(engine, touched) as held:
+                self._turns.wait_for(())
                 await self._exchange_nodes(how)
-                fresh = await self._start_afresh(switched)
+                fresh = self._to_start_afresh(switched)
+                early = {id(value) for value in waiting if value.node in {worker.node for worker in fresh}}
+                for value in [value for value in waiting if id(value) in early]:
+                    value.do()
+                waiting = [value for value in waiting if id(value) not in early]
+                for worker in fresh:
+                    self._turns.wait_for((worker,))
+                    await self._hook(worker, lifecycle.tear_down)
+                    await self._hook(worker, lifecycle.set_up)
                 self._need_run()
-                for value in values:
+                for value in waiting:
                     value.do()
                 took_effect = held.done = True
+                note()
                 if engine.core.trace is not None:
                     engine.core.trace(StructureChanged(engine.core.now(), what))
                 self._switch(switched, fresh)
                 self._take_effect(how, come, changes)
         except BaseException:
             if not took_effect:
-                undo_all(changes)
-                for worker in come:
-                    await self._tear_down(worker)
+                not_done = {id(value) for value in waiting}
+                undo_all([change for change in changes if id(change) not in not_done])
+                self._turns.wait_for(come)
+                await self._to_its_end(self._tear_down(come))
             raise
         finally:
             engine.unhold()
-        for worker in how.gone:
-            await self._tear_down(worker)
+        return how.gone
+
+    def _values_of_running_nodes(self, changes: Sequence[Change]) -> list[ParameterChange]:
+        values = [change for change in changes if isinstance(change, ParameterChange)]
+        running = {worker.node for worker in self._engine.core.workers} if values else set()
+        return [value for value in values if value.node in running]
 
     def _refuse_errors(self, how: Replan) -> None:
         """A graph that runs has no errors, and gets none."""
@@ -145,6 +174,7 @@ class Edits:
             come.append(worker)
             engine.lifetime.carry(worker)
             worker.busy = "setup"
+            self._turns.wait_for((worker,))
             await self._hook(worker, lifecycle.set_up)
             engine.lifetime.came(worker)
 
@@ -172,26 +202,44 @@ class Edits:
         if failure is not None:
             raise failure
 
+    async def _to_its_end(self, clearing: Coroutine[Any, Any, None]) -> None:
+        """Clear up after an edit that failed or was cancelled, however often it is cancelled."""
+        task = asyncio.create_task(clearing, name="hfg edit")
+        while not task.done():
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.wait({task})
+        task.result()
+
     async def _exchange_nodes(self, how: Replan) -> None:
         """Tear down the nodes that are replaced and set up the others in their place; back again if that fails."""
-        done: list[tuple[Worker, Any]] = []
-        for worker, node in how.swapped:
-            old = worker.node
-            await self._hook(worker, lifecycle.tear_down)
-            engine_ports.release_ports(worker)
-            done.append((worker, old))
-            try:
+        begun: list[tuple[Worker, Any]] = []
+        try:
+            for worker, node in how.swapped:
+                begun.append((worker, worker.node))
                 await self._become(worker, node)
-            except BaseException:
-                for changed, before in reversed(done):
-                    await self._hook(changed, lifecycle.tear_down)
-                    await self._become(changed, before)
-                raise
-        for worker, _ in done:
+        except BaseException:
+            await self._to_its_end(self._become_again(begun))
+            raise
+        for worker, _ in begun:
             lifecycle.not_ended(worker)
             worker.blocked &= ~(ENDED | UNREADY)
 
+    async def _become_again(self, begun: list[tuple[Worker, Any]]) -> None:
+        """Put the nodes back that were to be replaced; one that cannot be set up again ends the run."""
+        for worker, before in reversed(begun):
+            try:
+                await self._become(worker, before)
+            except HfgError as error:
+                self._engine.finish("failed", error)
+
     async def _become(self, worker: Worker, node: Any) -> None:
+        """Let a worker run another node: teardown, setup. A teardown that fails is told with the other errors (X3)."""
+        self._turns.wait_for((worker,))
+        try:
+            await self._hook(worker, lifecycle.tear_down)
+        except NodeError as error:
+            self._engine.core.errors.append(error)
+        engine_ports.release_ports(worker)
         if worker.carrier is not None:
             worker.carrier.drop()
             worker.carrier = None
@@ -227,42 +275,36 @@ class Edits:
             core.upstairs.idle_again(worker)
 
     def _switched(self, changes: Sequence[Change]) -> _Switched:
-        """The nodes, then the subgraphs, that are enabled or disabled, and which of both."""
+        """The nodes, then the subgraphs, that are enabled or disabled, and which of both in the end."""
         if not any(isinstance(change, OptionsChange) for change in changes):
-            return []
+            return {}
         by_node = {worker.node: worker for worker in self._engine.core.workers}
-        found = []
+        found: _Switched = {}
         for change in changes:
             if isinstance(change, NodeSwap) and change.old in by_node:
                 by_node[change.new] = by_node[change.old]
             elif isinstance(change, OptionsChange) and change.before.group == change.after.group:
                 worker = by_node.get(change.node)
                 if worker is not None:
-                    found.append((worker, change.after.enabled))
-        return sorted(found, key=lambda one: one[0].scope is not None)
+                    found[worker] = change.after.enabled
+        return dict(sorted(found.items(), key=lambda one: one[0].scope is not None))
 
-    async def _start_afresh(self, switched: _Switched) -> set[Worker]:
-        """Tear down and set up what is going to be enabled (F10), so that it all takes effect at one moment.
-
-        Raises:
-          NodeError: one of them failed; they stay disabled.
-        """
-        on = {worker for worker, enabled in switched if enabled}
+    def _to_start_afresh(self, switched: _Switched) -> list[Worker]:
+        """Whom to tear down and set up before they are enabled (F10), so that it all takes effect at one moment."""
+        on = {worker for worker, enabled in switched.items() if enabled}
         scopes = {worker.scope for worker in on}
-        fresh: set[Worker] = set()
+        fresh = []
         for worker in self._engine.core.workers if on else ():
             meant = worker in on or (worker.own_enabled and not scopes.isdisjoint(worker.around))
             if not meant or worker.scope is not None or not worker.blocked & DISABLED or worker.blocked & BACKOFF:
                 continue
             if all(scope.enabled or scope in scopes for scope in worker.around):
-                await self._hook(worker, lifecycle.tear_down)
-                await self._hook(worker, lifecycle.set_up)
-                fresh.add(worker)
+                fresh.append(worker)
         return fresh
 
-    def _switch(self, switched: _Switched, fresh: set[Worker]) -> None:
+    def _switch(self, switched: _Switched, fresh: Collection[Worker]) -> None:
         """Enable and disable nodes and subgraphs (F10)."""
-        for worker, enabled in switched:
+        for worker, enabled in switched.items():
             self._note_options(worker, enabled)
             if worker.scope is not None and enabled:
                 subgraphs.enable_scope(worker.scope, _nothing, fresh)
@@ -282,38 +324,38 @@ class Edits:
             if scope.subgraph is worker.node:
                 scope.options = msgspec.structs.replace(scope.options, enabled=enabled)
 
-    async def _tear_down(self, worker: Worker) -> None:
-        """A node that is gone closes what it has opened; if it fails, that is told with the other errors (X3)."""
+    async def _leave(self, gone: list[Worker]) -> None:
+        """Nodes that are gone are torn down, also if nobody waits for that any more."""
+        if not gone:
+            return
+        task = asyncio.create_task(self._tear_down(gone), name="hfg edit")
+        self.leaving.add(task)
+        task.add_done_callback(self.leaving.discard)
+        await asyncio.shield(task)
+
+    async def _tear_down(self, workers: Iterable[Worker]) -> None:
+        """Let nodes that are gone close what they have opened; if that fails, it is told with other errors (X3)."""
         engine = self._engine
-        for name in ("rate_timer", "limit_timer", "active_timer", "backoff_timer"):
-            timer = getattr(worker, name)
-            if timer is not None:
-                timer.cancel()
-                setattr(worker, name, None)
-        try:
-            await self._hook(worker, lifecycle.tear_down)
-        except HfgError as error:
-            engine.core.errors.append(error)
-        engine_ports.release_ports(worker)
-        engine.lifetime.forget(worker)
-        if worker.carrier is not None:
-            worker.carrier.drop()
-
-
-def _refuse_waiting_for_oneself(touched: Sequence[Worker]) -> None:
-    """Code of a node may edit the graph, but not wait for the end of its own firing."""
-    task = asyncio.current_task()
-    for worker in touched:
-        if worker.carrier is not None and worker.carrier.task is task:
-            raise UsageError(
-                f'"{worker.path}" edits itself in the middle of a firing and would wait for the end of that for ever: '
-                "do it in a task, asyncio.create_task(run.edit(...))"
-            )
+        for worker in workers:
+            for name in ("rate_timer", "limit_timer", "active_timer", "backoff_timer"):
+                timer = getattr(worker, name)
+                if timer is not None:
+                    timer.cancel()
+                    setattr(worker, name, None)
+        for worker in workers:
+            try:
+                await self._hook(worker, lifecycle.tear_down)
+            except HfgError as error:
+                engine.core.errors.append(error)
+            engine_ports.release_ports(worker)
+            engine.lifetime.forget(worker)
+            if worker.carrier is not None:
+                worker.carrier.drop()
 
 
 def _touched(how: Replan, switched: _Switched) -> list[Worker]:
     """Those who must rest: also all inside a subgraph that is enabled."""
-    scopes = [worker.scope for worker, enabled in switched if worker.scope is not None and enabled]
+    scopes = [worker.scope for worker, enabled in switched.items() if worker.scope is not None and enabled]
     return list(dict.fromkeys([*how.touched, *(member for scope in scopes for member in scope.members)]))
 
 
@@ -323,84 +365,6 @@ def _told(commands: Sequence[Command]) -> str:
         return encode(commands)
     except GraphError:
         return ", ".join(map(repr, commands))
-
-
-class _Held:
-    """Holds nodes as they come to rest; inside the block all of them rest.
-
-    Attributes:
-      done: the edit has taken effect; else it was given up.
-    """
-
-    def __init__(self, engine: Engine, workers: Sequence[Worker]) -> None:
-        self._engine = engine
-        self._workers = workers
-        self._letting_go: list[Callable[[], None]] = []
-        self._given_up = False
-        self.done = False
-        self._said = False  # that it waits
-        self._counts = False  # among what is in flight
-
-    async def __aenter__(self) -> _Held:
-        engine = self._engine
-        core = engine.core
-        waiter: asyncio.Future[None] = engine.loop.create_future()
-        left = [len(self._workers)]
-
-        def rests(worker: Worker, over: Callable[[], None]) -> None:
-            if self._given_up:
-                over()
-                return
-            worker.busy = "edit"
-            self._letting_go.append(over)
-            left[0] -= 1
-            if not left[0]:
-                if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)
-                    core.in_flight += 1
-                    self._counts = True
-                answer(waiter, None)
-
-        for worker in self._workers:
-            lifecycle.when_idle(worker, rests, _nothing)
-        if left[0]:
-            self._said = True
-            if core.trace is not None:
-                core.trace(EditWaits(core.now(), tuple(worker.path for worker in self._workers)))
-            try:
-                await self._or_end(waiter)
-            except BaseException:
-                self._let_go()
-                raise
-        return self
-
-    async def _or_end(self, waiter: asyncio.Future[None]) -> None:
-        """Wait until all rest, or the run is over."""
-        engine = self._engine
-        ending = asyncio.ensure_future(engine.ending.wait())
-        try:
-            await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            ending.cancel()
-            engine.core.in_flight -= self._counts
-            self._counts = False
-        if engine.core.over:
-            raise NotRunning("the run ended before the edit could take effect; the graph is as it was")
-
-    async def __aexit__(self, *_: object) -> None:
-        self._let_go()
-
-    def _let_go(self) -> None:
-        core = self._engine.core
-        self._given_up = True
-        if not self.done and self._said and core.trace is not None and not core.over:
-            core.trace(StructureChanged(core.now(), ""))
-        for worker in self._workers if self.done else ():
-            if not worker.blocked & REMOVED:
-                flush_automatic(worker)  # what activity that went back has raised (A8, A9)
-        letting_go, self._letting_go = self._letting_go, []
-        for over in letting_go:
-            over()
-        self._engine.kick()
 
 
 def _nothing() -> None:

@@ -197,6 +197,8 @@ class Lifetime:
         try:
             for dispose in self._disposables.values():
                 dispose()
+            for task in list(engine.edits.leaving):
+                await self._within_limit(task)
             problems += await self._cancel_code()
             for worker in reversed(self._was_set_up):
                 problem = await self._tear_down_one(worker)

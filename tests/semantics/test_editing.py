@@ -420,7 +420,7 @@ def test_a_node_that_would_wait_for_itself_is_told() -> None:
 
     @hfg.node
     async def vain(value: int) -> None:
-        with pytest.raises(UsageError, match='"vain" edits itself in the middle of a firing.*asyncio.create_task'):
+        with pytest.raises(UsageError, match='"vain" edits the graph in the middle of its code.*asyncio.create_task'):
             await runs[0].edit(c.Rename("vain", "modest"))
         later.append(asyncio.create_task(runs[0].edit(c.Rename("vain", "modest"))))
 

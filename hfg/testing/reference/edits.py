@@ -241,16 +241,18 @@ class Editing(Calling):
             self.set_up(station)
 
     def _switch(self, changes: Sequence[Change]) -> None:
-        """Enable and disable what there was before (F10): nodes first, then subgraphs."""
+        """Enable and disable what there was before (F10), as it is in the end: nodes first, then subgraphs."""
         number = {id(station.leaf.node): station.leaf.index for station in self.stations}
         number |= {id(box.node): -2 - box.index for box in self.structure.boxes}
-        switched = []
+        switched: dict[int, bool] = {}
         for change in changes:
             if isinstance(change, NodeSwap) and id(change.old) in number:
                 number[id(change.new)] = number[id(change.old)]
             elif isinstance(change, OptionsChange) and id(change.node) in number and _is_switch(change):
-                switched.append((number[id(change.node)], change.after.enabled))
-        for owner, enabled in sorted(switched, key=lambda one: is_box(one[0])):
+                switched[number[id(change.node)]] = change.after.enabled
+            elif isinstance(change, ParameterChange) and number.get(id(change.node), -1) >= 0:  # for `setup`
+                self.stations[number[id(change.node)]].node._parameters[change.name] = change.after
+        for owner, enabled in sorted(switched.items(), key=lambda one: is_box(one[0])):
             if enabled:
                 self.enable(owner)
             else:
