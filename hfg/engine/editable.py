@@ -27,7 +27,7 @@ class Editable:
 
         Raises:
           GraphError: a command cannot be carried out; the message says which and why.
-          NodeError: the `setup()` of a node that comes or is enabled failed; one that was to be replaced is set up again.
+          NodeError: the `setup()` of a node that comes failed; one that it was to replace is set up again.
           UsageError: it is an edit that only a graph at rest allows, or was asked for by code whose end it waits for.
           NotRunning: the run is over.
         """

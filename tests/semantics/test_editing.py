@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from collections.abc import Awaitable, Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -452,29 +450,3 @@ def test_edits_come_one_after_the_other() -> None:
     drive(graph, body)
     graph.redo()
     assert list(graph.nodes) == ["script", "one", "sink"]
-
-
-# --- hot reload ---
-
-
-def test_a_module_is_reloaded_while_its_nodes_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    source = "import hfg\n@hfg.node\ndef scale(value: int, *, by: int = 1) -> int:\n    return value * by + {}\n"
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "scaling", raising=False)
-    module = tmp_path / "scaling.py"
-    module.write_text(source.format(0))
-    graph = pipeline(1, 2, 3)
-    graph.edit(c.Replace("middle", "scaling:scale", {"by": 10}))
-
-    async def body(run: hfg.Run) -> None:
-        await asyncio.sleep(0.005)
-        module.write_text("def scale(:")
-        with pytest.raises(GraphError, match="invalid syntax in line 1 of .*the graph goes on with what it has"):
-            await run.reload("scaling")
-        await asyncio.sleep(0.01)
-        module.write_text(source.format(5))
-        await run.reload("scaling")
-        await run.wait_finished()
-
-    trace = drive(graph, body)
-    assert trace.values("middle.out -> sink.value")[:-1] == [10, 20, 35]
