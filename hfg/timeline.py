@@ -21,7 +21,7 @@ import msgspec
 
 from hfg.errors import UsageError
 from hfg.graph import Graph
-from hfg.graph.flat import FlatGraph, flatten
+from hfg.graph.flat import FlatGraph, FlatNode, flatten
 from hfg.trace import (
     ActivityChanged,
     CallEnded,
@@ -95,7 +95,7 @@ class Timeline:
         else:
             self._stream, self._ours = file, False
         self._graph = graph
-        self._groups = dict(_groups(flatten(graph)))
+        self._nodes = {node.path: node for node in _nodes(flatten(graph))}
         self._first = True
         self._closed = False
         self._origin: float | None = None
@@ -103,6 +103,7 @@ class Timeline:
         self._open: dict[str, _Box] = {}  # by node
         self._rows: dict[str, list[str | None]] = {}  # per group: who is on each of its rows
         self._row_ids: dict[tuple[str, int], int] = {}
+        self._group_order = list(dict.fromkeys(_group(node) for node in self._nodes.values()))
         self._last_row: dict[str, int] = {}
         self._active: dict[str, float] = {}
         self._activity_rows: dict[str, int] = {}
@@ -145,7 +146,7 @@ class Timeline:
             case QueueGrown(edge=edge, capacity=capacity):
                 self._mark(_source(edge)[0], "queue grown", {"edge": edge, "capacity": capacity})
             case StructureChanged():
-                self._groups |= _groups(flatten(self._graph))
+                self._edited()
             case RunEnded(outcome=outcome):
                 self.close(outcome)
 
@@ -178,7 +179,7 @@ class Timeline:
     # --- boxes ------------------------------------------------------------------------------------------------------
 
     def _begin(self, node: str, name: str, category: str, args: dict[str, Any]) -> None:
-        group = self._groups.get(node, "loop")
+        group = self._group_of(node)
         rows = self._rows.setdefault(group, [])
         row = self._last_row.get(node, 0)
         if row >= len(rows) or rows[row] is not None:
@@ -211,8 +212,9 @@ class Timeline:
         key = (group, row)
         number = self._row_ids.get(key)
         if number is None:
-            place = list(dict.fromkeys([*self._groups.values(), group])).index(group)
-            number = self._row_ids[key] = (place + 1) * _ROWS + row
+            if group not in self._group_order:
+                self._group_order.append(group)
+            number = self._row_ids[key] = (self._group_order.index(group) + 1) * _ROWS + row
             self._name("thread_name", _GROUPS, number, group if not row else f"{group} ({row + 1})")
             self._name("thread_sort_index", _GROUPS, number, number)
         return number
@@ -258,8 +260,27 @@ class Timeline:
 
     def _mark(self, node: str, name: str, args: dict[str, Any]) -> None:
         box = self._open.get(node)
-        row = self._row(self._groups.get(node, "loop"), 0 if box is None else box.row)
+        row = self._row(self._group_of(node), 0 if box is None else box.row)
         self._write(ph="i", s="t", name=name, cat="mark", pid=_GROUPS, tid=row, ts=self._now, args=args)
+
+    def _edited(self) -> None:
+        """Nodes may be called otherwise now, or be gone: the active times of each end under the name it had."""
+        before, self._nodes = self._nodes, {node.path: node for node in _nodes(flatten(self._graph))}
+        path_of = {node.node: path for path, node in self._nodes.items()}
+        stays = {path for path in self._nodes if path in before and before[path].node not in path_of}  # was replaced
+        moved = {}
+        for path in self._active:
+            here = path if path in stays or path not in before else path_of.get(before[path].node)
+            if here != path:
+                moved[path] = here
+        for path in moved:
+            self._activity(path, False)
+        for here in moved.values():
+            if here is not None:
+                self._activity(here, True)
+
+    def _group_of(self, node: str) -> str:
+        return _group(self._nodes[node]) if node in self._nodes else "loop"
 
     # --- the file ---------------------------------------------------------------------------------------------------
 
@@ -287,8 +308,9 @@ def _source(edge: str) -> tuple[str, str]:
     return port.rpartition(".")[0], port
 
 
-def _groups(flat: FlatGraph) -> Iterator[tuple[str, str]]:
-    for node in flat.nodes:
-        yield node.path, node.options.group or "loop"
-        if node.iteration is not None:
-            yield from _groups(node.iteration)
+def _nodes(flat: FlatGraph) -> Iterator[FlatNode]:
+    return (node for one in flat.walk() for node in one.nodes)
+
+
+def _group(node: FlatNode) -> str:
+    return node.options.group or "loop"

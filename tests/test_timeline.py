@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg import commands as c
 from hfg.timeline import Timeline
 
 Event = dict[str, Any]
@@ -224,3 +225,59 @@ def test_a_timeline_that_is_left_before_the_end_can_be_read(tmp_path: Path) -> N
     with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
         runner.run(main())
     assert of(json.loads(file.read_text(encoding="utf-8")), "X")
+
+
+def edited(graph: hfg.Graph, *steps: tuple[c.Command, ...]) -> list[Event]:
+    """Edit a run every 100 ms and end it after as long."""
+    stream = io.BytesIO()
+
+    async def main() -> None:
+        async with hfg.running(graph, trace=Timeline(stream, graph)) as run:
+            for commands in steps:
+                await asyncio.sleep(0.1)
+                await run.edit(*commands)
+            await asyncio.sleep(0.1)
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        runner.run(main())
+    events: list[Event] = json.loads(stream.getvalue())
+    return events
+
+
+@pytest.mark.rule("R7", "R4")
+@pytest.mark.parametrize(
+    ("commands", "times"),
+    [
+        ((c.Rename("mode", "other"),), {"mode": 0.1, "other": 0.1}),
+        ((c.Enclose(("mode",), "box"),), {"mode": 0.1, "box/mode": 0.1}),
+        ((c.Remove("mode"),), {"mode": 0.1}),
+        ((c.Replace("mode", "hfg.testing.nodes:Pulse"),), {"mode": 0.2}),
+        ((c.Rename("mode", "aside"), c.Rename("camera", "mode")), {"mode": 0.1, "aside": 0.1}),
+    ],
+)
+def test_active_times_end_under_the_name_they_began_with(
+    commands: tuple[c.Command, ...], times: dict[str, float]
+) -> None:
+    graph = hfg.Graph()
+    graph.start.activates(graph.add(Mode(), name="mode").activate)
+    graph.add(camera(count=20), max_rate_hz=100) >> graph.add(blur())
+    events = edited(graph, commands)
+    names = rows(events, 2)
+    assert {names[box["tid"]]: round(box["dur"] / 1e6, 3) for box in of(events, "X", 2)} == times
+
+
+@pytest.mark.rule("R7", "R4")
+def test_groups_keep_their_rows_when_all_their_nodes_move() -> None:
+    graph = hfg.Graph()
+    for name in ("one", "other"):
+        graph.group(name, threads=0)
+    graph.add(camera(count=25), max_rate_hz=100, group="one") >> graph.add(blur(), group="one")
+    events = edited(graph, (c.Move("camera", "other"), c.Move("blur", "other")), (c.Move("blur", "one"),))
+    names = rows(events, 1)
+    assert sorted(names.values()) == ["one", "other"]
+    assert {(box["name"], names[box["tid"]]) for box in of(events, "X")} == {
+        ("camera", "one"),
+        ("blur", "one"),
+        ("camera", "other"),
+        ("blur", "other"),
+    }

@@ -263,14 +263,13 @@ class Edits:
                 engine.lifetime.pipe(edge, flat.through)
         for edge in how.lost:
             engine.lifetime.forget(edge)
-        for worker in how.gone:
-            engine.pausing.forget(worker)
         for change in changes:
             if isinstance(change, ParameterChange) and core.trace is not None and change.node._place is not None:
                 here = core.by_path.get(change.node._place.path)
                 if here is not None and here.node is change.node:
                     core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
-        engine.looked_at_anew([worker for worker, _ in how.swapped])
+        swapped = {change.old: change.new for change in changes if isinstance(change, NodeSwap)}
+        engine.looked_at_anew([worker for worker, _ in how.swapped], swapped)
         for worker in come:
             core.upstairs.idle_again(worker)
 

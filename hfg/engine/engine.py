@@ -12,7 +12,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from hfg.clock import current_clock
@@ -478,11 +478,12 @@ class Engine:
                 self.measuring.end()
         return self.measuring
 
-    def looked_at_anew(self, swapped: Sequence[Worker]) -> None:
+    def looked_at_anew(self, workers: Sequence[Worker], swapped: Mapping[Any, Any]) -> None:
         """The graph was edited: who looks at it finds its places again; these workers have another node (R4)."""
         if self.measuring is not None:
-            self.measuring.refit(swapped)
-        self.taps.find_again()
+            self.measuring.refit(workers)
+        self.taps.find_again(swapped)
+        self.pausing.find_again(swapped)
 
     def _listen(self, take: Callable[[TraceEvent], None] | None) -> None:
         """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""

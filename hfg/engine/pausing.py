@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from hfg.engine import quiet, steps
+from hfg.engine.places import behind, is_gone, labels_at
 from hfg.engine.worker import CALLS_BLOCKED, Worker
 from hfg.errors import UsageError
 from hfg.token import Token
@@ -48,13 +49,15 @@ class Breakpoint:
     """Pauses the run; made by `Run.break_at`.
 
     Attributes:
-      path: the node before whose firings and calls the run pauses, or the edge or port on which tokens are looked at.
+      path: the node before whose firings and calls the run pauses, or the edge or port on which tokens are looked at;
+        as it is called now.
       hits: how often it has paused the run.
       token: the token that it saw last; None for a node.
     """
 
-    def __init__(self, path: str, remove: Callable[[Breakpoint], None]) -> None:
+    def __init__(self, place: Any, path: str, remove: Callable[[Breakpoint], None]) -> None:
         self.path = path
+        self.place = place
         self.hits = 0
         self.token: Token[Any] | None = None
         self._remove = remove
@@ -90,6 +93,7 @@ class Pausing:
         self._waiters: list[asyncio.Future[None]] = []  # for a pause, or for what is under way to be over
         self._at_nodes: dict[Worker, Breakpoint] = {}
         self._at_edges: dict[Breakpoint, Callable[[], None]] = {}
+        self._labels_at: dict[Breakpoint, frozenset[str]] = {}
         self._waived: set[Worker] = set()  # stopped here already: goes on when the run does
 
     # --- pause and resume -------------------------------------------------------------------------------------------
@@ -245,22 +249,30 @@ class Pausing:
         """Pause before each firing and call of a node."""
         found = self._at_nodes.get(worker)
         if found is None:
-            found = self._at_nodes[worker] = Breakpoint(worker.path, self.remove)
+            found = self._at_nodes[worker] = Breakpoint(worker.node, worker.path, self.remove)
             worker.halt = partial(self._behind, found)
             steps.choose(worker)
         return found
 
-    def at_edges(self, path: str, labels: set[str], when: Callable[[Token[Any]], object] | None) -> Breakpoint:
-        """Pause when a token is put on one of the edges, before anybody takes it."""
-        point = Breakpoint(path, self.remove)
+    def at_edges(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
+        """Pause when a token is put on one of the edges, before anybody takes it.
+
+        Raises:
+          UsageError: there is none.
+        """
+        labels = self._labels(place)
+        if not labels:
+            raise UsageError(f"{place!r} has no edge in this run, so no token can come there")
+        point = Breakpoint(place, _path(place, labels), self.remove)
+        self._labels_at[point] = frozenset(labels)
 
         def look(event: TraceEvent) -> None:
-            if type(event) is not TokenSent or event.edge not in labels:
+            if type(event) is not TokenSent or event.edge not in self._labels_at[point]:
                 return
             try:
-                hit = when is None or when(event.token)
+                hit = when is None or bool(when(event.token))
             except Exception:
-                _LOGGER.exception('the condition of the breakpoint at "%s" failed, so it was removed', path)
+                _LOGGER.exception('the condition of the breakpoint at "%s" failed, so it was removed', point.path)
                 point.remove()
                 return
             if hit:
@@ -270,17 +282,39 @@ class Pausing:
         self._at_edges[point] = self._engine.consumers.add(look, None)
         return point
 
+    def _labels(self, place: Any) -> list[str]:
+        return labels_at(self._engine.flat, place)
+
+    def find_again(self, swapped: Mapping[Any, Any]) -> None:
+        """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4).
+
+        Args:
+          swapped: nodes that were replaced, and by what.
+        """
+        for point in self.breakpoints:
+            point.place = behind(point.place, swapped)
+            if is_gone(point.place):
+                self.remove(point)
+        for worker, point in self._at_nodes.items():
+            self._is_called(point, worker.path)
+        for point in self._at_edges:
+            labels = self._labels(point.place)
+            self._labels_at[point] = frozenset(labels)
+            self._is_called(point, _path(point.place, labels) or point.path)
+
+    def _is_called(self, point: Breakpoint, path: str) -> None:
+        if self.why == point.path:
+            self.why = path
+        point.path = path
+
     def remove(self, point: Breakpoint) -> None:
         """Take a breakpoint away."""
         stop_looking = self._at_edges.pop(point, None)
         if stop_looking is not None:
             stop_looking()
+            del self._labels_at[point]
         for worker in [worker for worker, found in self._at_nodes.items() if found is point]:
-            self.forget(worker)
-
-    def forget(self, worker: Worker) -> None:
-        """The node is gone, and so is the breakpoint at it."""
-        if self._at_nodes.pop(worker, None) is not None:
+            del self._at_nodes[worker]
             self._waived.discard(worker)
             worker.halt = None
             steps.choose(worker)
@@ -302,6 +336,10 @@ class Pausing:
     def _hit(self, point: Breakpoint) -> None:
         point.hits += 1
         self.pause(point.path)
+
+
+def _path(place: Any, labels: Sequence[str]) -> str:
+    return str(getattr(place, "path", "") or next(iter(labels), ""))
 
 
 def _any_works(workers: list[Worker]) -> bool:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from hfg.engine import relays
 from hfg.engine.pausing import Breakpoint, Step
+from hfg.engine.places import place_of
 from hfg.errors import UsageError
 from hfg.token import Token
 
@@ -91,13 +91,9 @@ class Steering:
         engine = self._engine
         if when is not None and not callable(when):
             raise UsageError(f"when= takes a function of the token, like lambda token: token.value > 3; got {when!r}")
-        if isinstance(place, str):
-            place = engine.flat.graph[place]
+        place = place_of(engine.flat, place)
         if not hasattr(place, "_place"):
-            labels = relays.labels_of(engine.flat, place)
-            if not labels:
-                raise UsageError(f"{place!r} has no edge in this run, so no token can come there")
-            return engine.pausing.at_edges(str(getattr(place, "path", None) or labels[0]), set(labels), when)
+            return engine.pausing.at_edges(place, when)
         if when is not None:
             raise UsageError("when= looks at a token: give an edge or a port of the node, not the node")
         return engine.pausing.at_node(self._single(place, "stop at"))

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hfg.engine import ports, relays, steps
+from hfg.engine.places import Ends, behind, labels_at, place_of
 from hfg.engine.worker import RunningEvent, Worker
 from hfg.errors import GraphError, UsageError
 from hfg.graph.edges import Edge as DrawnEdge
-from hfg.graph.flat import FlatGraph
 from hfg.graph.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import InnerSource, InnerTarget, Port
@@ -144,7 +144,7 @@ class Taps:
             raise UsageError(f"size is how many tokens a tap keeps, 1 or more, got {size!r}")
         if max_rate_hz is not None and not (isinstance(max_rate_hz, int | float) and max_rate_hz > 0):
             raise UsageError(f"max_rate_hz is how many tokens a second a tap gives at most, got {max_rate_hz!r}")
-        what = self._by_path(what) if isinstance(what, str) else what
+        what = self._outside(what) or place_of(self._engine.flat, what)
         places = self._places(what)
         buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1))
         self._attach(buffer, what, places)
@@ -152,9 +152,14 @@ class Taps:
             buffer.end()
         return Tap(buffer, max_rate_hz, partial(self._remove, buffer))
 
-    def find_again(self) -> None:
-        """The graph was edited: what is looked at may be elsewhere, or nowhere for now (R4)."""
-        for buffer, (what, _) in list(self._buffers.items()):
+    def find_again(self, swapped: Mapping[Any, Any]) -> None:
+        """The graph was edited: what is looked at may be elsewhere, or nowhere for now (R4).
+
+        Args:
+          swapped: nodes that were replaced, and by what.
+        """
+        for buffer, (where, _) in list(self._buffers.items()):
+            what = behind(where, swapped)
             self._remove(buffer)
             try:
                 places = self._places(what)
@@ -212,13 +217,10 @@ class Taps:
 
     # --- finding ----------------------------------------------------------------------------------------------------
 
-    def _by_path(self, path: str) -> Any:
-        if " -> " in path:
-            labels = {edge.label: edge for edge in self._edges()}
-            if path not in labels:
-                raise GraphError(f'there is no edge "{path}" in this run; {suggest(path, labels)}')
-            return labels[path]
-        return self._engine.flat.graph[path]
+    def _outside(self, path: Any) -> Any:
+        """An edge by which signals come from outside the graph."""
+        edges = (edge for core in self._engine.all_cores() for edge in core.outside.values())
+        return next((edge for edge in edges if edge.label == path), None)
 
     def _edges(self) -> Iterator[Any]:
         return (edge for core in self._engine.all_cores() for edge in core.edges)
@@ -234,7 +236,7 @@ class Taps:
             )
         if any(what is edge for edge in self._edges()):
             return [(what, [])]
-        if not isinstance(what, Port | InnerSource | InnerTarget | DrawnEdge):
+        if not isinstance(what, Port | InnerSource | InnerTarget | DrawnEdge | Ends):
             raise UsageError(f"a tap looks at a port or an edge of this run, given itself or by path, got {what!r}")
         if isinstance(what, Port) and (what.graph is None or what.graph._root is not self._engine.flat.graph):
             raise UsageError(
@@ -244,8 +246,7 @@ class Taps:
         if isinstance(what, Port) and what.kind == "event":
             events = relays.events_behind(what) if relays.is_relay(what) else [what]
             return [(event, []) for event in map(self._running, events) if event is not None]
-        flats = list(_flats(self._engine.flat))
-        labels = {label for flat in flats for label in relays.labels_of(flat, what)}
+        labels = set(labels_at(self._engine.flat, what))
         carrying: dict[str, list[Any]] = {}
         for edge in self._edges():
             if edge.label in labels:
@@ -258,7 +259,7 @@ class Taps:
             if edge is not None:
                 places.append((edge, []))
         if not places:
-            name = what.label if isinstance(what, DrawnEdge) else what.path
+            name = what.path if isinstance(what, Port | InnerSource | InnerTarget) else _label(what)
             raise UsageError(f'"{name}" has no edge in this run, so no token passes there: connect it before the run')
         return places
 
@@ -274,11 +275,8 @@ class Taps:
         return next(worker for worker in self._engine.all_workers() if worker.node is port.node)
 
 
-def _flats(flat: FlatGraph) -> Iterator[FlatGraph]:
-    yield flat
-    for node in flat.nodes:
-        if node.iteration is not None:
-            yield from _flats(node.iteration)
+def _label(edge: Any) -> str:
+    return f"{edge.source.path} -> {edge.target.path}" if isinstance(edge, Ends) else str(edge.label)
 
 
 def _first_live(group: list[Any], edge: Any, put: Look) -> Look:
