@@ -27,6 +27,7 @@ __all__ = ["Consumers", "Listener", "check_consumer"]
 _LOGGER = logging.getLogger("hfg.engine")
 _BUFFER = 10_000  # events, for an async consumer that does not say
 _LAST_S = 1.0  # how long those behind a buffer may go on when the run is over
+_CANCELLED_S = 0.3  # and when they were cancelled for that
 
 Take = Callable[[TraceEvent], Any]
 
@@ -81,10 +82,10 @@ class Listener:
         if self._open:
             try:
                 self.consumer(event)
-            except Exception as error:
+            except (Exception, asyncio.CancelledError) as error:  # of something of its own: nobody cancels a function
                 self.failed(error)
 
-    def failed(self, error: Exception) -> None:
+    def failed(self, error: BaseException) -> None:
         """It raised: it is logged and removed, and the run goes on (R7)."""
         self.error = error
         _LOGGER.error("a consumer of the trace failed and was removed", exc_info=error)
@@ -136,6 +137,7 @@ class _InTask(_Buffered):
     def __init__(self, consumer: Any, consumers: Consumers, size: int, engine: Engine) -> None:
         super().__init__(consumer, consumers, size)
         self._something = asyncio.Event()
+        self._ending = False
         self._task = engine.loop.create_task(self._live(), name="hfg consumer", context=engine.context.copy())
 
     def wake(self) -> None:
@@ -148,6 +150,10 @@ class _InTask(_Buffered):
                 self.taken += 1
                 try:
                     await self.consumer(event)
+                except asyncio.CancelledError as error:
+                    if self._ending:
+                        return
+                    self.failed(error)  # of something of its own
                 except Exception as error:
                     self.failed(error)
             if not self._open:
@@ -161,8 +167,11 @@ class _InTask(_Buffered):
         self.ended = True
         self.wake()
         await asyncio.wait({self._task}, timeout=_LAST_S if self._open else 0)
+        self._ending = True
         self._task.cancel()
-        await asyncio.gather(self._task, return_exceptions=True)
+        await asyncio.wait({self._task}, timeout=_CANCELLED_S)
+        if not self._task.done():
+            _LOGGER.error("a consumer of the trace was cancelled at the end of the run and did not end; it was left")
         self._open = False
 
 
@@ -191,7 +200,7 @@ class _InThread(_Buffered):
                 self.taken += 1
                 try:
                     self.consumer(event)
-                except Exception as error:
+                except BaseException as error:  # whatever it is, nobody else hears of it
                     self._open = False
                     self._loop.call_soon_threadsafe(self._has_failed, error)
                     return
@@ -201,7 +210,7 @@ class _InThread(_Buffered):
             elif self.ended:
                 return
 
-    def _has_failed(self, error: Exception) -> None:
+    def _has_failed(self, error: BaseException) -> None:
         self._open = True
         self.failed(error)
 

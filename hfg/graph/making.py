@@ -10,8 +10,9 @@ from hfg import registry
 from hfg.errors import GraphError, HfgError
 from hfg.graph.commands import Replace
 from hfg.nodetype import Node
+from hfg.types import accepts
 
-__all__ = ["fitting", "kept", "made"]
+__all__ = ["as_meant", "fitting", "kept", "made"]
 
 
 def made(reference: str, parameters: dict[str, Any], path: str) -> Any:
@@ -20,11 +21,6 @@ def made(reference: str, parameters: dict[str, Any], path: str) -> Any:
     Raises:
       GraphError: there is no such type, or a parameter is refused.
     """
-    if not isinstance(reference, str):
-        raise GraphError(
-            f'node "{path}": a command names a node type by reference, "module:name", got {reference!r}; '
-            "hfg.registry.reference_of gives it"
-        )
     try:
         kind: Any = registry.find(reference)
     except HfgError as error:
@@ -35,6 +31,17 @@ def made(reference: str, parameters: dict[str, Any], path: str) -> Any:
         return kind(**values)
     except (TypeError, ValueError) as error:
         raise GraphError(f'node "{path}": {error}') from error
+
+
+def as_meant(value: Any, hint: Any) -> Any:
+    """The same for a value of any type; one that does not fit is left, for whoever checks it."""
+    if accepts(value, hint):
+        return value
+    try:
+        converted = msgspec.convert(value, hint)
+    except Exception:
+        return value
+    return converted if accepts(converted, hint) else value
 
 
 def fitting(spec: Any, value: Any) -> Any:

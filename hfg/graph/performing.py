@@ -30,13 +30,14 @@ from hfg.graph.changes import (
     undo_all,
 )
 from hfg.graph.copying import copy_of
-from hfg.graph.edges import Edge, refuse
+from hfg.graph.edges import Edge, refuse, type_of
 from hfg.graph.enclosing import dissolve, enclose
 from hfg.graph.gates import Gate
-from hfg.graph.making import fitting, kept, made
+from hfg.graph.making import as_meant, fitting, kept, made
 from hfg.graph.naming import need_name
 from hfg.graph.options import edge_options
 from hfg.graph.pointing import graph_and_name, node_at, parameter_at, source_at, target_at
+from hfg.graph.promotions import refuse_standing
 from hfg.graph.structure import Graph
 from hfg.nodetype import Node
 from hfg.ports import InnerSource, InnerTarget
@@ -82,6 +83,7 @@ class _Hand:
             raise GraphError(
                 f"an edit takes commands, got {command!r}; write one, as in hfg.commands.Connect('a.out', 'b.value')"
             )
+        _refuse_malformed(command)
         method(command)
 
     def do(self, change: Change) -> None:
@@ -182,7 +184,7 @@ class _Hand:
             self.do(EdgeChange(around, Edge(source, target, edge.options), at, added=True))
         for level, gate in gates:
             self.do(GateChange(level, _gate_of(gate, old, new), len(level.gates), added=True))
-        self.promote(around, _promoted_by(promoted, old, new))
+        self.promote(around, _promoted_by(around, promoted, old, new))
 
     def _hand_over(self, around: Graph, old: Node, new: Node) -> None:
         """Gates and promotions go on with the new node."""
@@ -191,7 +193,7 @@ class _Hand:
                 position = level.gates.index(gate)
                 self.do(GateChange(level, gate, position, added=False))
                 self.do(GateChange(level, _gate_of(gate, old, new), position, added=True))
-        self.promote(around, _promoted_by(around._promoted, old, new))
+        self.promote(around, _promoted_by(around, around._promoted, old, new))
 
     # --- options and parameters ---
 
@@ -238,7 +240,7 @@ class _Hand:
             capacity=command.capacity,
             overflow=command.overflow,
             capacity_limit=command.capacity_limit,
-            initial=command.initial,
+            initial=tuple(as_meant(value, type_of(target)) for value in command.initial),
         )
         home = around if around.edges and around.edges[-1] is edge else target.graph
         self.changes.append(EdgeChange(home, edge, len(home.edges) - 1, added=True))
@@ -270,14 +272,28 @@ class _Hand:
     # --- subgraphs ---
 
     def _enclose(self, command: c.Enclose) -> None:
-        paths: object = command.paths
-        if isinstance(paths, str):
-            raise GraphError(f'Enclose takes several paths, got {paths!r}; write Enclose(("{paths}",), "box")')
         members = [node_at(self.graph, path) for path in dict.fromkeys(command.paths)]
         enclose(self.do, members, command.name)
 
     def _dissolve(self, command: c.Dissolve) -> None:
         dissolve(self.do, node_at(self.graph, command.path), _levels(self.graph))
+
+
+def _refuse_malformed(command: c.Command) -> None:
+    """Commands of `decode` are well formed; those that are written in Python need not be.
+
+    Raises:
+      GraphError: a field holds something that it never holds.
+    """
+    for field in command.__struct_fields__:
+        value = getattr(command, field)
+        if field in ("parameters", "options") and not isinstance(value, dict):
+            raise GraphError(f"{type(command).__name__} takes {field} as a dict by name, got {value!r}")
+        if field in ("source", "target", "type") and not isinstance(value, str):
+            what = '"module:name"' if field == "type" else '"camera.out"'
+            raise GraphError(f"{type(command).__name__} takes {field} as a text such as {what}, got {value!r}")
+        if field == "paths" and not (isinstance(value, tuple | list) and all(isinstance(one, str) for one in value)):
+            raise GraphError(f'{type(command).__name__} takes several paths, as in ("detect", "track"), got {value!r}')
 
 
 def _touches(edge: Edge, node: Node) -> bool:
@@ -320,8 +336,7 @@ def _counterpart(end: Any, old: Node, new: Node) -> Any:
         where = old._place or new._place
         raise GraphError(
             f'"{where.path if where else old._type.name}" cannot be replaced by {new._type.qualname}, which has no '
-            f'{end.kind} "{end.name}" while the node has an edge there; remove the edge first, or take a type with '
-            "this port"
+            f'{end.kind} "{end.name}", and that is in use; disconnect it first, or take a type that has it'
         ) from error
 
 
@@ -330,12 +345,19 @@ def _gate_of(gate: Gate, old: Node, new: Node) -> Gate:
     return Gate(target, by, gate.idle_rate_hz)
 
 
-def _promoted_by(promoted: dict[str, Any], old: Node, new: Node) -> dict[str, Any]:
-    parameters = new.ports.parameters
-    return {
-        name: [parameters[port.name] if port.node is old and port.name in parameters else port for port in ports]
-        for name, ports in promoted.items()
-    }
+def _promoted_by(around: Graph, promoted: dict[str, Any], old: Node, new: Node) -> dict[str, Any]:
+    """Let the parameters of the new node stand where those of the old one did.
+
+    Raises:
+      GraphError: it has none of this name, or one that cannot take the same values.
+    """
+    found: dict[str, list[Any]] = {}
+    for name, ports in promoted.items():
+        found[name] = [_counterpart(port, old, new) for port in ports]
+        for port in found[name]:
+            if port.node is new:
+                refuse_standing(around._owner.ports.parameters[name], port)
+    return found
 
 
 def _need_free(around: Graph, name: str, path: str) -> None:

@@ -9,7 +9,7 @@ from hfg.graph.edges import end_path
 from hfg.ports import ParameterPort
 from hfg.types import describe, why_not
 
-__all__ = ["refuse_promotion"]
+__all__ = ["refuse_promotion", "refuse_standing"]
 
 
 def refuse_promotion(graph: Any, outer: Any, inner: Any) -> None:
@@ -44,9 +44,21 @@ def refuse_promotion(graph: Any, outer: Any, inner: Any) -> None:
             "too; "
             "leave out one of the two"
         )
+    refuse_standing(outer, inner)
+
+
+def refuse_standing(outer: Any, inner: Any) -> None:
+    """Raise if the one inside cannot take what the parameter of the subgraph takes.
+
+    Raises:
+      GraphError: the types do not fit, or the present value is out of the inner one's limits.
+    """
     reason = why_not(outer.type, inner.type)
     if reason is not None:
         raise GraphError(
             f'"{outer.path}" is {describe(outer.type)}, but "{inner.path}" takes {describe(inner.type)} ({reason}); '
             "give both one type"
         )
+    problem = inner.spec.check(outer.value)
+    if problem is not None:
+        raise GraphError(f'"{outer.path}" cannot stand for "{inner.path}": {problem}; change its value or the limits')

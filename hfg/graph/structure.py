@@ -415,12 +415,7 @@ class Graph(Editable):
         self._need_rest("promoting a parameter")
         with Refusable(outer):
             refuse_promotion(self, outer, inner)
-            try:
-                inner.value = outer.value
-            except ValueError as error:
-                raise GraphError(
-                    f'"{outer.path}" cannot stand for "{inner.path}": {error}; change its default or the limits'
-                ) from error
+            inner.value = outer.value
             self._promoted.setdefault(outer.name, []).append(inner)
 
     # --- finding and checking ---

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import threading
 from collections import deque
@@ -238,6 +239,59 @@ def test_a_consumer_that_hangs_does_not_hold_the_end_of_the_run_for_long() -> No
         return report.outcome, loop.time(), listener.is_open
 
     assert drive(main) == ("done", 1.0, False)
+
+
+def test_a_consumer_that_does_not_let_itself_be_cancelled_is_left(caplog: pytest.LogCaptureFixture) -> None:
+    async def main() -> tuple[str, float]:
+        gives_up = asyncio.Event()
+
+        async def consumer(event: TraceEvent) -> None:
+            while not gives_up.is_set():
+                with contextlib.suppress(asyncio.CancelledError):
+                    await asyncio.sleep(3600)
+
+        loop = asyncio.get_running_loop()
+        async with hfg.running(chain()) as run:
+            run.trace(consumer)
+            report = await run.wait_finished()
+        gives_up.set()
+        return report.outcome, loop.time()
+
+    with caplog.at_level(logging.ERROR):
+        assert drive(main) == ("done", 1.3)
+    assert "was cancelled at the end of the run and did not end" in caplog.text
+
+
+@pytest.mark.parametrize("how", ["plain", "async", "thread"])
+def test_a_consumer_that_fails_with_no_ordinary_exception_is_removed(
+    how: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def main() -> Any:
+        async def of_its_own(event: TraceEvent) -> None:
+            task = asyncio.create_task(asyncio.sleep(1))
+            task.cancel()
+            await task
+
+        def plain(event: TraceEvent) -> None:
+            raise asyncio.CancelledError
+
+        def leaves(event: TraceEvent) -> None:
+            raise SystemExit(3)
+
+        consumer: Any = {"plain": plain, "async": of_its_own, "thread": leaves}[how]
+        async with hfg.running(chain()) as run:
+            listener = run.trace(consumer, size=100 if how == "thread" else None)
+            report = await run.wait_finished()
+        assert report.outcome == "done"
+        for _ in range(3):
+            await asyncio.sleep(0)
+        return listener
+
+    with caplog.at_level(logging.ERROR):
+        listener = drive(main)
+    assert isinstance(listener.error, SystemExit if how == "thread" else asyncio.CancelledError)
+    assert not listener.is_open
+    assert len(caplog.records) == 1
 
 
 def test_a_consumer_behind_a_buffer_that_is_removed_sees_nothing_more() -> None:

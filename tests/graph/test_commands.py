@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import annotated_types as at
 import pytest
 
 import hfg
 from hfg import commands as c
 from hfg.errors import GraphError, HfgError, UsageError
 from hfg.graph.flat import flatten
+from hfg.registry import reference_of
 from hfg.testing.edits import drawn, random_edit
 from hfg.testing.making import Allowed, SeededChooser, random_plan
-from hfg.testing.nodes import Counter, Tally, add, double, script, sink
+from hfg.testing.nodes import Counter, Scaled, Tally, add, double, script, sink
 
 SEQUENCES = 60  # of 20 edits each; runs are edited in tests/semantics/test_edits.py
 
@@ -213,12 +216,20 @@ REFUSED = [
     (c.Add("hfg.testing.nodes:doubel", "x"), 'module "hfg.testing.nodes" has no "doubel"'),
     (c.Add("hfg.testing.nodes:double", "x", {"size": 3}), 'node "x": double has no parameter "size"'),
     (c.Add("hfg.testing.nodes:double", "x", {}, {"rate": 3}), "options are those of graph.add"),
-    (c.Replace("first", "hfg.testing.nodes:sink"), 'which has no output "out" while the node has an edge there'),
+    (c.Replace("first", "hfg.testing.nodes:sink"), 'which has no output "out", and that is in use'),
     (c.Move("first", "gpu"), "which is not declared"),
     (c.Dissolve("first"), '"first" is no subgraph, so it cannot be dissolved'),
     (c.Enclose((), "box"), "made of at least one node"),
     (c.Enclose(("first",), "second"), "has a node of this name already"),
     ("remove first", "an edit takes commands"),
+    (c.Add("hfg.testing.nodes:double", "x", None), "Add takes parameters as a dict by name, got None"),  # type: ignore[arg-type]
+    (c.Add(5, "x"), 'Add takes type as a text such as "module:name", got 5'),  # type: ignore[arg-type]
+    (c.Replace("first", None), 'Replace takes type as a text such as "module:name", got None'),  # type: ignore[arg-type]
+    (c.MakeActive(["a"], "b"), "MakeActive takes source as a text such as \"camera.out\", got ['a']"),  # type: ignore[arg-type]
+    (c.Enclose("first", "box"), "Enclose takes several paths"),  # type: ignore[arg-type]
+    (c.Enclose(None, "box"), "Enclose takes several paths"),  # type: ignore[arg-type]
+    (c.Enclose((1,), "box"), "Enclose takes several paths"),  # type: ignore[arg-type]
+    (c.Remove(3), "a path is a text"),  # type: ignore[arg-type]
 ]
 
 
@@ -331,6 +342,76 @@ def test_a_module_that_fails_leaves_graph_and_module_as_they_were(module: Path, 
     assert drawn(graph) == before
     assert graph["grow"]._type.reference == "growing:grow"
     assert sent(graph) == [11, 12]
+
+
+@hfg.node
+def places(*, home: tuple[int, int] = (0, 0)) -> Iterator[tuple[int, int]]:
+    """Give places."""
+    yield home
+
+
+@hfg.node
+def travel(goal: tuple[int, int]) -> None:
+    """Take places."""
+
+
+@pytest.mark.rule("R4", "P7")
+def test_initial_tokens_that_are_no_json_travel_with_the_command() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.add(places())
+        graph.add(travel())
+        return graph
+
+    command = c.Connect("places.out", "travel.goal", initial=((1, 2), (3, 4)))
+    graph, other = build(), build()
+    graph.edit(command)
+    other.edit(*c.decode(c.encode([command])))
+    assert other.edges[0].options.initial == graph.edges[0].options.initial == ((1, 2), (3, 4))
+
+
+class Tuned(hfg.Subgraph):
+    """A parameter that stands for one inside."""
+
+    value = hfg.Input(int)
+    factor = hfg.Parameter(7, at.Le(10))
+
+    def build(self, graph: hfg.Graph) -> None:
+        inner = graph.add(Scaled(), name="inner")
+        graph.connect(self.value.inner, inner.value)
+        graph.promote(self.factor, inner.ports.parameters["factor"])
+
+
+class Limited(hfg.Node):
+    """One with limits."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    factor = hfg.Parameter(1, at.Le(5))
+
+    def process(self, value: int) -> int:
+        return value * self.factor
+
+
+@pytest.mark.rule("R4", "G3")
+@pytest.mark.parametrize(
+    ("type_", "sentence"),
+    [
+        ("hfg.testing.nodes:double", 'double, which has no parameter "factor", and that is in use'),
+        (reference_of(Limited), '"box.factor" cannot stand for "box/inner.factor": must be <= 5, got 7'),
+    ],
+)
+def test_a_node_whose_parameter_is_promoted_is_replaced_by_one_that_can_take_it(type_: str, sentence: str) -> None:
+    graph = hfg.Graph()
+    graph.add(Tuned(), name="box")
+    before = drawn(graph)
+    with pytest.raises(GraphError) as refused:
+        graph.edit(c.Replace("box/inner", type_))
+    assert sentence in str(refused.value)
+    assert drawn(graph) == before
+    graph.edit(c.SetParameter("box.factor", 3), c.Replace("box/inner", reference_of(Limited)))
+    graph.edit(c.SetParameter("box.factor", 4))
+    assert graph["box/inner"].factor == 4
 
 
 def test_a_module_that_was_never_imported_is_named() -> None:
