@@ -25,7 +25,7 @@ def execute(
     begin: Callable[[Run], Awaitable[None] | None] | None = None,
     **options: Any,
 ) -> tuple[Report | None, HfgError | None]:
-    """Run it to its end; a failed run's report comes with its error, an interrupted run has neither.
+    """Run it to its end; a failed run's report comes with its error, an interrupted run has no report.
 
     Args:
       graph: it is loaded, and its parameters are set.
@@ -38,6 +38,7 @@ def execute(
     Raises:
       TargetError: the options do not fit.
     """
+    begun_run: Run | None = None
 
     async def main() -> Report:
         task = asyncio.current_task()
@@ -49,6 +50,8 @@ def execute(
             beside: list[Awaitable[None]] = []
 
             def begun(run: Run) -> None:
+                nonlocal begun_run
+                begun_run = run
                 if door is not None:
                     door.run = run
                 if begin is not None and (waits := begin(run)) is not None:
@@ -72,4 +75,4 @@ def execute(
     except (asyncio.CancelledError, KeyboardInterrupt):
         if not interrupt.count:
             raise
-        return None, None
+        return None, None if begun_run is None else begun_run.error

@@ -19,6 +19,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -121,13 +122,14 @@ class Interrupt:
         task.cancel()
 
     def _insist(self) -> None:
+        leave_at = time.monotonic() + _LEAVE_AFTER_S
         if not self._noticed.wait(_BREAK_IN_AFTER_S):
             self._breaking_in = True
             if hasattr(signal, "pthread_kill"):  # wakes the code also from a sleep or a read
                 signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
             else:
                 _thread.interrupt_main()
-        threading.Event().wait(_LEAVE_AFTER_S - _BREAK_IN_AFTER_S)
+        time.sleep(max(0.0, leave_at - time.monotonic()))
         self._leave("interrupted: something did not come back in time and was left behind, not everything is torn down")
 
     def _leave(self, sentence: str) -> None:

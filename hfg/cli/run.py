@@ -72,12 +72,12 @@ def run(
         report, error = execute(graph, target, clock, interrupt, live.begin, **options)
     if json and report is not None:
         show.json(report)
+    if error is not None:
+        show.failure(error)
     if interrupt.count:
         show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
         return 1
-    if error is not None:
-        show.failure(error)
-    elif report is not None and (not json or verbose):
+    if error is None and report is not None and (not json or verbose):
         show.report(graph.name, report, verbose)
     return 0 if error is None else 1
 

@@ -427,9 +427,9 @@ class Engine:
         return max(0.0, min(self.settings.teardown_limit_s, self._leave_by - time.monotonic()))
 
     def hurry(self) -> None:
-        """Somebody wants to leave: tear down what can be torn down in a second."""
+        """Somebody wants to leave: tear down what can be torn down in 1.5 s, for in two the process is to be over."""
         if not self.hurried.is_set():
-            self._leave_by = time.monotonic() + 1.0
+            self._leave_by = time.monotonic() + 1.5
             self.hurried.set()
 
     def leave_now(self) -> None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import asyncio
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -92,9 +93,10 @@ class CtrlC:
         self.task.cancel()
 
     def _insist(self) -> None:
+        leave_at = time.monotonic() + _LEAVE_AFTER_S
         if not self._noticed.wait(_BREAK_IN_AFTER_S):
             self._break_in()
-        if not self._over.wait(_LEAVE_AFTER_S - _BREAK_IN_AFTER_S):
+        if not self._over.wait(leave_at - time.monotonic()):
             self._break_in()
 
     def _break_in(self) -> None:

@@ -301,11 +301,13 @@ class Lifetime:
             problem = NodeError(worker.path, "teardown()", error)
             problem.__cause__ = error
             return problem
-        limit = engine.teardown_limit_s
+        begun = time.monotonic()
         if await self._within_limit(waiter):
             return waiter.result()
-        limit = min(limit, engine.teardown_limit_s or 1.0)
-        return NodeError(worker.path, "teardown()", f"it took longer than {limit:g} s and was given up")
+        limit = f"{engine.settings.teardown_limit_s:g}"
+        if engine.hurried.is_set():
+            limit = f"{time.monotonic() - begun:.1f}"
+        return NodeError(worker.path, "teardown()", f"it took longer than {limit} s and was given up")
 
     async def _end_threads(self) -> None:
         """Let idle threads end; those that work have had their time and are left to themselves, as daemons."""

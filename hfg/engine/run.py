@@ -20,7 +20,7 @@ from hfg.engine.statistics import Statistics
 from hfg.engine.steering import Steering
 from hfg.engine.taps import Tap
 from hfg.engine.worker import Worker
-from hfg.errors import NotRunning, RunError, UsageError
+from hfg.errors import HfgError, NotRunning, RunError, UsageError
 from hfg.graph import Graph
 from hfg.nodetype import Node
 from hfg.ports import EventPort, ParameterPort, SlotPort
@@ -270,6 +270,11 @@ class Run(Steering, Editable):
 
         reset_activity(self._engine.core)
         self._engine.kick()
+
+    @property
+    def error(self) -> HfgError | None:
+        """What the run failed with; None if it did not. A run that was cancelled can fail in its teardown."""
+        return self._engine.error
 
     def report(self) -> Report:
         """What the run has done; final once it is over."""
