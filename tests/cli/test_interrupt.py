@@ -121,6 +121,17 @@ def test_a_thread_that_does_not_come_back_is_left_behind(process: Process) -> No
     assert "interrupted" in err
 
 
+def test_a_teardown_that_does_not_end_in_time_is_named(process: Process) -> None:
+    code = GRAPH.format(code="await asyncio.Event().wait()", group="loop", prefix="async ")
+    process.run(code.replace("def teardown(self) -> None: ", "async def teardown(self): await asyncio.sleep(60); "))
+    process.interrupt()
+    returned, seconds, err = process.end()
+    assert returned == 1
+    assert seconds < PROMISED_S + SLACK_S
+    assert 'node "busy" failed in teardown(): it took longer than' in err
+    assert "interrupted" in err
+
+
 def test_second_interrupt_ends_at_once(process: Process) -> None:
     process.run_node("time.sleep(60)", group="thread")
     process.interrupt()
