@@ -117,8 +117,8 @@ class Edits:
                 self._refuse_errors(how)
             switched = self._switched(changes)
             touched = _touched(how, switched)
-            waiting = self._values_of_running_nodes(changes)
             self._turns.wait_for(touched)
+            waiting = self._values_of_running_nodes(changes)
             undo_all(waiting)  # they work with the old ones until their firings are over
             await self._set_up(how, come)
             self._turns.wait_for(touched)

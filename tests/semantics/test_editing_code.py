@@ -333,6 +333,15 @@ def test_of_two_nodes_that_edit_each_other_the_second_is_told() -> None:
     assert LOG[1:] == ["b.whom was set"]
 
 
+def test_a_node_that_sets_its_own_parameter_by_an_edit_is_told_and_keeps_it() -> None:
+    async def body(run: hfg.Run) -> None:
+        await run.wait_finished()
+        assert run.graph["a"].whom == "a.whom"
+
+    drive(editors(a=("a.whom", 0.001)), body)
+    assert LOG[0].startswith('"a" edits the graph in the middle of its code')
+
+
 def test_a_node_that_waits_behind_an_edit_that_comes_to_need_it_is_told() -> None:
     async def body(run: hfg.Run) -> None:
         await asyncio.sleep(0.0005)
