@@ -167,7 +167,7 @@ def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) ->
         else:
             has_value = True
         has_mandatory = has_mandatory or edge.mandatory
-    if end or (any(token.value is END for token in tokens) and _all_ended(worker, edges)):
+    if end or (any(edge.ended for edge in worker.in_edges) and _all_ended(worker, edges)):
         return "end"
     if any(edge.ended for edge in edges):
         rewire(worker)
