@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from hfg.engine.worker import CALLS_BLOCKED, FULL, RATE, UNREADY, Worker
+from hfg.engine.worker import CALLS_BLOCKED, DISABLED, FULL, RATE, UNREADY, Worker
 from hfg.ports.edges import Edge, EventEdge
 
 SAME_MOMENT_S = 1e-9  # times that differ by less are one: sums of floats do
@@ -152,7 +152,7 @@ def freed(edge: EventEdge) -> None:
 def idle_again(worker: Worker, *, asked: bool = False) -> None:
     """A firing, call or question is over: see what is next."""
     worker.busy = ""
-    if worker.pending_end and not worker.outputs.missing:
+    if worker.pending_end and (not worker.outputs.missing or worker.blocked & DISABLED):
         worker.core.upstairs.send_end(worker)  # its outputs became free during a slot call
     if worker.on_idle is not None:
         _let_others(worker)

@@ -11,7 +11,7 @@ from typing import Any
 from hfg.engine.agenda import block, cancel_limit, freed, idle_again
 from hfg.engine.releasing import release
 from hfg.engine.sending import flush_automatic, put_outputs, send_end
-from hfg.engine.worker import ENDED, Worker
+from hfg.engine.worker import DISABLED, ENDED, Worker
 from hfg.ports.edges import EventEdge
 from hfg.token import Marker, Token
 from hfg.trace import FiringEnded, TokenDrained, TokenDropped
@@ -90,7 +90,7 @@ def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     release(taken)
     worker.end_stamp = worker.stamp
     worker.right = False  # the firing is over; END is not part of it (A3)
-    if worker.outputs.missing:
+    if worker.outputs.missing and not worker.blocked & DISABLED:
         worker.pending_end = True
     else:
         send_end(worker)

@@ -14,8 +14,8 @@ from hfg.engine.agenda import block, consider, unblock
 from hfg.engine.core import Core
 from hfg.engine.modifiers import derive_scopes, discard
 from hfg.engine.releasing import release
-from hfg.engine.sending import telling_behind
-from hfg.engine.worker import BACKOFF, DISABLED, ENDED, FUTILE, REMOVED, TORN_DOWN, Worker
+from hfg.engine.sending import send_end, telling_behind
+from hfg.engine.worker import AMID_NOTHING, BACKOFF, DISABLED, ENDED, FUTILE, REMOVED, TORN_DOWN, Worker
 from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge
 from hfg.trace import NodeEnabled
@@ -160,6 +160,9 @@ def _settle_disabled(workers: Sequence[Worker]) -> None:
             worker.taken = ()
             free = (*incoming, *(edge for edge in outgoing if edge in untaken))
             release([edge for edge in free if type(edge) is not EventEdge and edge.held])
+        for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
+            if worker.pending_end and worker.busy in AMID_NOTHING:
+                send_end(worker)
 
 
 def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> None:

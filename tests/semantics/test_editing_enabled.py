@@ -14,13 +14,14 @@ from hfg.errors import NodeError
 from hfg.registry import reference_of
 from hfg.testing import Recorder, recorder, replay
 from hfg.testing.edits import drawn
-from hfg.testing.nodes import Failing, Scaled, Waiting, add, ascript, double, script, sink
+from hfg.testing.nodes import Failing, Latch, Scaled, Waiting, add, ascript, double, script, sink
 from hfg.trace import (
     CallStarted,
     EventTriggered,
     FiringEnded,
     FiringStarted,
     NodeEnabled,
+    NodeEnded,
     StructureChanged,
     TokenDropped,
 )
@@ -284,3 +285,51 @@ def test_signals_into_slots_and_parameters_arrive_in_order_of_connecting() -> No
 
     calls = [event.slot for event in drive(build) if isinstance(event, CallStarted) and event.node == "scaled"]
     assert calls == ["factor", "ping"]
+
+
+class Farewell(hfg.Node):
+    """A source that has nothing but a last word."""
+
+    out = hfg.Output(int)
+
+    def process(self) -> None:
+        raise hfg.EndOfStream
+
+    def end(self) -> None:
+        self.out.send(7)
+
+
+@pytest.mark.rule("F4", "F5", "F10")
+def test_a_node_that_is_disabled_ends_without_waiting_for_what_others_have_taken() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.add(Farewell(), name="source") >> graph.add(Waiting(pause_s=0.01), name="slow")
+        return graph
+
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.002)
+        await run.edit(c.Disable("source"))
+
+    trace = drive(build, body)
+    assert next((event.node, event.time) for event in trace if isinstance(event, NodeEnded)) == ("source", 0.002)
+
+
+@pytest.mark.rule("F4", "F12", "R4")
+def test_a_node_that_starts_afresh_with_nothing_left_but_initial_tokens_ends_again() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        latch = graph.add(Latch(), name="latch")
+        graph.connect(graph.add(script(values=()), name="first").out, latch.first)
+        late = graph.add(ascript(values=(4, 5), pause_s=0.005), name="late")
+        graph.connect(late.out, latch.second, initial=[1])
+        latch >> graph.add(sink())
+        late >> graph.add(sink(), name="other")  # or the run would be over
+        return graph
+
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.002)
+        await run.edit(c.Replace("latch", "hfg.testing.nodes:Latch"))
+
+    trace = drive(build, body)
+    kinds = [(event.time, event.kind) for event in trace if isinstance(event, FiringStarted) and event.node == "latch"]
+    assert kinds == [(0.0, "end"), (0.005, "end")]
