@@ -266,7 +266,7 @@ class Engine:
     def _rests(self) -> bool:
         """R3: paused, so nothing new starts: it is quiet when nothing is under way, but does not end by that."""
         if self.pausing.paused:
-            if not self.core.in_flight:
+            if not self.pausing.is_under_way():
                 self._answer_quiet()
             self.pausing.rest()
         return self.pausing.paused

@@ -68,7 +68,11 @@ class _InnerTimer:
 
 
 class Iteration:
-    """The inside of one iterating subgraph."""
+    """The inside of one iterating subgraph.
+
+    Attributes:
+      looking: at the loop's next pass it is seen whether the inside is quiet.
+    """
 
     def __init__(self, worker: Worker, flat: FlatGraph, groups: Any, loop: Any) -> None:
         self.worker = worker
@@ -84,7 +88,7 @@ class Iteration:
         self._position = 0
         self._results: list[list[Any]] = []
         self._queued = 0
-        self._looking = False
+        self.looking = False
         plan.build(self.core, flat, groups, loop=loop)
         for inner in self.core.workers:
             if not inner.is_boundary_output:
@@ -150,13 +154,13 @@ class Iteration:
 
     def look_later(self) -> None:
         """See at the loop's next pass whether the inside is quiet."""
-        if not self._looking and self.worker.in_flight:
-            self._looking = True
+        if not self.looking and self.worker.in_flight:
+            self.looking = True
             engine: Any = self.worker.core.host
             engine.loop.call_soon(self._look, context=engine.context)
 
     def _look(self) -> None:
-        self._looking = False
+        self.looking = False
         self.settle()
 
     def settle(self) -> None:

@@ -219,7 +219,7 @@ async def signal(
 ) -> None:
     """Bring a signal into a slot from outside, as if by an edge that is active; waits while its queue is full (F8).
 
-    The signal takes its place behind all that wait already.
+    The signal takes its place behind all that wait already. To a node that is disabled nothing is sent (F10).
     """
     _check_running(engine)
     edge = worker.core.outside.get((worker.index, slot))
@@ -239,5 +239,6 @@ async def signal(
         explicit = value.activity if activity is None else activity
         stamp = value.stamp if stamp is None else stamp
         value = value.value
-    enqueue(edge, value, explicit, engine.now() if stamp is None else stamp)
-    engine.kick()
+    if edge.live:
+        enqueue(edge, value, explicit, engine.now() if stamp is None else stamp)
+        engine.kick()

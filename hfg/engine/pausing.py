@@ -152,10 +152,17 @@ class Pausing:
         """
         engine = self._engine
         while not engine.core.over:
-            if self.paused and not engine.core.in_flight and not self._stepping:
+            if self.paused and not self.is_under_way() and not self._stepping:
                 return self.why
             await self._change()
         raise UsageError("the run has ended: nothing can pause it any more")
+
+    def is_under_way(self) -> bool:
+        """Whether something comes to its end by itself; what iterates does not, for its inside is held (G4)."""
+        return any(
+            core.in_flight > sum(worker.in_flight for worker in core.workers if worker.iteration is not None)
+            for core in self._engine.all_cores()
+        )
 
     # --- steps ------------------------------------------------------------------------------------------------------
 
@@ -168,6 +175,8 @@ class Pausing:
                 return Step((), why_not)
             self._let(worker)
             await self._over([worker])
+            while worker.core.inside is not None and worker.core.inside.looking:
+                await asyncio.sleep(0)  # the next element goes in by itself (G4)
         finally:
             self._stepping = False
         return Step((worker.path,))
@@ -261,6 +270,11 @@ class Pausing:
           UsageError: there is none.
         """
         labels = self._labels(place)
+        if not labels and labels_at(self._engine.flat, place):
+            raise UsageError(
+                f"{place!r} is inside a subgraph that iterates, where tokens can be looked at by run.tap alone; "
+                "a breakpoint may be at a node there"
+            )
         if not labels:
             raise UsageError(f"{place!r} has no edge in this run, so no token can come there")
         point = Breakpoint(place, _path(place, labels), self.remove)
@@ -283,7 +297,8 @@ class Pausing:
         return point
 
     def _labels(self, place: Any) -> list[str]:
-        return labels_at(self._engine.flat, place)
+        flat = self._engine.flat
+        return [edge.label for edge in flat.edges if edge.label in labels_at(flat, place)]
 
     def find_again(self, swapped: Mapping[Any, Any]) -> None:
         """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4).
@@ -328,7 +343,7 @@ class Pausing:
                 step(worker)
                 return
             self._waived.add(worker)
-            worker.push(worker)  # it stands in the queue as before
+            worker.group.push(worker)  # it stands in the queue as before
             self._hit(point)
 
         return stop_first

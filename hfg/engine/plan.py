@@ -343,6 +343,7 @@ def prepare_slot(worker: Worker, name: str) -> EventEdge:
         worker.meter.measure_slots()
     core.edges.append(edge)
     core.outside[worker.index, name] = edge
+    edge.live = is_live(edge)
     if core.started:
         rewire(worker)
     return edge

@@ -11,7 +11,19 @@ from typing import Any
 from hfg.engine.agenda import block, freed, must_wait, unblock
 from hfg.engine.core import Core
 from hfg.engine.sending import enqueue, put_outputs
-from hfg.engine.worker import CALLS_BLOCKED, DISABLED, ENDED, FULL, FUTILE, RESTING, UNREADY, UNWIRED, Worker
+from hfg.engine.worker import (
+    BACKOFF,
+    CALLS_BLOCKED,
+    DISABLED,
+    ENDED,
+    FULL,
+    FUTILE,
+    RATE,
+    RESTING,
+    UNREADY,
+    UNWIRED,
+    Worker,
+)
 from hfg.errors import QueueLimit, Stalled
 from hfg.ports.edges import EventEdge
 from hfg.token import END
@@ -207,6 +219,17 @@ def stall(core: Core) -> Stalled | None:
     )
 
 
+_WAITS = (
+    (DISABLED, "is disabled"),
+    (ENDED, "has ended"),
+    (UNREADY, "says by ready() that it is not ready"),
+    (FULL, "is held back by a full queue"),
+    (BACKOFF, "is being restarted"),
+    (RESTING, "rests, for its gate is closed"),
+    (FUTILE, "has nobody left to work for"),
+)
+
+
 def waits_for(worker: Worker) -> str:
     """Say what keeps a node from moving, as the end of a sentence about it."""
     if worker.is_boundary_output:
@@ -218,14 +241,13 @@ def waits_for(worker: Worker) -> str:
         if names:
             return "waits for its unconnected input " + ", ".join(f'"{name}"' for name in names)
         return "has no process function" if worker.process is None else "has no live input"
-    if blocked & UNREADY:
-        return "says by ready() that it is not ready"
-    if blocked & FULL:
-        return "is held back by a full queue"
+    waits = next((words for bit, words in _WAITS if blocked & bit), None)
+    if waits is not None:
+        return waits
     if worker.inputs.missing:
         names = [edge.port_name for edge in worker.live_inputs if not edge.untaken]
         return "waits for " + ", ".join(f'"{name}"' for name in names)
     if worker.outputs.missing:
         edges = [edge.label for edge in worker.all_out_edges() if getattr(edge, "held", False)]
         return "waits until its token is processed on " + ", ".join(f'"{label}"' for label in edges[:3])
-    return "cannot move"
+    return "is held back by its rate" if blocked & RATE else "cannot move"

@@ -124,6 +124,8 @@ def feed_from_observable(
     loop_thread = threading.get_ident()
 
     def deliver(item: Any) -> None:
+        if not edge.live:
+            return  # nothing is sent to a node that is disabled (F10)
         if type(item) is Token:
             enqueue(edge, item.value, item.activity if edge.active else 0, item.stamp)
         else:

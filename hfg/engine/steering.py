@@ -101,7 +101,8 @@ class Steering:
     def _single(self, node: Any, what: str) -> Worker:
         if isinstance(node, str):
             node = self._engine.flat.graph[node]
-        worker = self._worker(node)
+        inside = (worker for worker in self._engine.all_workers() if worker.node is node and node is not None)
+        worker = next(inside, None) or self._worker(node)
         if worker.scope is not None:
             raise UsageError(f'"{worker.path}" is a subgraph: {what} a node inside (G1)')
         return worker

@@ -56,14 +56,34 @@ def fitting(spec: Any, value: Any) -> Any:
 
 
 def kept(old: Node, command: Replace) -> dict[str, Any]:
-    """The parameters of the new node: those that are given, and of the old one what the new one takes."""
+    """The parameters of the new node: those that are given, and of the old one those that both have.
+
+    Raises:
+      GraphError: there is no such type, or it does not take the value of one of them.
+    """
     try:
         specs: Any = registry.find(command.type)._type.parameters
     except HfgError as error:
         raise GraphError(f'node "{command.path}": {error}') from error
-    values = {
-        name: value
-        for name, value in old._parameters.items()
-        if name in specs and not specs[name].trigger and specs[name].check(value) is None
-    }
+    values = {}
+    for name, value in old._parameters.items():
+        if name not in specs or specs[name].trigger or name in command.parameters:
+            continue
+        values[name] = _as_now(specs[name], value)
+        problem = specs[name].check(values[name])
+        if problem is not None:
+            raise GraphError(
+                f'"{command.path}" cannot be replaced by {command.type} with its parameters as they are: "{name}" '
+                f"{problem}; set it before, or give another value with the command"
+            )
     return values | command.parameters
+
+
+def _as_now(spec: Any, value: Any) -> Any:
+    """A value of a type that a reload has made anew, an enum or a dataclass, in that type."""
+    if spec.check(value) is None:
+        return value
+    try:
+        return fitting(spec, msgspec.to_builtins(value))
+    except Exception:
+        return value

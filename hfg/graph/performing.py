@@ -57,6 +57,7 @@ def perform(graph: Graph, commands: Sequence[c.Command]) -> list[Change]:
     try:
         for command in commands:
             hand.carry_out(command)
+        hand.check_moved()
     except BaseException:
         undo_all(hand.changes)
         raise
@@ -71,6 +72,7 @@ class _Hand:
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
         self.changes: list[Change] = []
+        self.moved: list[tuple[Graph, Edge]] = []  # edges of nodes that were replaced
 
     def carry_out(self, command: c.Command) -> None:
         """Do what one command says.
@@ -85,6 +87,16 @@ class _Hand:
             )
         _refuse_malformed(command)
         method(command)
+
+    def check_moved(self) -> None:
+        """Check the edges of replaced nodes, when those at both ends are what they will be.
+
+        Raises:
+          GraphError: one cannot be.
+        """
+        for around, edge in self.moved:
+            if edge in around.edges:
+                refuse(around, edge.source, edge.target, edge.options)
 
     def do(self, change: Change) -> None:
         """Take a step and note it."""
@@ -153,9 +165,9 @@ class _Hand:
             _counterpart(edge.target, old, new)
         self.do(NodeSwap(old, new))
         for edge in edges:
-            source, target = _counterpart(edge.source, old, new), _counterpart(edge.target, old, new)
-            refuse(around, source, target, edge.options)
-            self.do(EdgeSwap(around, edge, Edge(source, target, edge.options)))
+            other = Edge(_counterpart(edge.source, old, new), _counterpart(edge.target, old, new), edge.options)
+            self.do(EdgeSwap(around, edge, other))
+            self.moved.append((around, other))
         self._hand_over(around, old, new)
 
     def _replace_box(self, old: Any, new: Any) -> None:
@@ -179,9 +191,9 @@ class _Hand:
         self.do(added.inverse())
         self.do(moved)
         for at, edge in edges:
-            source, target = _counterpart(edge.source, old, new), _counterpart(edge.target, old, new)
-            refuse(around, source, target, edge.options)
-            self.do(EdgeChange(around, Edge(source, target, edge.options), at, added=True))
+            other = Edge(_counterpart(edge.source, old, new), _counterpart(edge.target, old, new), edge.options)
+            self.do(EdgeChange(around, other, at, added=True))
+            self.moved.append((around, other))
         for level, gate in gates:
             self.do(GateChange(level, _gate_of(gate, old, new), len(level.gates), added=True))
         self.promote(around, _promoted_by(around, promoted, old, new))

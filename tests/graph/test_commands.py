@@ -395,18 +395,21 @@ class Limited(hfg.Node):
 
 @pytest.mark.rule("R4", "G3")
 @pytest.mark.parametrize(
-    ("type_", "sentence"),
+    ("type_", "given", "sentence"),
     [
-        ("hfg.testing.nodes:double", 'double, which has no parameter "factor", and that is in use'),
-        (reference_of(Limited), '"box.factor" cannot stand for "box/inner.factor": must be <= 5, got 7'),
+        ("hfg.testing.nodes:double", {}, 'double, which has no parameter "factor", and that is in use'),
+        (reference_of(Limited), {}, 'with its parameters as they are: "factor" must be <= 5, got 7'),
+        (reference_of(Limited), {"factor": 2}, '"box.factor" cannot stand for "box/inner.factor": must be <= 5, got 7'),
     ],
 )
-def test_a_node_whose_parameter_is_promoted_is_replaced_by_one_that_can_take_it(type_: str, sentence: str) -> None:
+def test_a_node_whose_parameter_is_promoted_is_replaced_by_one_that_can_take_it(
+    type_: str, given: dict[str, int], sentence: str
+) -> None:
     graph = hfg.Graph()
     graph.add(Tuned(), name="box")
     before = drawn(graph)
     with pytest.raises(GraphError) as refused:
-        graph.edit(c.Replace("box/inner", type_))
+        graph.edit(c.Replace("box/inner", type_, given))
     assert sentence in str(refused.value)
     assert drawn(graph) == before
     graph.edit(c.SetParameter("box.factor", 3), c.Replace("box/inner", reference_of(Limited)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from typing import Any
 
 import pytest
@@ -120,3 +120,56 @@ def test_a_condition_that_gives_no_truth_is_one_that_fails(caplog: pytest.LogCap
     with caplog.at_level(logging.ERROR, logger="hfg.engine"):
         drive(line(), body)
     assert 'the condition of the breakpoint at "middle.out" failed' in caplog.text
+
+
+# --- subgraphs that iterate ---
+
+
+class Each(hfg.Subgraph):
+    """Works on one element after the other."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        one, two = graph.add(double(), name="one"), graph.add(double(), name="two")
+        graph.connect(self.value.inner, one.ports.inputs["value"])
+        one >> two
+        graph.connect(two.ports.outputs["out"], self.out.inner)
+
+
+@hfg.node
+def lists() -> Iterator[list[int]]:
+    """Give a collection."""
+    yield [1, 2, 3]
+
+
+@hfg.node
+def take(values: list[int]) -> None:
+    """Take what was made of it."""
+
+
+@pytest.mark.rule("R3", "G4")
+def test_inside_of_what_iterates_one_can_pause_and_step_and_stop_at_nodes() -> None:
+    graph = hfg.Graph()
+    graph.add(lists()) >> graph.add(Each(), name="each", iterate_over=["value"]) >> graph.add(take())
+
+    async def body(run: hfg.Run) -> None:
+        point = run.break_at("each/two")
+        run.resume()
+        assert await run.wait_paused() == "each/two"
+        await run.wait_quiet()
+        assert (await run.step("each/two")).moved == ("each/two",)
+        assert (await run.step("each/one")).moved == ("each/one",)
+        assert (await run.step("take")).why_not == '"take" waits for "values"'
+        with pytest.raises(UsageError, match=r"tokens can be looked at by run\.tap alone"):
+            run.break_at("each/one.out")
+        run.resume()
+        assert await run.wait_paused() == "each/two"
+        point.remove()
+        run.resume()
+        await run.wait_finished()
+        assert point.hits == 2
+        assert run.report().nodes["take"].firings == 2
+
+    drive(graph, body)

@@ -271,3 +271,31 @@ def test_who_subscribes_to_start_hears_of_it_with_or_without_an_edge(edge: bool,
         return story
 
     assert drive(main) == ["early 1", "early 1", "late", "end"]
+
+
+@pytest.mark.rule("F10", "P9", "P10")
+def test_nothing_is_sent_to_the_slot_of_a_disabled_node_from_outside() -> None:
+    graph = hfg.Graph()
+    ear, source = graph.add(Ear(), name="ear", enabled=False), Subject()
+    graph.connect(source, ear.hear)
+
+    async def main() -> hfg.Report:
+        async with hfg.running(graph) as live:
+            source.on_next(1)
+            await live.trigger(ear.hear, 2)
+            await live.wait_quiet()
+            await live.trigger(ear.enable)
+            await live.wait_quiet()
+            source.on_next(3)
+            await live.trigger(ear.hear, 4)
+            await live.wait_quiet()
+            await live.trigger(ear.disable)
+            await live.wait_quiet()
+            source.on_next(5)
+            await live.trigger(ear.hear, 6)
+            source.on_completed()
+            return await live.wait_finished()
+
+    report = drive(main)
+    assert ear.heard == [3, 4]
+    assert report.nodes["ear"].calls == 4

@@ -183,3 +183,66 @@ def test_a_package_keeps_what_is_inside_it(source: Path) -> None:
     grown: Any = sys.modules["grown"]
     assert grown.inner is sys.modules["grown.inner"]
     assert type(graph["twice"]) is grown.inner.twice._class
+
+
+TYPES = """
+import enum
+from collections.abc import Iterator
+from dataclasses import dataclass
+import hfg
+
+class Mode(enum.Enum):
+    SLOW = "slow"
+    FAST = "fast"
+
+@dataclass
+class Pose:
+    x: int = 0
+
+@hfg.node
+def poses(*, mode: Mode = Mode.SLOW, home: Pose = Pose()) -> Iterator[Pose]:
+    yield home
+
+@hfg.node
+def shift(pose: Pose) -> Pose:
+    return Pose(pose.x + 1)
+"""
+
+
+@pytest.mark.rule("R4")
+def test_types_of_the_module_itself_are_made_anew_on_edges_and_in_parameters(source: Path) -> None:
+    source.write_text(TYPES)
+    graph = hfg.Graph()
+    graph.edit(c.Add("growing:poses", "poses"), c.Add("growing:shift", "shift"))
+    graph.edit(c.Connect("poses.out", "shift.pose"), c.SetParameter("poses.mode", "fast"))
+    graph.edit(c.SetParameter("poses.home", {"x": 7}))
+    source.write_text(TYPES.replace("+ 1", "+ 2"))
+    graph.reload("growing")
+    module: Any = sys.modules["growing"]
+    assert graph["poses"].mode is module.Mode.FAST
+    assert type(graph["poses"].home) is module.Pose
+    trace = recorder()
+    graph["shift"] >> graph.add(Anything(), name="sink")
+    hfg.run(graph, clock="virtual", trace=trace)
+    assert [pose.x for pose in trace.values("shift.out -> sink.value")[:-1]] == [9]
+
+
+class Anything(hfg.Node):
+    """Takes anything."""
+
+    value = hfg.Input(object)
+
+    def process(self, value: object) -> None: ...
+
+
+def test_a_value_that_the_new_type_does_not_take_is_no_silent_loss(source: Path) -> None:
+    source.write_text(TYPES)
+    graph = hfg.Graph()
+    graph.edit(c.Add("growing:poses", "poses"), c.SetParameter("poses.mode", "fast"))
+    source.write_text(TYPES.replace('    FAST = "fast"\n', ""))
+    with pytest.raises(GraphError, match='with its parameters as they are: "mode" must be of type Mode'):
+        graph.reload("growing")
+    assert graph["poses"].mode.name == "FAST"
+    graph.edit(c.SetParameter("poses.mode", "slow"))
+    graph.reload("growing")
+    assert graph["poses"].mode.name == "SLOW"
