@@ -25,12 +25,14 @@ __all__ = [
     "Dissolve",
     "Enable",
     "Enclose",
+    "Gate",
     "MakeActive",
     "Move",
     "Remove",
     "Rename",
     "Replace",
     "SetParameter",
+    "Ungate",
     "decode",
     "encode",
 ]
@@ -122,6 +124,20 @@ class Disable(Command, frozen=True):
     path: str
 
 
+class Gate(Command, frozen=True):
+    """Couple the work of a node or subgraph to the activity of another, as `graph.gate` does (rule A11)."""
+
+    path: str
+    by: str
+    idle_rate_hz: float | None = None
+
+
+class Ungate(Command, frozen=True):
+    """Take the gate of a node or subgraph away."""
+
+    path: str
+
+
 class SetParameter(Command, frozen=True):
     """Set a parameter, "lookup.tolerance"."""
 
@@ -164,6 +180,8 @@ AnyCommand: TypeAlias = (
     | MakeActive
     | Enable
     | Disable
+    | Gate
+    | Ungate
     | SetParameter
     | Enclose
     | Dissolve

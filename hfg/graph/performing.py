@@ -32,7 +32,7 @@ from hfg.graph.changes import (
 from hfg.graph.copying import copy_of
 from hfg.graph.edges import Edge, refuse, type_of
 from hfg.graph.enclosing import dissolve, enclose
-from hfg.graph.gates import Gate
+from hfg.graph.gates import Gate, refuse_gate
 from hfg.graph.making import as_meant, fitting, kept, made
 from hfg.graph.naming import need_name
 from hfg.graph.options import edge_options
@@ -229,6 +229,20 @@ class _Hand:
 
     def _note_options(self, node: Node, before: Any) -> None:
         self.changes.append(OptionsChange(node, before, node._options))
+
+    def _gate(self, command: c.Gate) -> None:
+        gate = Gate(node_at(self.graph, command.path), node_at(self.graph, command.by), command.idle_rate_hz)
+        refuse_gate(self.graph, gate.target, gate.by, gate.idle_rate_hz)
+        self.do(GateChange(self.graph, gate, len(self.graph.gates), added=True))
+
+    def _ungate(self, command: c.Ungate) -> None:
+        node = node_at(self.graph, command.path)
+        for level in _levels(self.graph):
+            for position, gate in enumerate(level.gates):
+                if gate.target is node:
+                    self.do(GateChange(level, gate, position, added=False))
+                    return
+        raise GraphError(f'"{command.path}" has no gate that could be taken away')
 
     def _setparameter(self, command: c.SetParameter) -> None:
         port = parameter_at(self.graph, command.path)

@@ -97,10 +97,12 @@ def random_command(graph: Graph, choose: Chooser, name: str) -> c.Command:
     if what < 92:
         boxes = [one.place.path for one in _all_nodes(graph) if hasattr(one, "_graph")]
         return c.Dissolve(choose.one_of(boxes)) if boxes else c.Rename(node, name)
-    if what < 97:
+    if what < 95:
         kind = graph[node]._type.reference if choose.chance(50) else None
         return c.Replace(node, kind or f"hfg.testing.nodes:{choose.one_of(_TYPES)}")
-    return c.Move(node, choose.one_of([None, *graph.groups]))
+    if what < 97:
+        return c.Move(node, choose.one_of([None, *graph.groups]))
+    return _about_a_gate(graph, choose, node)
 
 
 def _all_nodes(graph: Graph) -> list[Any]:
@@ -150,6 +152,14 @@ def _about_an_edge(graph: Graph, choose: Chooser) -> c.Command | None:
     if choose.chance(60):
         return c.Disconnect(source, target)
     return c.MakeActive(source, target, not edge.active)
+
+
+def _about_a_gate(graph: Graph, choose: Chooser, node: str) -> c.Command:
+    gated = [gate.target.place.path for level in _levels(graph) for gate in level.gates]
+    if gated and choose.chance(40):
+        return c.Ungate(choose.one_of(gated))
+    by = choose.one_of([one.place.path for one in _all_nodes(graph)])
+    return c.Gate(node, by, choose.one_of([None, None, 200.0]))
 
 
 def _levels(graph: Graph) -> Sequence[Graph]:
