@@ -259,6 +259,7 @@ class _Reforming:
 
     def _gates(self, flat: FlatGraph, workers: list[Worker]) -> None:
         core = self.core
+        gated = {worker for worker in core.workers if worker.gates_over}
         for worker in core.workers:
             if worker.node is None:
                 continue
@@ -268,6 +269,9 @@ class _Reforming:
         for scope in core.scopes:
             scope.gates = []
         plan.set_gates(core, flat, workers)
+        for worker in core.workers:
+            if worker.gates_over and worker not in gated:
+                worker.gate_next = float("-inf")  # an idle rate counts from the first firing behind the gate (A11)
         for scope in core.scopes:
             if scope.watched:
                 scope.find_inner_edges()

@@ -96,9 +96,13 @@ class Editing(Calling):
         senders = [(lying, name_of.get(lying.sender, "")) for line in self.lines for lying in line.queue]
         after = whole(self.graph)
         enabled = [station for station in self.stations if self.is_enabled(station.leaf.index)]
+        gated = {id(self.stations[index]) for gate in self.structure.gates for index in gate.targets}
         self._disable_for_good(boxes, {id(box.node) for box in after.boxes})
         self._exchange_stations(after, before)
         self._exchange_boxes(after, boxes)
+        for index in {index for gate in self.structure.gates for index in gate.targets}:
+            if id(self.stations[index]) not in gated:
+                self.stations[index].last_function = float("-inf")  # from the first firing behind the gate
         number_of = {self._name_of(owner): owner for owner in self._owners()}
         for lying, name in senders:
             lying.sender = number_of.get(name, _GONE)
