@@ -8,6 +8,7 @@ groups. Outside, the subgraph is one node that fires. Stands on `plan` and `quie
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -68,11 +69,7 @@ class _InnerTimer:
 
 
 class Iteration:
-    """The inside of one iterating subgraph.
-
-    Attributes:
-      looking: at the loop's next pass it is seen whether the inside is quiet.
-    """
+    """The inside of one iterating subgraph."""
 
     def __init__(self, worker: Worker, flat: FlatGraph, groups: Any, loop: Any) -> None:
         self.worker = worker
@@ -88,7 +85,8 @@ class Iteration:
         self._position = 0
         self._results: list[list[Any]] = []
         self._queued = 0
-        self.looking = False
+        self._waiters: list[asyncio.Future[None]] = []
+        self._looking = False
         plan.build(self.core, flat, groups, loop=loop)
         for inner in self.core.workers:
             if not inner.is_boundary_output:
@@ -154,14 +152,26 @@ class Iteration:
 
     def look_later(self) -> None:
         """See at the loop's next pass whether the inside is quiet."""
-        if not self.looking and self.worker.in_flight:
-            self.looking = True
+        if not self._looking and self.worker.in_flight:
+            self._looking = True
             engine: Any = self.worker.core.host
             engine.loop.call_soon(self._look, context=engine.context)
 
     def _look(self) -> None:
-        self.looking = False
+        self._looking = False
         self.settle()
+        waiters, self._waiters = self._waiters, []
+        for waiter in waiters:
+            if not waiter.done():
+                waiter.set_result(None)
+
+    async def looked(self) -> None:
+        """Wait until it was seen whether the inside is quiet, and what follows has been done."""
+        engine: Any = self.worker.core.host
+        while self._looking:
+            waiter: asyncio.Future[None] = engine.loop.create_future()
+            self._waiters.append(waiter)
+            await waiter
 
     def settle(self) -> None:
         """If the inside is quiet, take what came out and go on with the next element."""

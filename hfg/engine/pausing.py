@@ -175,8 +175,8 @@ class Pausing:
                 return Step((), why_not)
             self._let(worker)
             await self._over([worker])
-            while worker.core.inside is not None and worker.core.inside.looking:
-                await asyncio.sleep(0)  # the next element goes in by itself (G4)
+            if worker.core.inside is not None:
+                await worker.core.inside.looked()  # the next element goes in by itself (G4)
         finally:
             self._stepping = False
         return Step((worker.path,))

@@ -222,6 +222,9 @@ REFUSED = [
     (c.Enclose((), "box"), "made of at least one node"),
     (c.Enclose(("first",), "second"), "has a node of this name already"),
     ("remove first", "an edit takes commands"),
+    (c.Ungate("first"), '"first" has no gate that could be taken away'),
+    (c.Gate("first", "secnod"), 'there is no "secnod"'),
+    (c.Gate("first", "second", -1), "idle_rate_hz must be a number above 0, or None to rest, got -1"),
     (c.Add("hfg.testing.nodes:double", "x", None), "Add takes parameters as a dict by name, got None"),  # type: ignore[arg-type]
     (c.Add(5, "x"), 'Add takes type as a text such as "module:name", got 5'),  # type: ignore[arg-type]
     (c.Replace("first", None), 'Replace takes type as a text such as "module:name", got None'),  # type: ignore[arg-type]
@@ -342,6 +345,22 @@ def test_a_module_that_fails_leaves_graph_and_module_as_they_were(module: Path, 
     assert drawn(graph) == before
     assert graph["grow"]._type.reference == "growing:grow"
     assert sent(graph) == [11, 12]
+
+
+@pytest.mark.rule("A11", "R4")
+def test_gates_come_and_go_by_commands() -> None:
+    graph = chain()
+    graph.edit(c.Gate("first", "second", 5.0))
+    before = drawn(graph)
+    assert before["gates"] == [("first", "second", 5.0)]
+    with pytest.raises(GraphError, match='"first" has a gate already'):
+        graph.edit(c.Gate("first", "sink"))
+    graph.edit(*c.decode(c.encode([c.Ungate("first"), c.Gate("first", "sink")])))
+    assert drawn(graph)["gates"] == [("first", "sink", None)]
+    graph.undo()
+    assert drawn(graph) == before
+    graph.undo()
+    assert drawn(graph)["gates"] == []
 
 
 @hfg.node

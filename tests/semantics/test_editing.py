@@ -450,3 +450,27 @@ def test_edits_come_one_after_the_other() -> None:
     drive(graph, body)
     graph.redo()
     assert list(graph.nodes) == ["script", "one", "sink"]
+
+
+# --- gates ---
+
+
+@pytest.mark.rule("A11", "R4")
+def test_a_gate_that_is_set_while_it_runs_holds_from_the_next_firing_on() -> None:
+    def build() -> hfg.Graph:
+        graph = pipeline(*range(12))
+        graph.add(Ear(), name="state")
+        return graph
+
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.025)
+        await run.edit(c.Gate("middle", "state"))
+        await asyncio.sleep(0.03)
+        await run.undo()
+        await asyncio.sleep(0.03)
+        await run.edit(c.Gate("middle", "state", 50.0))
+        await run.wait_finished()
+
+    trace = drive(build(), body, compare=build())
+    kinds = "".join(e.kind[0] for e in trace if isinstance(e, FiringStarted) and e.node == "middle")
+    assert kinds == "ppp" + "sss" + "ppp" + "psp" + "e"  # 100 firings a second, of which 50 may be
