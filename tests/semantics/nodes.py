@@ -442,3 +442,15 @@ class Last(hfg.Node):
 
     def end(self) -> None:
         self.out.send(7)
+
+
+class Farewell(hfg.Node):
+    """A source that has nothing but a last word."""
+
+    out = hfg.Output(int)
+
+    def process(self) -> None:
+        raise hfg.EndOfStream
+
+    def end(self) -> None:
+        self.out.send(7)

@@ -25,7 +25,7 @@ from hfg.trace import (
     StructureChanged,
     TokenDropped,
 )
-from tests.semantics.nodes import Last
+from tests.semantics.nodes import Farewell, Last
 
 
 class Pair(hfg.Subgraph):
@@ -285,18 +285,6 @@ def test_signals_into_slots_and_parameters_arrive_in_order_of_connecting() -> No
 
     calls = [event.slot for event in drive(build) if isinstance(event, CallStarted) and event.node == "scaled"]
     assert calls == ["factor", "ping"]
-
-
-class Farewell(hfg.Node):
-    """A source that has nothing but a last word."""
-
-    out = hfg.Output(int)
-
-    def process(self) -> None:
-        raise hfg.EndOfStream
-
-    def end(self) -> None:
-        self.out.send(7)
 
 
 @pytest.mark.rule("F4", "F5", "F10")

@@ -20,6 +20,7 @@ from hfg.trace import (
     TokenDropped,
     TraceEvent,
 )
+from tests.semantics.nodes import Farewell
 
 
 class Inner(hfg.Subgraph):
@@ -243,18 +244,6 @@ def test_what_the_end_of_a_node_brings_is_told_by_the_node_first_and_by_subgraph
 
     told = [event.event for event in judged(build) if isinstance(event, EventTriggered)]
     assert told[1:3] == ["source.deactivated", "box.activated"]
-
-
-class Farewell(hfg.Node):
-    """A source that has nothing but a last word."""
-
-    out = hfg.Output(int)
-
-    def process(self) -> None:
-        raise hfg.EndOfStream
-
-    def end(self) -> None:
-        self.out.send(7)
 
 
 @pytest.mark.rule("A9", "F12")
