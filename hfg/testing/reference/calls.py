@@ -84,7 +84,15 @@ class Calling(Firing):
         # `setup` and `teardown` run where the node does
         at_once = automatic and flight.slot not in ("reset", "enable")
         self.begin_in_group(flight, at_once or (not automatic and self.is_async_slot(flight)))
-        self.launch(flight, handler, lambda _, error: self.end_call(flight, error))
+        if not (automatic and flight.in_thread):
+            self.launch(flight, handler, lambda _, error: self.end_call(flight, error))
+            return
+
+        def set_up_there(_: Any, error: BaseException | None) -> None:
+            handler()
+            self.end_call(flight, error)
+
+        self.launch(flight, lambda: None, set_up_there)
 
     def is_async_slot(self, flight: Flight) -> bool:
         """Whether the handler may wait."""
