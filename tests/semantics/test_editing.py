@@ -264,6 +264,21 @@ def test_grouping_dissolving_renaming_and_replacing_leave_tokens_where_they_are(
 
 
 @pytest.mark.rule("R4")
+def test_a_parameter_that_the_old_node_did_not_have_is_set_with_the_new_node() -> None:
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.015)
+        await run.edit(c.Replace("middle", "hfg.testing.nodes:Scaled"), c.SetParameter("middle.factor", 5))
+        await run.wait_finished()
+
+    def build() -> hfg.Graph:
+        return pipeline(1, 2, 3, 4)
+
+    trace = drive(build(), body, compare=build())
+    assert trace.values("middle.out -> sink.value") == [2, 4, 15, 20, hfg.END]
+    assert dict(double()._parameters) == {}  # nor has any other node without parameters one now
+
+
+@pytest.mark.rule("R4")
 def test_edited_then_run_equals_built_so_then_run() -> None:
     edited, built = pipeline(1, 2, 3), hfg.Graph("line")
     edited.edit(

@@ -65,7 +65,8 @@ class Editing(Calling):
         """Edit the drawing; its parameters are first what tokens have made of them (P8)."""
         for station in self.stations:
             if station.leaf.inside is None:
-                station.leaf.node._parameters.update(station.node._parameters)
+                for name, value in station.node._parameters.items():
+                    station.leaf.node._parameters[name] = value
         history = history_of(self.graph)
         if what == "undo":
             changes = undo_all(history.next_undo().changes)
@@ -246,7 +247,8 @@ class Editing(Calling):
 
     def _switch(self, changes: Sequence[Change]) -> None:
         """Enable and disable what there was before (F10), as it is in the end: nodes first, then subgraphs."""
-        number = {id(station.leaf.node): station.leaf.index for station in self.stations}
+        of_node = {id(station.leaf.node): station for station in self.stations}
+        number = {node: station.leaf.index for node, station in of_node.items()}
         number |= {id(box.node): -2 - box.index for box in self.structure.boxes}
         switched: dict[int, bool] = {}
         for change in changes:
@@ -254,8 +256,8 @@ class Editing(Calling):
                 number[id(change.new)] = number[id(change.old)]
             elif isinstance(change, OptionsChange) and id(change.node) in number and _is_switch(change):
                 switched[number[id(change.node)]] = change.after.enabled
-            elif isinstance(change, ParameterChange) and number.get(id(change.node), -1) >= 0:  # for `setup`
-                self.stations[number[id(change.node)]].node._parameters[change.name] = change.after
+            elif isinstance(change, ParameterChange) and id(change.node) in of_node:  # for `setup`
+                of_node[id(change.node)].node._parameters[change.name] = change.after
         for owner, enabled in sorted(switched.items(), key=lambda one: is_box(one[0])):
             if enabled:
                 self.enable(owner)
