@@ -97,6 +97,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except HfgError as error:
             show.failure(error)
             return 1
+        except OSError as error:
+            if error.filename is None:  # of a stream, see there
+                raise
+            show.sentence(f'"{error.filename}" cannot be used: {error.strerror}')  # by --install-completion
+            return 1
         except (KeyboardInterrupt, typer.Abort):
             code = Interrupt.TYPERS_CODE
         if code == Interrupt.TYPERS_CODE:

@@ -57,3 +57,15 @@ def test_the_script_for_a_shell_can_be_shown(command: Command, capsys: pytest.Ca
         command("--show-completion", shell)
     assert not left.value.code
     assert "_HFG_COMPLETE" in capsys.readouterr().out
+
+
+def test_a_home_that_cannot_be_written_gets_a_sentence(
+    command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    home = tmp_path / "home"
+    home.write_text("a file, no directory")
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
+    shown = command("--install-completion", "bash")
+    assert shown.code == 1
+    assert shown.err.startswith(f'hfg: "{home}')
