@@ -106,13 +106,17 @@ class Feed:
         if self._engine.core.over or worker.blocked & ENDED:
             return
         if worker.outputs.missing:
-            worker.outputs.when_complete(self._put_end_soon)
+            worker.outputs.when_complete(partial(self._put_end_soon, _Waiting(self._engine, worker)))
             return
         worker.blocked |= ENDED
         self._put(END, None, None)
 
-    def _put_end_soon(self) -> None:
-        self._engine.loop.call_soon(self._put_end)  # not in the middle of what the engine does now
+    def _put_end_soon(self, waiting: _Waiting) -> None:
+        def now() -> None:
+            self._put_end()
+            waiting.over()
+
+        self._engine.loop.call_soon(now)  # not in the middle of what the engine does now
 
     def _put(self, value: Any, activity: int | None, stamp: float | None) -> None:
         if value is None:

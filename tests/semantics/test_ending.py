@@ -9,6 +9,7 @@ import pytest
 
 import hfg
 from hfg import END
+from hfg.testing import recorder
 from hfg.trace import ActivityChanged, NodeEnded, TokenDrained, TokenDropped, TokenSent, TraceEvent
 from tests.semantics.nodes import (
     Both,
@@ -245,6 +246,32 @@ def test_the_end_of_events_waits_as_long_as_somebody_outside_holds_the_run_open(
         return before, sink.values
 
     assert drive(main) == ([], [5])
+
+
+@pytest.mark.rule("F13", "R5")
+def test_events_end_behind_the_end_of_a_closed_feed_that_had_to_wait_for_its_place() -> None:
+    trace = recorder()
+
+    async def main() -> None:
+        graph = hfg.Graph()
+        red, blue = graph.input("red", int), graph.input("blue", int)
+        join, ear, node = graph.add(add(), max_rate_hz=100.0), graph.add(Ear()), graph.add(Total())
+        graph.connect(red, join.a)
+        graph.connect(blue, join.b)
+        graph.connect(ear.passed, node.value)
+        async with hfg.running(graph, trace=trace) as run:
+            async with run.feed(red) as reds, run.feed(blue) as blues:
+                sending = asyncio.gather(reds.send(1), blues.send(1))
+                await run.wait_quiet()
+                await sending
+                waiting = asyncio.ensure_future(reds.send(2))  # lies there until blue's END lets it be dropped
+                await run.wait_quiet()
+                waiting.cancel()
+            await run.wait_finished()
+
+    drive(main)
+    ends = [event.edge for event in of_kind(trace, TokenSent) if event.token.value is END]
+    assert ends[:3] == ["blue -> add.b", "red -> add.a", "ear.passed -> total.value"]
 
 
 # --- R5 ---
