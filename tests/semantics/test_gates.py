@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 import hfg
-from hfg.testing import explore
+from hfg.testing import Recorder, explore, recorder, replay
 from tests.semantics.nodes import (
     Clock,
     Ear,
@@ -172,6 +172,48 @@ def test_a_throttled_source_fires_at_most_at_the_idle_rate(fast: bool) -> None:
     assert times[:3] == [0, 1, 2]
     assert times[3:11] == [2.5, 2.75, 3.0, 3.25, 3.5, 3.75, 4.0, 4.25]
     assert times[11:] == [5.25]
+
+
+@pytest.mark.rule("A11", "G1")
+def test_a_source_behind_two_gates_fires_at_the_lower_idle_rate(fast: bool) -> None:
+    times, trace = behind_two_gates(fast, 2.0)
+    assert times == [0, 0.5, 1.0]
+    if not fast:
+        replay(two_gates(2.0), trace, until_s=1.2)
+
+
+@pytest.mark.rule("A11", "G1")
+def test_an_idle_rate_does_not_open_another_gate(fast: bool) -> None:
+    times, trace = behind_two_gates(fast, None)
+    assert times == []
+    if not fast:
+        replay(two_gates(None), trace, until_s=1.2)
+
+
+class Inside(hfg.Subgraph):
+    """A source, throttled to 5 a second by a state next to it."""
+
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        clock, state = graph.add(Clock(), max_rate_hz=10), graph.add(Ear(), name="state")
+        graph.connect(clock.out, self.out.inner)
+        graph.gate(clock, by=state, idle_rate_hz=5.0)
+
+
+def two_gates(outer_rate: float | None) -> hfg.Graph:
+    graph = hfg.Graph()
+    box, sink, state = graph.add(Inside(), name="box"), graph.add(Timed()), graph.add(Ear(), name="state")
+    graph.connect(box.ports.outputs["out"], sink.value)
+    graph.gate(box, by=state, idle_rate_hz=outer_rate)
+    return graph
+
+
+def behind_two_gates(fast: bool, outer_rate: float | None) -> tuple[list[float], Recorder]:
+    """When the source fired, and the trace; there is none on the short ways."""
+    graph, trace = two_gates(outer_rate), recorder()
+    hfg.run(graph, clock="virtual", until_s=1.2, fast=fast, trace=None if fast else trace)
+    return [time for _, time in graph["timed"].seen], trace
 
 
 @pytest.mark.rule("A11")

@@ -271,10 +271,11 @@ class ReferenceMachine(Editing):
             if station.resting_until is not None:
                 times.append(station.resting_until)
             if flight is None and station.place is None and self.may_fire(index, ignore="timers and queues"):
-                times += [station.hold_until] if not self.is_over(station.hold_until) else []
-                times += [
+                rests = [station.hold_until]
+                rests += [
                     station.last_function + 1 / rate for rate in self.gates_of(index) if rate and self.is_resting(index)
                 ]
+                times += [rest for rest in rests if not self.is_over(rest)]
             times.append(self.time_of_timeout(index))
         times += [self.time_of_timeout(-2 - box.index) for box in self.structure.boxes]
         for line in self.lines:
