@@ -57,18 +57,18 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
 def outputs_done(worker: Worker, trace: Callable[[TraceEvent], None] | None = None, time: float = 0.0) -> None:
     """All its tokens are processed: the short form of `release`, up a chain; `trace` hears of it, at `time`."""
     while True:
-        if worker.outputs.waiters is not None or worker.pending_end or len(worker.taken) > 1:
+        taken = worker.taken
+        if worker.outputs.waiters is not None or worker.pending_end or len(taken) > 1:
             release(outputs_free(worker))
             return
-        upstream: Any = None
-        if worker.held:
-            worker.held = False
-            taken = worker.taken
-            if taken and taken[0].sequential:
-                upstream = taken[0]
+        held = worker.held
+        worker.held = False
         if not worker.inputs.missing and not worker.blocked and not worker.placed:
             consider(worker)
-        if upstream is None or not upstream.held:
+        if not held or not taken:
+            return
+        upstream: Any = taken[0]
+        if not upstream.sequential or not upstream.held:
             return
         upstream.held = False
         if trace is not None:
