@@ -126,10 +126,10 @@ class Edits:
                 self._turns.wait_for(())
                 await self._exchange_nodes(how)
                 fresh = self._to_start_afresh(switched)
-                early = {id(value) for value in waiting if value.node in {worker.node for worker in fresh}}
-                for value in [value for value in waiting if id(value) in early]:
+                starting = {worker.node for worker in fresh}
+                for value in [value for value in waiting if value.node in starting]:
                     value.do()
-                waiting = [value for value in waiting if id(value) not in early]
+                    waiting.remove(value)
                 for worker in fresh:
                     self._turns.wait_for((worker,))
                     await self._hook(worker, lifecycle.tear_down)
@@ -145,8 +145,7 @@ class Edits:
                 self._take_effect(how, come, changes)
         except BaseException:
             if not took_effect:
-                not_done = {id(value) for value in waiting}
-                undo_all([change for change in changes if id(change) not in not_done])
+                undo_all([change for change in changes if change not in waiting])
                 self._turns.wait_for(come)
                 await self._to_its_end(self._tear_down(come))
             raise
@@ -306,11 +305,11 @@ class Edits:
         for worker, enabled in switched.items():
             self._note_options(worker, enabled)
             if worker.scope is not None and enabled:
-                subgraphs.enable_scope(worker.scope, _nothing, fresh)
+                subgraphs.enable_scope(worker.scope, lifecycle.nothing, fresh)
             elif worker.scope is not None:
                 subgraphs.disable_scope(worker.scope)
             elif enabled:
-                lifecycle.enable(worker, _nothing, fresh=worker in fresh)
+                lifecycle.enable(worker, lifecycle.nothing, fresh=worker in fresh)
             else:
                 lifecycle.disable(worker)
 
@@ -364,7 +363,3 @@ def _told(commands: Sequence[Command]) -> str:
         return encode(commands)
     except GraphError:
         return ", ".join(map(repr, commands))
-
-
-def _nothing() -> None:
-    """Nobody waits for it."""

@@ -45,7 +45,6 @@ _VIRTUAL_LOOK_STEPS = 8  # it ends sooner only where code has spent virtual time
 
 _MOST_AT_ONE_INSTANT = 3_000_000  # firings, before a run with `until_s` is taken to stand still
 
-
 Done = Callable[[Any, BaseException | None], None]
 
 

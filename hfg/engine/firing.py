@@ -167,10 +167,11 @@ def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) ->
         else:
             has_value = True
         has_mandatory = has_mandatory or edge.mandatory
-    if end or (any(edge.ended for edge in worker.in_edges) and _all_ended(worker, edges)):
-        return "end"
-    if any(edge.ended for edge in edges):
-        rewire(worker)
+    if any(edge.ended for edge in worker.in_edges):
+        if end or _all_ended(worker, edges):
+            return "end"
+        if any(edge.ended for edge in edges):
+            rewire(worker)
     if silent or (edges and not has_mandatory and not has_value):
         return "silent"
     if not worker.is_source:

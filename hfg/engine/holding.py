@@ -58,7 +58,7 @@ class Held:
                 answer(waiter, None)
 
         for worker in self._workers:
-            lifecycle.when_idle(worker, rests, _nothing)
+            lifecycle.when_idle(worker, rests, lifecycle.nothing)
         if left[0]:
             self._said = True
             if core.trace is not None:
@@ -98,7 +98,3 @@ class Held:
         for over in letting_go:
             over()
         self._engine.kick()
-
-
-def _nothing() -> None:
-    """Nobody waits for it."""

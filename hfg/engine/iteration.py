@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from hfg.engine import errors, firing, plan, quiet
+from hfg.engine.code import answer
 from hfg.engine.core import Core, Timer
 from hfg.engine.releasing import take_from_reader
 from hfg.engine.sending import put_outputs
@@ -162,8 +163,7 @@ class Iteration:
         self.settle()
         waiters, self._waiters = self._waiters, []
         for waiter in waiters:
-            if not waiter.done():
-                waiter.set_result(None)
+            answer(waiter, None)
 
     async def looked(self) -> None:
         """Wait until it was seen whether the inside is quiet, and what follows has been done."""

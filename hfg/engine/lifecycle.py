@@ -27,6 +27,7 @@ __all__ = [
     "enable",
     "enable_around",
     "not_ended",
+    "nothing",
     "reset",
     "restart",
     "set_up",
@@ -35,6 +36,10 @@ __all__ = [
 ]
 
 Then = Callable[[NodeError | None], None]
+
+
+def nothing() -> None:
+    """What follows when nobody waits for it."""
 
 
 def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], None], then: Callable[[], None]) -> None:
@@ -258,7 +263,7 @@ def restart(worker: Worker, backoff_s: float) -> None:
 
     def rested() -> None:
         worker.backoff_timer = None
-        when_idle(worker, up, lambda: None)
+        when_idle(worker, up, nothing)
 
     def up(worker: Worker, then: Callable[[], None]) -> None:
         if worker.blocked & (DISABLED | REMOVED):

@@ -298,7 +298,8 @@ class Pausing:
 
     def _labels(self, place: Any) -> list[str]:
         flat = self._engine.flat
-        return [edge.label for edge in flat.edges if edge.label in labels_at(flat, place)]
+        labels = set(labels_at(flat, place))
+        return [edge.label for edge in flat.edges if edge.label in labels]
 
     def find_again(self, swapped: Mapping[Any, Any]) -> None:
         """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4).

@@ -55,7 +55,7 @@ def _each(workers: Iterable[Worker], action: Action, then: Callable[[], None]) -
         inside = True
         for worker in rest:
             if worker.busy:
-                when_idle(worker, action, _nothing)
+                when_idle(worker, action, lifecycle.nothing)
                 continue
             done_inside = False
             when_idle(worker, action, step)
@@ -65,10 +65,6 @@ def _each(workers: Iterable[Worker], action: Action, then: Callable[[], None]) -
         then()
 
     step()
-
-
-def _nothing() -> None:
-    """Nobody waits for it."""
 
 
 def disable_scope(scope: Scope) -> None:
@@ -116,5 +112,5 @@ def enable_scope(scope: Scope, then: Callable[[], None], fresh: Collection[Worke
     meant = [worker for worker in scope.members if worker.own_enabled and all(one.enabled for one in worker.around)]
     for worker in meant:
         if worker in fresh:
-            lifecycle.enable(worker, _nothing, fresh=True)
+            lifecycle.enable(worker, lifecycle.nothing, fresh=True)
     _each([worker for worker in meant if worker not in fresh], lifecycle.enable, finished)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -34,25 +35,24 @@ def made(reference: str, parameters: dict[str, Any], path: str) -> Any:
 
 
 def as_meant(value: Any, hint: Any) -> Any:
-    """The same for a value of any type; one that does not fit is left, for whoever checks it."""
-    if accepts(value, hint):
-        return value
-    try:
-        converted = msgspec.convert(value, hint)
-    except Exception:
-        return value
-    return converted if accepts(converted, hint) else value
+    """What came over a wire may have lost its type: a list stands for a tuple, a text for an enum's member."""
+    return _converted(value, hint, lambda one: accepts(one, hint))
 
 
 def fitting(spec: Any, value: Any) -> Any:
-    """What came over a wire may have lost its type: a list stands for a tuple, a text for an enum's member."""
-    if spec.check(value) is None:
+    """The same for a value of a parameter, which may have limits."""
+    return _converted(value, spec.type, lambda one: spec.check(one) is None)
+
+
+def _converted(value: Any, hint: Any, fits: Callable[[Any], bool]) -> Any:
+    """A value as one of the type; what cannot be one is left as it is, for whoever checks it."""
+    if fits(value):
         return value
     try:
-        converted = msgspec.convert(value, spec.type)
-    except Exception:
-        return value  # the parameter says what is wrong with it
-    return value if spec.check(converted) is not None else converted
+        converted = msgspec.convert(value, hint)
+    except Exception:  # types of users raise what they like
+        return value
+    return converted if fits(converted) else value
 
 
 def kept(old: Node, command: Replace) -> dict[str, Any]:
@@ -84,6 +84,8 @@ def _as_now(spec: Any, value: Any) -> Any:
     if spec.check(value) is None:
         return value
     try:
-        return fitting(spec, msgspec.to_builtins(value))
-    except Exception:
+        plain = msgspec.to_builtins(value)
+    except (TypeError, ValueError, RecursionError):
         return value
+    found = fitting(spec, plain)
+    return value if found is plain else found

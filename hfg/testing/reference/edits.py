@@ -65,8 +65,7 @@ class Editing(Calling):
         """Edit the drawing; its parameters are first what tokens have made of them (P8)."""
         for station in self.stations:
             if station.leaf.inside is None:
-                for name, value in station.node._parameters.items():
-                    station.leaf.node._parameters[name] = value
+                station.leaf.node._parameters.update(station.node._parameters)
         history = history_of(self.graph)
         if what == "undo":
             changes = undo_all(history.next_undo().changes)
