@@ -184,7 +184,10 @@ class Node:
 
     @property
     def active(self) -> bool:
-        """A(v) of the paper; False outside a run."""
+        """A(v) of the paper; False outside a run.
+
+        Code in a thread sees each change at once, but under the virtual clock what was when it began (R6).
+        """
         return self._active
 
     @property

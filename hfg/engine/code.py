@@ -157,8 +157,7 @@ class CodeRunner:
             if job is not worker_job:
                 return
             group.returned(job)
-            worker.in_flight = False
-            worker.core.in_flight -= 1
+            self._is_back(worker)
             if self.core.over:
                 self.came_back.set()
             if not self.core.over or closing:
@@ -174,6 +173,14 @@ class CodeRunner:
         else:
             self._limit(worker)
         group.submit(worker_job)
+
+    def _is_back(self, worker: Worker) -> None:
+        """Its code is over, or given up."""
+        worker.in_flight = False
+        worker.core.in_flight -= 1
+        if worker.job is not None:
+            worker.job = None
+            worker.node._active = worker.active
 
     def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Done) -> None:
         """See `Host`."""
@@ -209,11 +216,10 @@ class CodeRunner:
         """See `Host`."""
         if not worker.in_flight:
             return
-        worker.in_flight = False
-        worker.core.in_flight -= 1
+        job = worker.job
+        self._is_back(worker)
         group: Any = worker.group
         if group.threaded:
-            job = worker.job
             job.owner = lambda _job: None
             if isinstance(self.loop, VirtualTimeLoop):
                 self.loop.drop(job.held)

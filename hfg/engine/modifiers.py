@@ -45,7 +45,8 @@ def set_active(worker: Worker, active: bool, cause: Any) -> None:
     worker.active = active
     core = worker.core
     node = worker.node
-    if node is not None:
+    # under the virtual clock code in a thread sees what was when it began, or chance would say what it sees (R6)
+    if node is not None and (worker.job is None or worker.job.held is None):
         node._active = active
     if core.trace is not None:
         core.trace(ActivityChanged(core.now(), worker.path, active, cause))

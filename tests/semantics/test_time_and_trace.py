@@ -44,6 +44,46 @@ from tests.semantics.nodes import (
 # --- R6 ---
 
 
+class Looking(hfg.Node):
+    """Looks at its own activity, when it may."""
+
+    begun = threading.Event()
+    may_look = threading.Event()
+    seen = hfg.State[list[bool]](factory=list)
+
+    def process(self, value: int) -> None:
+        self.begun.set()
+        self.may_look.wait(10.0)
+        self.seen.append(self.active)
+
+
+@pytest.mark.rule("R6", "A14")
+@pytest.mark.parametrize(("loop", "seen"), [(hfg.VirtualTimeLoop, [True, False]), (None, [False, False])])
+def test_in_virtual_time_code_in_a_thread_sees_the_activity_with_which_it_began(loop: Any, seen: list[bool]) -> None:
+    Looking.begun.clear()
+    Looking.may_look.clear()
+    graph = hfg.Graph()
+    graph.group("work", threads=1)
+    numbers, node = graph.input("numbers", int), graph.add(Looking(), group="work")
+    graph.connect(numbers, node.value)
+
+    async def main() -> list[bool]:
+        async with hfg.running(graph) as run, run.feed(numbers) as feed:
+            await run.trigger(node.activate)
+            await run.wait_quiet()
+            sending = asyncio.ensure_future(feed.send(1))
+            while not Looking.begun.is_set():
+                await asyncio.sleep(0)
+            run.reset_activity()
+            Looking.may_look.set()
+            await sending
+            await feed.send(2)
+            return node.seen
+
+    with asyncio.Runner(loop_factory=loop) as runner:
+        assert runner.run(main()) == seen
+
+
 @pytest.mark.rule("R6")
 def test_an_hour_of_virtual_time_takes_no_time(fast: bool) -> None:
     graph = hfg.Graph()
