@@ -151,7 +151,7 @@ def test_the_table_names_only_what_exists_or_is_planned() -> None:
         ("from anyio.abc import TaskGroup", "only floor 5 and above may wait"),
         ("from ..engine import run", "imports hfg.engine"),
         ("from hfg import engine", "imports hfg.engine"),
-        ("def f():\n    import hfg.engine.plan", "imports hfg.engine.plan"),
+        ("def f():\n    import hfg.engine.runtime.plan", "imports hfg.engine.runtime.plan"),
         ("from hfg import Graph", "imports hfg (floor 8)"),
         ("import hfg_transports", "never by import"),
     ],

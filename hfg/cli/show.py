@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hfg.cli.encoding import encode
-from hfg.engine.report import Report
+from hfg.engine.observing.report import Report
 from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
 
 __all__ = ["failure", "json", "log_to_stderr", "report", "sentence", "set_debug", "table", "user_traceback"]

@@ -1,29 +1,22 @@
 """Running graphs: where asyncio begins.
 
-Which module stands on which; imports go down only:
+The wings, each of which knows those above it in this list, never those below:
 
-    run         the face: run, run_async, running
-    outside     feeds, readers, signals        engine      the loop, time, quiet, the trace
-    lifetime    beginning and ending           code        coroutines and threads
-    upstairs    ties the deciding modules together
-    iteration   plan  ports  rx                carrier  virtual  watchdog  report
-    steps       short ways for common shapes   quiet       growing, ending, stalling
-    watched     the same while somebody looks  consumers   who listens to the trace
-    glance      the few that a table shows     statistics  numbers while it runs
-    meters      what measures the code of nodes
-    errors      what a failure brings          activity    what a change of A(v) brings
-    firing      what a node does next          builtin_slots  subgraphs  lifecycle
-    wiring      which edges are live
-    sending     what leaves a node
-    core  worker  scopes  groups  settings     the state of a run
+    model       what a run is made of: nodes (workers), subgraphs (scopes), ready queues, and the state they share
+    rules       what the rules decide: firing, sending, releasing, activity, ending; plain functions that never wait
+    fusion      fast paths: what the rules prescribe for common shapes, in fewer steps
+    runtime     what waits: the loop, the code of nodes, threads, clocks, beginning and ending
+    observing   who looks at a run: listeners, taps, statistics, reports
+    editing     what changes or holds a run while it goes on: edits, pause, steps, breakpoints
+    face        what users hold in their hands: a run, its feeds and readers
 """
 
-from hfg.engine.glance import Glance, NodeGlance, glance
-from hfg.engine.report import EdgeReport, NodeReport, Report
-from hfg.engine.run import Run
-from hfg.engine.running import run, run_async, running
-from hfg.engine.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
-from hfg.engine.virtual import VirtualTimeLoop
+from hfg.engine.face.run import Run
+from hfg.engine.face.running import run, run_async, running
+from hfg.engine.observing.glance import Glance, NodeGlance, glance
+from hfg.engine.observing.report import EdgeReport, NodeReport, Report
+from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
+from hfg.engine.runtime.virtual import VirtualTimeLoop
 
 __all__ = [
     "EdgeReport",

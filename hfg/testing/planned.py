@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from hfg.engine.engine import Engine
-from hfg.engine.settings import Settings
+from hfg.engine.runtime.engine import Engine
+from hfg.engine.runtime.settings import Settings
 from hfg.graph.flat import flatten
 
 __all__ = ["planned", "planned_afresh"]

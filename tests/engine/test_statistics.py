@@ -12,7 +12,7 @@ import pytest
 
 import hfg
 from hfg import commands
-from hfg.engine.meters import BATCH, KEPT, Distribution
+from hfg.engine.observing.meters import BATCH, KEPT, Distribution
 from hfg.testing import Recorder
 
 T = TypeVar("T")

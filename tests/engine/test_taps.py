@@ -10,7 +10,7 @@ import pytest
 
 import hfg
 from hfg import commands
-from hfg.engine.run import Run
+from hfg.engine.face.run import Run
 from hfg.testing.nodes import Relay, script
 
 T = TypeVar("T")

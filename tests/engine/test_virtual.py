@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from hfg.engine.virtual import VirtualTimeLoop
+from hfg.engine.runtime.virtual import VirtualTimeLoop
 
 
 @pytest.mark.rule("R6")

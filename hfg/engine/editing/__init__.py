@@ -1,0 +1,3 @@
+"""What changes or holds a run while it goes on: edits, pause, steps, breakpoints."""
+
+__all__: list[str] = []

@@ -1,0 +1,366 @@
+"""Edits of a graph that runs: commands, undo and redo that take effect between firings (rule R4).
+
+One edit after the other: checked on the drawn graph, new nodes are set up while the others go on, then the touched
+nodes are held as they come to rest, the plan is changed at one moment, and all go on. What fails on the way leaves
+graph and run as they were. Stands on `reforming` and `lifecycle`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Collection, Coroutine, Iterable, Sequence
+from functools import partial
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from hfg.engine.editing.holding import Held
+from hfg.engine.editing.reforming import reform
+from hfg.engine.editing.replanning import Replan, closes_a_ring, replan
+from hfg.engine.editing.turns import Turns
+from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
+from hfg.engine.rules import lifecycle, subgraphs
+from hfg.engine.runtime import plan
+from hfg.engine.runtime import ports as engine_ports
+from hfg.engine.runtime.code import answer
+from hfg.errors import GraphError, HfgError, NodeError, NotRunning
+from hfg.graph import Graph
+from hfg.graph.changes import Change, NodeSwap, OptionsChange, ParameterChange, undo_all
+from hfg.graph.checks import check_flat
+from hfg.graph.commands import Command, encode
+from hfg.graph.editing import Transaction, history_of, may_break, prepare, refuse_new_errors
+from hfg.graph.flat import flatten
+from hfg.graph.reloading import reloaded
+from hfg.trace import ParameterSet, StructureChanged
+
+if TYPE_CHECKING:
+    from hfg.engine.runtime.engine import Engine
+
+__all__ = ["Edits"]
+
+_Switched = dict[Worker, bool]
+"""Nodes and subgraphs, and whether they are enabled or disabled."""
+
+
+class Edits:
+    """Edits the graph of one engine."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._graph: Graph = engine.flat.graph
+        self._turns = Turns()
+        self.leaving: set[asyncio.Task[None]] = set()  # nodes that are gone are torn down
+
+    async def edit(self, commands: Sequence[Command]) -> None:
+        """See `Run.edit`."""
+        async with self._turns.one():
+            gone = await self._edit(commands)
+        await self._leave(gone)
+
+    async def reload(self, module: str | ModuleType) -> None:
+        """See `Run.reload`."""
+        async with self._turns.one():
+            with reloaded(self._graph, module) as commands:
+                gone = await self._edit(commands)
+        await self._leave(gone)
+
+    async def _edit(self, commands: Sequence[Command]) -> list[Worker]:
+        self._need_run()
+        what = _told(commands)
+        transaction = prepare(self._graph, commands, check=False)
+        note = partial(history_of(self._graph).note, transaction)
+        return await self._follow(transaction.changes, what, note, check=may_break(commands))
+
+    async def undo(self) -> None:
+        """See `Run.undo`."""
+        async with self._turns.one():
+            self._need_run()
+            history = history_of(self._graph)
+            changes = undo_all(history.next_undo().changes)
+            gone = await self._follow(changes, "undo", history.undo_done, check=False)
+        await self._leave(gone)
+
+    async def redo(self) -> None:
+        """See `Run.redo`."""
+        async with self._turns.one():
+            self._need_run()
+            history = history_of(self._graph)
+            transaction: Transaction = history.next_redo()
+            for change in transaction.changes:
+                change.do()
+            gone = await self._follow(transaction.changes, "redo", history.redo_done, check=False)
+        await self._leave(gone)
+
+    def _need_run(self) -> None:
+        if self._engine.core.over:
+            raise NotRunning("the run is over: edit the graph with graph.edit(...)")
+
+    # --- following what was done to the drawn graph
+
+    async def _follow(
+        self, changes: Sequence[Change], what: str, note: Callable[[], None], *, check: bool
+    ) -> list[Worker]:
+        """Let the run be as the drawn graph is, and note that; if it fails, take back what was done to the graph.
+
+        Returns:
+          the workers that are gone and have yet to be torn down, for which the next edit does not wait.
+        """
+        engine = self._engine
+        come: list[Worker] = []
+        waiting: list[ParameterChange] = []  # values with which nobody works yet
+        took_effect = False
+        engine.hold()
+        try:
+            how = replan(engine.core, engine.flat, changes)
+            if check:
+                self._refuse_errors(how)
+            switched = self._switched(changes)
+            touched = _touched(how, switched)
+            self._turns.wait_for(touched)
+            waiting = self._values_of_running_nodes(changes)
+            undo_all(waiting)  # they work with the old ones until their firings are over
+            await self._set_up(how, come)
+            self._turns.wait_for(touched)
+            async with Held(engine, touched) as held:
+                self._turns.wait_for(())
+                await self._exchange_nodes(how)
+                fresh = self._to_start_afresh(switched)
+                starting = {worker.node for worker in fresh}
+                for value in [value for value in waiting if value.node in starting]:
+                    value.do()
+                    waiting.remove(value)
+                for worker in fresh:
+                    self._turns.wait_for((worker,))
+                    await self._hook(worker, lifecycle.tear_down)
+                    await self._hook(worker, lifecycle.set_up)
+                self._need_run()
+                for value in waiting:
+                    value.do()
+                took_effect = held.done = True
+                note()
+                if engine.core.trace is not None:
+                    engine.core.trace(StructureChanged(engine.core.now(), what))
+                self._switch(switched, fresh)
+                self._take_effect(how, come, changes)
+        except BaseException:
+            if not took_effect:
+                undo_all([change for change in changes if change not in waiting])
+                self._turns.wait_for(come)
+                await self._to_its_end(self._tear_down(come))
+            raise
+        finally:
+            engine.unhold()
+        return how.gone
+
+    def _values_of_running_nodes(self, changes: Sequence[Change]) -> list[ParameterChange]:
+        values = [change for change in changes if isinstance(change, ParameterChange)]
+        running = {worker.node for worker in self._engine.core.workers} if values else set()
+        return [value for value in values if value.node in running]
+
+    def _refuse_errors(self, how: Replan) -> None:
+        """A graph that runs has no errors, and gets none."""
+        if how.whole:
+            refuse_new_errors((), [one for one in check_flat(how.flat) if one.severity == "error"])
+        elif closes_a_ring(self._engine.core, how.new):
+            refuse_new_errors((), [one for one in check_flat(flatten(self._graph)) if one.severity == "error"])
+
+    async def _set_up(self, how: Replan, come: list[Worker]) -> None:
+        """Make workers of the nodes that come and set them up, before anybody is held for them."""
+        engine = self._engine
+        for node in how.come:
+            worker = plan.make_worker(engine.core, node, engine.groups)
+            come.append(worker)
+            engine.lifetime.carry(worker)
+            worker.busy = "setup"
+            self._turns.wait_for((worker,))
+            await self._hook(worker, lifecycle.set_up)
+            engine.lifetime.came(worker)
+
+    async def _hook(self, worker: Worker, hook: Callable[[Worker, lifecycle.Then], None]) -> None:
+        """Run a hook of a node to its end; if the edit is cancelled meanwhile, so is the hook, and waited for.
+
+        Raises:
+          NodeError: it failed.
+        """
+        waiter: asyncio.Future[NodeError | None] = self._engine.loop.create_future()
+        hook(worker, partial(answer, waiter))
+        cancelled: asyncio.CancelledError | None = None
+        while not waiter.done():
+            try:
+                await asyncio.wait({waiter})
+            except asyncio.CancelledError as error:
+                if cancelled is not None or self._engine.core.over:
+                    raise
+                cancelled = error
+                if worker.carrier is not None:
+                    worker.carrier.cancel()
+        if cancelled is not None:
+            raise cancelled
+        failure = waiter.result()
+        if failure is not None:
+            raise failure
+
+    async def _to_its_end(self, clearing: Coroutine[Any, Any, None]) -> None:
+        """Clear up after an edit that failed or was cancelled, however often it is cancelled."""
+        task = asyncio.create_task(clearing, name="hfg edit")
+        while not task.done():
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.wait({task})
+        task.result()
+
+    async def _exchange_nodes(self, how: Replan) -> None:
+        """Tear down the nodes that are replaced and set up the others in their place; back again if that fails."""
+        begun: list[tuple[Worker, Any]] = []
+        try:
+            for worker, node in how.swapped:
+                begun.append((worker, worker.node))
+                await self._become(worker, node)
+        except BaseException:
+            await self._to_its_end(self._become_again(begun))
+            raise
+        for worker, _ in begun:
+            lifecycle.not_ended(worker)
+            worker.blocked &= ~(ENDED | UNREADY)
+
+    async def _become_again(self, begun: list[tuple[Worker, Any]]) -> None:
+        """Put the nodes back that were to be replaced; one that cannot be set up again ends the run."""
+        for worker, before in reversed(begun):
+            try:
+                await self._become(worker, before)
+            except HfgError as error:
+                self._engine.finish("failed", error)
+
+    async def _become(self, worker: Worker, node: Any) -> None:
+        """Let a worker run another node: teardown, setup. A teardown that fails is told with the other errors (X3)."""
+        self._turns.wait_for((worker,))
+        try:
+            await self._hook(worker, lifecycle.tear_down)
+        except NodeError as error:
+            self._engine.core.errors.append(error)
+        engine_ports.release_ports(worker)
+        if worker.carrier is not None:
+            worker.carrier.drop()
+            worker.carrier = None
+        worker.node = node
+        worker.type = type(node)._type
+        worker.silent_code = worker.type.is_function
+        worker.is_async = worker.type.process_kind.startswith("async")
+        node._active = worker.active
+        self._engine.lifetime.carry(worker)
+        await self._hook(worker, lifecycle.set_up)
+
+    def _take_effect(self, how: Replan, come: list[Worker], changes: Sequence[Change]) -> None:
+        """From one moment to the next the run is another."""
+        engine = self._engine
+        core = engine.core
+        engine.flat = how.flat
+        for edge, flat in reform(core, how, come, engine.groups):
+            if flat.source.kind == "observable":
+                engine.lifetime.feed(flat.source.port, edge, flat.through)
+            elif flat.through:
+                engine.lifetime.pipe(edge, flat.through)
+        for edge in how.lost:
+            engine.lifetime.forget(edge)
+        for change in changes:
+            if isinstance(change, ParameterChange) and core.trace is not None and change.node._place is not None:
+                here = core.by_path.get(change.node._place.path)
+                if here is not None and here.node is change.node:
+                    core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
+        swapped = {change.old: change.new for change in changes if isinstance(change, NodeSwap)}
+        engine.looked_at_anew([worker for worker, _ in how.swapped], swapped)
+        for worker in come:
+            core.upstairs.idle_again(worker)
+
+    def _switched(self, changes: Sequence[Change]) -> _Switched:
+        """The nodes, then the subgraphs, that are enabled or disabled, and which of both in the end."""
+        if not any(isinstance(change, OptionsChange) for change in changes):
+            return {}
+        by_node = {worker.node: worker for worker in self._engine.core.workers}
+        found: _Switched = {}
+        for change in changes:
+            if isinstance(change, NodeSwap) and change.old in by_node:
+                by_node[change.new] = by_node[change.old]
+            elif isinstance(change, OptionsChange) and change.before.group == change.after.group:
+                worker = by_node.get(change.node)
+                if worker is not None:
+                    found[worker] = change.after.enabled
+        return dict(sorted(found.items(), key=lambda one: one[0].scope is not None))
+
+    def _to_start_afresh(self, switched: _Switched) -> list[Worker]:
+        """Whom to tear down and set up before they are enabled (F10), so that it all takes effect at one moment."""
+        on = {worker for worker, enabled in switched.items() if enabled}
+        scopes = {worker.scope for worker in on}
+        fresh = []
+        for worker in self._engine.core.workers if on else ():
+            meant = worker in on or (worker.own_enabled and not scopes.isdisjoint(worker.around))
+            if not meant or worker.scope is not None or not worker.blocked & DISABLED or worker.blocked & BACKOFF:
+                continue
+            if all(scope.enabled or scope in scopes for scope in worker.around):
+                fresh.append(worker)
+        return fresh
+
+    def _switch(self, switched: _Switched, fresh: Collection[Worker]) -> None:
+        """Enable and disable nodes and subgraphs (F10)."""
+        for worker, enabled in switched.items():
+            self._note_options(worker, enabled)
+            if worker.scope is not None and enabled:
+                subgraphs.enable_scope(worker.scope, lifecycle.nothing, fresh)
+            elif worker.scope is not None:
+                subgraphs.disable_scope(worker.scope)
+            elif enabled:
+                lifecycle.enable(worker, lifecycle.nothing, fresh=worker in fresh)
+            else:
+                lifecycle.disable(worker)
+
+    def _note_options(self, worker: Worker, enabled: bool) -> None:
+        flat = self._engine.flat
+        for node in flat.nodes:
+            if node.node is worker.node:
+                worker.options = node.options = msgspec.structs.replace(node.options, enabled=enabled)
+        for scope in flat.scopes:
+            if scope.subgraph is worker.node:
+                scope.options = msgspec.structs.replace(scope.options, enabled=enabled)
+
+    async def _leave(self, gone: list[Worker]) -> None:
+        """Nodes that are gone are torn down, also if nobody waits for that any more."""
+        if not gone:
+            return
+        task = asyncio.create_task(self._tear_down(gone), name="hfg edit")
+        self.leaving.add(task)
+        task.add_done_callback(self.leaving.discard)
+        await asyncio.shield(task)
+
+    async def _tear_down(self, workers: Iterable[Worker]) -> None:
+        """Let nodes that are gone close what they have opened; if that fails, it is told with other errors (X3)."""
+        engine = self._engine
+        for worker in workers:
+            for name in ("rate_timer", "limit_timer", "active_timer", "backoff_timer"):
+                timer = getattr(worker, name)
+                if timer is not None:
+                    timer.cancel()
+                    setattr(worker, name, None)
+        for worker in workers:
+            try:
+                await self._hook(worker, lifecycle.tear_down)
+            except HfgError as error:
+                engine.core.errors.append(error)
+            engine_ports.release_ports(worker)
+            engine.lifetime.forget(worker)
+            if worker.carrier is not None:
+                worker.carrier.drop()
+
+
+def _touched(how: Replan, switched: _Switched) -> list[Worker]:
+    """Those who must rest: also all inside a subgraph that is enabled."""
+    scopes = [worker.scope for worker, enabled in switched.items() if worker.scope is not None and enabled]
+    return list(dict.fromkeys([*how.touched, *(member for scope in scopes for member in scope.members)]))
+
+
+def _told(commands: Sequence[Command]) -> str:
+    """What the trace says; a parameter may have a value that is no data, an array, and is shown then."""
+    try:
+        return encode(commands)
+    except GraphError:
+        return ", ".join(map(repr, commands))

@@ -1,0 +1,372 @@
+"""Holding a run still: pause, one step of one node, one wave, breakpoints (rule R3).
+
+While the run is paused nothing is taken from the run queues; what is under way goes on to its end, timers ring and
+tokens stay where they are. Stands on `groups` and `steps`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from hfg.engine.fusion import steps
+from hfg.engine.model.worker import CALLS_BLOCKED, Worker
+from hfg.engine.rules import quiet
+from hfg.engine.runtime.places import behind, is_gone, labels_at
+from hfg.errors import UsageError
+from hfg.token import Token
+from hfg.trace import RunPaused, RunResumed, TokenSent, TraceEvent
+
+if TYPE_CHECKING:
+    from hfg.engine.runtime.engine import Engine
+
+__all__ = ["Breakpoint", "Halt", "Pausing", "Step"]
+
+_LOGGER = logging.getLogger("hfg.engine")
+
+
+class Halt(Exception):
+    """Thrown by the pump between two steps, so that not one more is made."""
+
+
+class Step(msgspec.Struct, frozen=True):
+    """What one step did.
+
+    Attributes:
+      moved: paths of the nodes that fired or were called, in order; a node of a wave may be there twice.
+      why_not: why nothing moved: what the node waits for; "" if something did.
+    """
+
+    moved: tuple[str, ...]
+    why_not: str = ""
+
+
+class Breakpoint:
+    """Pauses the run; made by `Run.break_at`.
+
+    Attributes:
+      path: the node before whose firings and calls the run pauses, or the edge or port on which tokens are looked at;
+        as it is called now.
+      hits: how often it has paused the run.
+      token: the token that it saw last; None for a node.
+    """
+
+    def __init__(self, place: Any, path: str, remove: Callable[[Breakpoint], None]) -> None:
+        self.path = path
+        self.place = place
+        self.hits = 0
+        self.token: Token[Any] | None = None
+        self._remove = remove
+
+    def remove(self) -> None:
+        """It pauses the run no more; a run that it has paused stays so. Does nothing the second time."""
+        self._remove(self)
+
+    def __repr__(self) -> str:
+        return f'<Breakpoint at "{self.path}", {self.hits} hits>'
+
+
+class _Stop:
+    """Stands among the groups that are to dispatch: the one place which the pump passes between two steps."""
+
+    def dispatch(self) -> None:
+        raise Halt
+
+
+class Pausing:
+    """The part of the engine that may hold everything still.
+
+    Attributes:
+      paused: no new firing or call starts.
+      why: what paused the run: "pause", or the path of the breakpoint that was hit.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self.paused = False
+        self.why = ""
+        self._stepping = False
+        self._waiters: list[asyncio.Future[None]] = []  # for a pause, or for what is under way to be over
+        self._at_nodes: dict[Worker, Breakpoint] = {}
+        self._at_edges: dict[Breakpoint, Callable[[], None]] = {}
+        self._labels_at: dict[Breakpoint, frozenset[str]] = {}
+        self._waived: set[Worker] = set()  # stopped here already: goes on when the run does
+
+    # --- pause and resume -------------------------------------------------------------------------------------------
+
+    def pause(self, why: str = "pause") -> None:
+        """Let no new firing and no new slot call start. Does nothing if the run is paused."""
+        engine = self._engine
+        if self.paused or engine.core.over:
+            return
+        self.paused, self.why = True, why
+        self._hold_groups(True)
+        if engine.core.pumping:
+            engine._ready_groups.appendleft(_Stop())  # type: ignore[arg-type]
+        if engine.core.trace is not None:
+            engine.core.trace(RunPaused(engine.now(), why))
+        self.rest()
+
+    def resume(self) -> None:
+        """Go on. Does nothing if the run is not paused.
+
+        Raises:
+          UsageError: a step is under way.
+        """
+        if not self.paused:
+            return
+        if self._stepping:
+            raise UsageError("a step is under way: await it before run.resume()")
+        engine = self._engine
+        self.paused, self.why = False, ""
+        self._hold_groups(False)
+        if engine.core.trace is not None:
+            engine.core.trace(RunResumed(engine.now()))
+        engine.kick()
+
+    def _hold_groups(self, held: bool) -> None:
+        for group in self._engine.groups.values():
+            group.held = held
+
+    def rest(self) -> None:
+        """The pump would go on now: tell those who wait for the pause, or for the end of what is under way."""
+        waiters, self._waiters = self._waiters, []
+        for waiter in waiters:
+            if not waiter.done():
+                waiter.set_result(None)
+
+    async def _change(self) -> None:
+        waiter: asyncio.Future[None] = self._engine.loop.create_future()
+        self._waiters.append(waiter)
+        await waiter
+
+    async def wait_paused(self) -> str:
+        """Wait until the run is paused and nothing is under way any more; gives back why it was paused.
+
+        Raises:
+          UsageError: the run has ended.
+        """
+        engine = self._engine
+        while not engine.core.over:
+            if self.paused and not self.is_under_way() and not self._stepping:
+                return self.why
+            await self._change()
+        raise UsageError("the run has ended: nothing can pause it any more")
+
+    def is_under_way(self) -> bool:
+        """Whether something comes to its end by itself; what iterates does not, for its inside is held (G4)."""
+        return any(
+            core.in_flight > sum(worker.in_flight for worker in core.workers if worker.iteration is not None)
+            for core in self._engine.all_cores()
+        )
+
+    # --- steps ------------------------------------------------------------------------------------------------------
+
+    async def step(self, worker: Worker) -> Step:
+        """Let one node make one firing or one slot call, and wait until that is over."""
+        self._begin(worker.path)
+        try:
+            why_not = self._why_not(worker)
+            if why_not:
+                return Step((), why_not)
+            self._let(worker)
+            await self._over([worker])
+            if worker.core.inside is not None:
+                await worker.core.inside.looked()  # the next element goes in by itself (G4)
+        finally:
+            self._stepping = False
+        return Step((worker.path,))
+
+    async def wave(self) -> Step:
+        """Let each node make at most one firing and one call, those that become enabled by that included."""
+        self._begin("a wave")
+        moved: list[str] = []
+        done: set[tuple[Worker, str]] = set()
+        aside: list[Worker] = []
+        workers: list[Worker] = []
+        try:
+            while True:
+                for worker in self._queued():
+                    kind = _next_kind(worker)
+                    if (worker, kind) in done or not kind:
+                        aside.append(worker)
+                        worker.group.policy.remove(worker)
+                    else:
+                        done.add((worker, kind))
+                        moved.append(worker.path)
+                        workers.append(worker)
+                        self._let(worker)
+                        break
+                else:
+                    if not _any_works(workers) or self._engine.core.over:
+                        break
+                    await self._change()
+        finally:
+            for worker in aside:
+                worker.group.policy.push(worker)
+            self._stepping = False
+        return Step(tuple(moved), "" if moved else "no node can move")
+
+    def _begin(self, what: str) -> None:
+        if self._engine.core.over:
+            raise UsageError(f"{what} cannot step: the run has ended")
+        if not self.paused:
+            raise UsageError(f"{what} cannot step while the run goes on: run.pause() first")
+        if self._stepping:
+            raise UsageError(f"{what} cannot step while another step is under way: await that first")
+        self._stepping = True
+
+    def _queued(self) -> Iterator[Worker]:
+        """Those that could move now, group by group."""
+        for group in self._engine.groups.values():
+            if not getattr(group, "running", 0):
+                yield from list(group.policy)
+
+    def _why_not(self, worker: Worker) -> str:
+        if worker.busy:
+            return f'"{worker.path}" is in the middle of a {worker.busy}'
+        if getattr(worker.group, "running", 0):
+            return f'group "{worker.group.name}" of "{worker.path}" is still at work'
+        if worker.queued and _next_kind(worker):
+            return ""
+        return f'"{worker.path}" {quiet.waits_for(worker)}'
+
+    def _let(self, worker: Worker) -> None:
+        """Make its next step, as the pump would."""
+        engine = self._engine
+        worker.group.policy.remove(worker)
+        self._waived.add(worker)
+        engine.guard(lambda: worker.step(worker))
+        self._waived.discard(worker)
+
+    async def _over(self, workers: list[Worker]) -> None:
+        while _any_works(workers) and not self._engine.core.over:
+            await self._change()
+
+    # --- breakpoints ------------------------------------------------------------------------------------------------
+
+    @property
+    def breakpoints(self) -> list[Breakpoint]:
+        """All that are set."""
+        return [*self._at_nodes.values(), *self._at_edges]
+
+    def at_node(self, worker: Worker) -> Breakpoint:
+        """Pause before each firing and call of a node."""
+        found = self._at_nodes.get(worker)
+        if found is None:
+            found = self._at_nodes[worker] = Breakpoint(worker.node, worker.path, self.remove)
+            worker.halt = partial(self._behind, found)
+            steps.choose(worker)
+        return found
+
+    def at_edges(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
+        """Pause when a token is put on one of the edges, before anybody takes it.
+
+        Raises:
+          UsageError: there is none.
+        """
+        labels = self._labels(place)
+        if not labels and labels_at(self._engine.flat, place):
+            raise UsageError(
+                f"{place!r} is inside a subgraph that iterates, where tokens can be looked at by run.tap alone; "
+                "a breakpoint may be at a node there"
+            )
+        if not labels:
+            raise UsageError(f"{place!r} has no edge in this run, so no token can come there")
+        point = Breakpoint(place, _path(place, labels), self.remove)
+        self._labels_at[point] = frozenset(labels)
+
+        def look(event: TraceEvent) -> None:
+            if type(event) is not TokenSent or event.edge not in self._labels_at[point]:
+                return
+            try:
+                hit = when is None or bool(when(event.token))
+            except Exception:
+                _LOGGER.exception('the condition of the breakpoint at "%s" failed, so it was removed', point.path)
+                point.remove()
+                return
+            if hit:
+                point.token = event.token
+                self._hit(point)
+
+        self._at_edges[point] = self._engine.consumers.add(look, None)
+        return point
+
+    def _labels(self, place: Any) -> list[str]:
+        flat = self._engine.flat
+        labels = set(labels_at(flat, place))
+        return [edge.label for edge in flat.edges if edge.label in labels]
+
+    def find_again(self, swapped: Mapping[Any, Any]) -> None:
+        """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4).
+
+        Args:
+          swapped: nodes that were replaced, and by what.
+        """
+        for point in self.breakpoints:
+            point.place = behind(point.place, swapped)
+            if is_gone(point.place):
+                self.remove(point)
+        for worker, point in self._at_nodes.items():
+            self._is_called(point, worker.path)
+        for point in self._at_edges:
+            labels = self._labels(point.place)
+            self._labels_at[point] = frozenset(labels)
+            self._is_called(point, _path(point.place, labels) or point.path)
+
+    def _is_called(self, point: Breakpoint, path: str) -> None:
+        if self.why == point.path:
+            self.why = path
+        point.path = path
+
+    def remove(self, point: Breakpoint) -> None:
+        """Take a breakpoint away."""
+        stop_looking = self._at_edges.pop(point, None)
+        if stop_looking is not None:
+            stop_looking()
+            del self._labels_at[point]
+        for worker in [worker for worker, found in self._at_nodes.items() if found is point]:
+            del self._at_nodes[worker]
+            self._waived.discard(worker)
+            worker.halt = None
+            steps.choose(worker)
+
+    def _behind(self, point: Breakpoint, step: Callable[[Worker], None]) -> Callable[[Worker], None]:
+        """The step of a worker, behind its breakpoint."""
+
+        def stop_first(worker: Worker) -> None:
+            if worker in self._waived or worker.busy or not _next_kind(worker):
+                self._waived.discard(worker)
+                step(worker)
+                return
+            self._waived.add(worker)
+            worker.group.push(worker)  # it stands in the queue as before
+            self._hit(point)
+
+        return stop_first
+
+    def _hit(self, point: Breakpoint) -> None:
+        point.hits += 1
+        self.pause(point.path)
+
+
+def _path(place: Any, labels: Sequence[str]) -> str:
+    return str(getattr(place, "path", "") or next(iter(labels), ""))
+
+
+def _any_works(workers: list[Worker]) -> bool:
+    """Whether a step of one of them will be over by itself; who waits for room in a queue (F8) may not be."""
+    return any(worker.busy and not worker.waiting_room and worker.iteration is None for worker in workers)
+
+
+def _next_kind(worker: Worker) -> str:
+    """What a worker in a run queue would do; "" if what it was queued for is gone."""
+    calls = worker.calls
+    if worker.placed and not (calls and worker.ahead):
+        return "firing"
+    return "call" if calls and not worker.blocked & CALLS_BLOCKED else ""

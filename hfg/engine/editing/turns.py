@@ -1,0 +1,102 @@
+"""Edits of a run take effect one after the other (rule R4), and code of nodes may ask for them.
+
+What must not be is code that waits for an edit that waits for this code: of its own node, or of two nodes that edit
+each other. Whoever asks last is refused, with a sentence. Decides who waits for whom; knows nothing of edits.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
+
+from hfg.engine.model.worker import Worker
+from hfg.engine.runtime.code import whose_code
+from hfg.errors import UsageError
+
+__all__ = ["Turns"]
+
+
+class Turns:
+    """Who edits now, and who waits for that."""
+
+    def __init__(self) -> None:
+        self._taken = False
+        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._asking: dict[Worker, asyncio.Future[None]] = {}  # whose code waits for its turn
+        self._awaited: set[Worker] = set()  # the end of whose code the present edit waits for
+
+    @asynccontextmanager
+    async def one(self) -> AsyncIterator[None]:
+        """Wait for the others; inside the block nobody else edits.
+
+        Raises:
+          UsageError: an edit waits for the end of the code that asks, or soon will.
+        """
+        await self._take(_speaker())
+        try:
+            yield
+        finally:
+            self._awaited.clear()
+            self._pass_on()
+
+    def wait_for(self, workers: Iterable[Worker]) -> None:
+        """The present edit waits from now on for the code of these, and of nobody else, to come to its end.
+
+        Raises:
+          UsageError: it was asked for by the code of one of them.
+        """
+        self._awaited = set(workers)
+        speaker = _speaker()
+        if speaker in self._awaited:
+            raise _waits_for_itself(speaker)
+        for worker in [worker for worker in self._asking if worker in self._awaited]:
+            waiter = self._asking[worker]
+            if waiter in self._waiting:
+                self._waiting.remove(waiter)
+                waiter.set_exception(_waits_for_itself(worker))
+
+    async def _take(self, speaker: Worker | None) -> None:
+        if speaker is not None and speaker in self._awaited:
+            raise _waits_for_itself(speaker)
+        if not self._taken:
+            self._taken = True
+            return
+        waiter: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiting.append(waiter)
+        if speaker is not None:
+            self._asking[speaker] = waiter
+        try:
+            await waiter
+        except asyncio.CancelledError:
+            if waiter in self._waiting:
+                self._waiting.remove(waiter)
+            elif waiter.done() and not waiter.cancelled() and waiter.exception() is None:
+                self._pass_on()  # it had just been given to us
+            raise
+        finally:
+            if speaker is not None:
+                del self._asking[speaker]
+
+    def _pass_on(self) -> None:
+        while self._waiting:
+            waiter = self._waiting.popleft()
+            if not waiter.done():  # else it was cancelled just now
+                waiter.set_result(None)
+                return
+        self._taken = False
+
+
+def _speaker() -> Worker | None:
+    """Whose code asks; a task that it has started is nobody's, for nothing waits for that."""
+    worker = whose_code()
+    carrier = None if worker is None else worker.carrier
+    return worker if carrier is not None and carrier.task is asyncio.current_task() else None
+
+
+def _waits_for_itself(worker: Worker) -> UsageError:
+    return UsageError(
+        f'"{worker.path}" edits the graph in the middle of its code and would wait for ever, for the edit, or one '
+        "before it, waits for the end of this code: do it in a task, asyncio.create_task(run.edit(...))"
+    )

@@ -1,0 +1,363 @@
+"""What one can do with a run from outside (ARCHITECTURE §1, rules R1, R7, P10).
+
+Stands on `engine` and `outside`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping
+from functools import partial
+from typing import Any
+
+from hfg.engine.face import outside
+from hfg.engine.face.editable import Editable
+from hfg.engine.face.steering import Steering
+from hfg.engine.model.worker import Worker
+from hfg.engine.observing.consumers import Listener
+from hfg.engine.observing.report import Report, edge_reports, node_reports
+from hfg.engine.observing.statistics import Statistics
+from hfg.engine.observing.taps import Tap
+from hfg.engine.runtime import relays
+from hfg.engine.runtime.code import answer
+from hfg.engine.runtime.engine import Engine
+from hfg.errors import HfgError, NotRunning, RunError, UsageError
+from hfg.graph import Graph
+from hfg.nodetype import Node
+from hfg.ports import EventPort, ParameterPort, SlotPort
+from hfg.token import Token
+from hfg.trace import ParameterSet
+from hfg.types import accepts, describe
+
+__all__ = ["Run"]
+
+
+class Run(Steering, Editable):
+    """A graph that runs; made by `running`."""
+
+    def __init__(self, graph: Graph, engine: Engine) -> None:
+        self.graph = graph
+        self._engine = engine
+        self._outputs: dict[str, list[Any]] = {}
+        self._held = False
+        self._done: asyncio.Future[None] | None = None
+
+    # --- bringing in and taking out ---------------------------------------------------------------------------------
+
+    async def trigger(
+        self, port: Any, value: Any = None, *, activity: int | None = None, stamp: float | None = None
+    ) -> None:
+        """Send a signal into a slot, or trigger an event as its node would; waits while a queue is full (F8).
+
+        Args:
+          port: a slot or an event of a node in the graph.
+          value: of the port's type; a token passed on keeps its modifier and stamp.
+          activity: the modifier; into a slot it acts as over an active edge.
+          stamp: seconds on the run's clock; now, if not given.
+
+        Raises:
+          TypeError: the value is not of the port's type.
+        """
+        if not isinstance(port, EventPort | SlotPort):
+            raise UsageError(
+                f"run.trigger is for slots and events of nodes, got {port!r}; give tokens to a graph input "
+                f"with run.feed"
+            )
+        outside.need_sendable(activity, stamp)
+        plain = value.value if isinstance(value, Token) else value
+        if not accepts(plain, port.type) and (plain is not None or port.kind == "slot"):
+            raise TypeError(f'{port.kind} "{port.path}" expects {describe(port.type)}, got {plain!r:.80}')
+        if relays.is_relay(port):
+            await self._trigger_inside(port, value, activity, stamp)
+            return
+        if port.kind == "slot":
+            worker = self._worker(port.node)
+            await outside.signal(self._engine, worker, port.name, value, activity, stamp)
+            return
+        from hfg.engine.runtime.ports import bind_event
+
+        event = bind_event(self._worker(port.node), port.name)
+        await self._engine.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
+
+    async def _trigger_inside(self, port: Any, value: Any, activity: int | None, stamp: float | None) -> None:
+        """The slot of a subgraph stands for those inside that it leads to (G1)."""
+        behind = relays.slots_behind(port) if port.kind == "slot" else []
+        if not behind or any(slot.kind != "slot" for slot, _ in behind):
+            raise UsageError(
+                f'"{port.path}" is the {port.kind} of a subgraph and leads to no slot inside: name the port of a node'
+            )
+        for slot, active in behind:
+            explicit = activity if active else 0
+            await outside.signal(self._engine, self._worker(slot.node), slot.name, value, explicit, stamp)
+
+    def feed(self, port: Any, *, end: bool = True) -> outside.Feed:
+        """Open a feed into a graph input; use it with `async with`.
+
+        Which holds the run open and sends END at its end unless `end=False`.
+        """
+        name = self._boundary(port, self.graph.inputs)
+        for worker in self._engine.core.feeds:
+            if worker.port_name == name:
+                return outside.Feed(self._engine, worker, self.graph.inputs[name].type, end=end)
+        raise UsageError(
+            f'graph input "{name}" is not connected: graph.connect(graph.inputs["{name}"], ...) before the run'
+        )
+
+    def read(self, port: Any) -> AsyncIterator[Any]:
+        """Read a graph output, value by value and lossless: a reader that does not read holds the graph back (P10).
+
+        While something lies before a reader that goes on, the run does not end.
+        """
+        name = self._boundary(port, self.graph.outputs)
+        for worker in self._engine.core.readers:
+            if worker.port_name == name:
+                return outside.read(self._engine, worker)
+        raise UsageError(
+            f'graph output "{name}" is not connected: graph.connect(..., graph.outputs["{name}"]) before the run'
+        )
+
+    def tap(self, what: Any, *, size: int | None = None, max_rate_hz: float | None = None) -> Tap:
+        """Look at a port or an edge, given itself or by path: an async iterator over the tokens, markers too.
+
+        The graph never waits for a tap: tokens that it has no room for are skipped, oldest first, and counted.
+
+        Args:
+          what: a port or an edge of the graph, "fetch/go_to.goal", or "a.out -> b.in". An event shows its signals, an
+            output each token once whatever its fan-out, a slot what comes over all its edges and from outside.
+          size: how many tokens are kept for the reader; 100, or 1, the latest, with `max_rate_hz`.
+          max_rate_hz: give at most so many tokens a second of the run's clock.
+
+        Raises:
+          UsageError: it is in no run or has no edge.
+          GraphError: there is no such path.
+        """
+        return self._engine.taps.add(what, size, max_rate_hz)
+
+    def trace(self, consumer: Any, *, size: int | None = None) -> Listener:
+        """Let a consumer see every event of the run from now on (R7); gives back what removes it.
+
+        Args:
+          consumer: a function that takes an event, called at once and on the loop, so let it be quick; or a list.
+            One that raises is logged and removed, and the run goes on.
+          size: the events that a buffer of its own holds; the function is then called on a thread of its own. An async
+            function has a task and a buffer in any case. Whoever is too slow loses the oldest, counted as `lost`.
+
+        Raises:
+          UsageError: it cannot take events.
+        """
+        return self._engine.consumers.add(consumer, size)
+
+    def set(self, parameter: Any, value: Any) -> None:
+        """Set a parameter of a node between its firings (P8).
+
+        Raises:
+          ValueError: the value is out of the parameter's limits; nothing is changed.
+        """
+        if not isinstance(parameter, ParameterPort):
+            raise UsageError(
+                f'run.set takes the port of a parameter, as in node.ports.parameters["name"], got {parameter!r}'
+            )
+        parameter.node._set_parameter(parameter.name, value)
+        core = self._engine.core
+        if core.trace is not None:
+            core.trace(ParameterSet(core.now(), parameter.node.place.path, parameter.name, value))
+
+    # --- waiting ----------------------------------------------------------------------------------------------------
+
+    async def wait_for(self, event: Any) -> Token[Any]:
+        """Wait for the next signal of an event.
+
+        Raises:
+          NotRunning: the run ended without one.
+          UsageError: it is no event of a node in this graph, or the graph's `start`, which is over by now.
+        """
+        if not isinstance(event, EventPort):
+            raise UsageError(f"run.wait_for waits for an event of a node, got {event!r}; look at others with run.tap")
+        if event is self.graph.start:
+            raise UsageError(
+                '"start" was triggered as the run began, so waiting for it would never end: leave the line out, or '
+                "write `await run.wait_quiet()` to wait for what it began"
+            )
+        waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
+        from hfg.engine.runtime.ports import bind_event
+
+        bind_event(self._worker(event.node), event.name)
+        subscription = event.subscribe(partial(answer, waiter))
+        ending = asyncio.ensure_future(self._engine.ending.wait())
+        try:
+            await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
+            if waiter.done():
+                return waiter.result()
+            raise NotRunning(f'the run ended before "{event.path}" was triggered')
+        finally:
+            ending.cancel()
+            waiter.cancel()
+            subscription.dispose()
+
+    async def wait_quiet(self) -> None:
+        """Wait until nothing runs, nothing can start and no timer is pending (SEMANTICS, "quiet")."""
+        await self._engine.wait_quiet()
+        self._raise_failure()
+
+    async def wait_inputs(self, node: Node) -> None:
+        """Wait for the node's input barrier: every live input holds a token."""
+        await self._barrier(node, "inputs")
+
+    async def wait_outputs(self, node: Node) -> None:
+        """Wait for the node's output barrier: every token it sent is processed."""
+        await self._barrier(node, "outputs")
+
+    async def _barrier(self, node: Node, which: str) -> None:
+        from hfg.engine.fusion import steps
+
+        worker = self._worker(node)
+        if worker.scope is not None:
+            raise UsageError(f'"{worker.path}" is a subgraph, in which each node waits for itself: name a node inside')
+        neighbours = [edge.source for edge in worker.in_edges] + [edge.target for edge in worker.all_out_edges()]
+        for one in (worker, *neighbours):
+            one.observed = True
+            steps.choose(one)
+        await outside.until(self._engine, getattr(worker, which).when_complete)
+
+    async def wait_finished(self) -> Report:
+        """Let the run end by itself (R5), wait for that and give back the report.
+
+        Raises:
+          RunError: the run failed, stalled or was aborted.
+        """
+        await asyncio.sleep(0)  # tasks that were begun beside us open their feeds and readers first
+        self._release()
+        await self._engine.ending.wait()
+        await self._close()
+        return self.report()
+
+    # --- looking ----------------------------------------------------------------------------------------------------
+
+    def active(self) -> list[str]:
+        """The paths of all active nodes, in order of adding."""
+        return [
+            worker.path
+            for worker in self._engine.core.workers
+            if worker.active and worker.scope is None and worker.node is not None
+        ]
+
+    def statistics(self) -> Statistics:
+        """What the run has done so far: a frozen snapshot of counts, rates, times and depths, ready for JSON.
+
+        Counts are kept anyway. Times are measured from the first call on, so make it at the start of the block if they
+        are to cover the whole run; it costs some 0.2 us a firing.
+        """
+        return self._engine.measure().snapshot()
+
+    def now(self) -> float:
+        """Seconds on the run's clock."""
+        return self._engine.now()
+
+    def wake(self, node: Node) -> None:
+        """Ask a node's `ready()` again (F1)."""
+        from hfg.engine.model.worker import UNREADY
+        from hfg.engine.rules.agenda import unblock
+
+        unblock(self._worker(node), UNREADY)
+        self._engine.kick()
+
+    def stop(self) -> None:
+        """End the run well, as the graph's slot `stop` does."""
+        self._engine.finish("stopped", None)
+
+    def reset_activity(self) -> None:
+        """Take all activity away and trigger `start` again (A14)."""
+        from hfg.engine.rules.activity import reset_activity
+
+        reset_activity(self._engine.core)
+        self._engine.kick()
+
+    @property
+    def error(self) -> HfgError | None:
+        """What the run failed with; None if it did not. A run that was cancelled can fail in its teardown."""
+        return self._engine.error
+
+    def report(self) -> Report:
+        """What the run has done; final once it is over."""
+        engine = self._engine
+        core = engine.core
+        nodes = node_reports(core)
+        outcome = engine.outcome
+        return Report(
+            outcome=outcome,
+            duration_s=engine.ended_at - engine.started_at
+            if engine.ended_at is not None
+            else engine.now() - engine.started_at,
+            firings=sum(node.firings for node in nodes.values()),
+            nodes=nodes,
+            edges=edge_reports(core),
+            outputs=dict(self._outputs),
+            errors=[str(error) for error in core.errors],
+            lost_activity=core.lost_activity,
+        )
+
+    # --- inside -----------------------------------------------------------------------------------------------------
+
+    def _worker(self, node: Any) -> Worker:
+        place = getattr(node, "_place", None)
+        if node is self.graph:
+            worker = self._engine.core.boundary
+        else:
+            worker = None if place is None else self._engine.core.by_path.get(place.path)
+            if worker is not None and worker.node is not node:
+                worker = None
+        if worker is None:
+            raise UsageError(f"{node!r} is no node of this run: its graph is another one, or it was never added")
+        return worker
+
+    def _boundary(self, port: Any, ports: Mapping[str, Any]) -> str:
+        """Find one of the graph's own ports, given itself or by name."""
+        name = str(getattr(port, "name", port))
+        if name in ports and (port == name or port is ports[name]):
+            return name
+        kind, verb = ("input", "feed") if ports is self.graph.inputs else ("output", "read")
+        found = f'"{getattr(port, "path", port)}"' if isinstance(port, str) or hasattr(port, "name") else repr(port)
+        raise UsageError(
+            f'{found} is no {kind} of graph "{self.graph.name}", which has {_names(ports)}: '
+            f'run.{verb} takes what graph.{kind}("name", type) gave'
+        )
+
+    def _adopt(self, event: Any) -> None:
+        """Somebody has subscribed to an automatic event, or to `start`; asked by the event."""
+        from hfg.engine.runtime.ports import bind_event, bind_start
+
+        if event is self.graph.start:
+            bind_start(self._worker(self.graph), event)
+        else:
+            bind_event(self._worker(event.node), event.name)
+
+    def _hold(self) -> None:
+        self._held = True
+        self._engine.hold()
+
+    def _release(self) -> None:
+        if self._held:
+            self._held = False
+            self._engine.unhold()
+
+    async def _close(self) -> None:
+        if self._done is None:
+            self._done = self._engine.loop.create_future()
+            try:
+                await self._engine.close()
+            finally:
+                self._done.set_result(None)
+        elif not self._done.done():
+            await asyncio.shield(self._done)
+        self._raise_failure()
+
+    def _raise_failure(self) -> None:
+        error = self._engine.error
+        if error is not None:
+            if isinstance(error, RunError):
+                error.report = self.report()  # type: ignore[attr-defined]
+            raise error
+
+
+def _names(ports: Any) -> str:
+    return ", ".join(f'"{name}"' for name in ports) or "none"

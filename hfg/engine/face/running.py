@@ -1,0 +1,265 @@
+"""Running a graph to its end, or as long as a block lasts: `run`, `run_async`, `running` (rules R1, R5, R6).
+
+Stands on `run`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
+from typing import Any, Literal
+
+from hfg.engine.face import outside
+from hfg.engine.face.run import Run
+from hfg.engine.observing.report import Report
+from hfg.engine.runtime.engine import Engine
+from hfg.engine.runtime.interrupt import CtrlC
+from hfg.engine.runtime.settings import Settings
+from hfg.engine.runtime.virtual import VirtualTimeLoop
+from hfg.errors import CheckFailed, GraphError, HfgError, RunError, UsageError
+from hfg.graph import Graph
+from hfg.graph.checks import check_flat
+from hfg.graph.endless import endless
+from hfg.graph.flat import FlatGraph, flatten
+from hfg.trace import TraceEvent
+
+__all__ = ["run", "run_async", "running"]
+
+Clock = Literal["real", "virtual"]
+
+
+def _need_clock(clock: str) -> None:
+    if clock not in ("real", "virtual"):
+        raise UsageError(f'clock must be "real" or "virtual", got {clock!r}')
+
+
+def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
+    """Check the graph and make its running form; nothing has happened yet."""
+    if not isinstance(graph, Graph):
+        raise UsageError(f"a Graph can run, not {type(graph).__name__}: write hfg.run(graph)")
+    _need_clock(clock)
+    if graph._owner is not None:
+        raise UsageError(f'{graph._title} runs as a part of the whole: run graph "{graph._root.name}"')
+    if graph._run is not None:
+        raise UsageError(f'graph "{graph.name}" runs already: a graph has one run at a time; build a second graph')
+    loop = asyncio.get_running_loop()
+    if clock == "virtual" and not isinstance(loop, VirtualTimeLoop):
+        raise UsageError(
+            'clock="virtual" needs a loop in virtual time: hfg.run(graph, clock="virtual"), or '
+            "asyncio.Runner(loop_factory=hfg.VirtualTimeLoop).run(main()) around the whole program"
+        )
+    flat = flatten(graph)
+    problems = check_flat(flat)
+    if any(problem.severity == "error" for problem in problems):
+        raise CheckFailed(problems)
+    if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
+        _refuse_endless(flat)
+    engine = Engine(flat, settings)
+    run = Run(graph, engine)
+    graph._run = run
+    return run
+
+
+def _refuse_endless(flat: FlatGraph) -> None:
+    """R6: under a virtual clock a source that never ends and waits for nothing would hold time still for ever.
+
+    Only where that is certain; else the engine notices that time has stood still for millions of firings.
+    """
+    for node in endless(flat, virtual=True):
+        raise GraphError(
+            f'source "{node.path}" has no rate, waits for nothing and never ends, so virtual time would stand still '
+            "for ever: give it max_rate_hz=, or let it raise hfg.EndOfStream"
+        )
+
+
+async def _run_to_end(
+    graph: Graph, clock: Clock, settings: Settings, begin: Callable[[Run], object] | None, ctrl_c: CtrlC | None = None
+) -> Report:
+    run = _prepare(graph, clock, settings)
+    engine = run._engine
+    if ctrl_c is not None:
+        ctrl_c.task, ctrl_c.engine = asyncio.current_task(), engine
+    try:
+        for worker in engine.core.readers:
+            outside.collect(engine, worker, run._outputs.setdefault(worker.port_name, []))
+        if begin is not None:
+            begin(run)
+        if settings.allow_idle:
+            engine.hold()
+        await engine.start()
+        await engine.ending.wait()
+    finally:
+        try:
+            await run._engine.close()
+        finally:
+            graph._run = None
+    run._raise_failure()
+    return run.report()
+
+
+async def run_async(
+    graph: Graph,
+    *,
+    clock: Clock | None = None,
+    until_s: float | None = None,
+    debug: bool = False,
+    policy: str | None = None,
+    seed: int | None = None,
+    trace: Callable[[TraceEvent], None] | None = None,
+    begin: Callable[[Run], object] | None = None,
+    allow_idle: bool = False,
+    block_warning_s: float = 0.1,
+    fast: bool = True,
+) -> Report:
+    """Run a graph to its end in the running event loop; see `run` for the arguments.
+
+    Cancelling it tears the run down.
+    """
+    settings = Settings(
+        debug=debug,
+        policy=policy,
+        seed=seed,
+        trace=trace,
+        fast=fast,
+        until_s=until_s,
+        allow_idle=allow_idle,
+        block_warning_s=block_warning_s,
+    )
+    return await _run_to_end(graph, clock or "real", settings, begin)
+
+
+def run(
+    graph: Graph,
+    *,
+    clock: Clock = "real",
+    until_s: float | None = None,
+    debug: bool = False,
+    policy: str | None = None,
+    seed: int | None = None,
+    trace: Callable[[TraceEvent], None] | None = None,
+    begin: Callable[[Run], object] | None = None,
+    allow_idle: bool = False,
+    block_warning_s: float = 0.1,
+    fast: bool = True,
+) -> Report:
+    """Run a graph to its end; blocks until then.
+
+    Args:
+      graph: it is checked first; a graph has one run at a time, and each run starts fresh.
+      clock: "real", or "virtual": as fast as the machine can, with the same values and stamps each time (R6).
+      until_s: end the run after so many seconds on its clock.
+      debug: check every value against the type of its port.
+      policy: for all groups, in place of their own: "fifo", "priority", "random" (R2).
+      seed: of the policy "random".
+      trace: receives every event of the run (R7); one that raises is removed.
+      begin: called with the run on its loop, before its nodes are set up: the place for `run.tap` and `run.trace`.
+      allow_idle: a quiet graph does not end; it waits for subscribers, `stop` or Ctrl-C.
+      block_warning_s: after how long a firing on the loop group is warned about; 0 for never.
+      fast: take short ways for common shapes; outcomes do not differ.
+
+    Returns:
+      How it went; `outcome` is "done", "stopped" or "until".
+
+    Raises:
+      CheckFailed: the graph has errors; nothing was started.
+      RunError: a node failed (`NodeError`), the graph stalled (`Stalled`) or aborted itself (`Aborted`).
+      UsageError: called inside a running event loop, or the graph runs already.
+    """
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        pass
+    else:
+        raise UsageError(
+            "hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`"
+        )
+    settings = Settings(
+        debug=debug,
+        policy=policy,
+        seed=seed,
+        trace=trace,
+        fast=fast,
+        until_s=until_s,
+        allow_idle=allow_idle,
+        block_warning_s=block_warning_s,
+    )
+    _need_clock(clock)
+    factory = VirtualTimeLoop if clock == "virtual" else None
+    ctrl_c = CtrlC()
+    runner = asyncio.Runner(loop_factory=factory)
+    try:
+        with ctrl_c.handled(runner.get_loop()), runner:
+            report = runner.run(_run_to_end(graph, clock, settings, begin, ctrl_c))
+        if not ctrl_c.count:
+            return report
+    except (asyncio.CancelledError, KeyboardInterrupt, RunError):
+        if not ctrl_c.count:
+            raise
+    raise KeyboardInterrupt(ctrl_c.sentence(graph.name))
+
+
+@asynccontextmanager
+async def running(
+    graph: Graph,
+    *,
+    clock: Clock | None = None,
+    until_s: float | None = None,
+    debug: bool = False,
+    policy: str | None = None,
+    seed: int | None = None,
+    trace: Callable[[TraceEvent], None] | None = None,
+    block_warning_s: float = 0.1,
+    fast: bool = True,
+) -> AsyncIterator[Run]:
+    """Run a graph as long as the block lasts; the block holds the run open until it calls `wait_finished`.
+
+    Leaving the block stops the run and tears it down. A failure of the run cancels what the block waits for and
+    comes out here.
+    """
+    settings = Settings(
+        debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, block_warning_s=block_warning_s
+    )
+    run = _prepare(graph, clock or "real", settings)
+    engine = run._engine
+    body = asyncio.current_task()
+    assert body is not None
+    cancelled_by_us = False
+
+    async def guard() -> None:
+        nonlocal cancelled_by_us
+        await engine.ending.wait()
+        if engine.error is not None and run._done is None:
+            cancelled_by_us = True
+            body.cancel()
+
+    watcher: asyncio.Task[None] | None = None
+    try:
+        run._hold()
+        await engine.start()
+        if engine.error is None:
+            watcher = asyncio.create_task(guard(), name=f"hfg guard of {graph.name}")
+            yield run
+    except asyncio.CancelledError:
+        if not cancelled_by_us:
+            engine.finish("cancelled", None)
+            engine.hurry()
+            raise
+        body.uncancel()
+    finally:
+        if watcher is not None:
+            watcher.cancel()
+        if engine.outcome == "running":
+            engine.finish("stopped", None)
+        try:
+            await _quietly(run._close())
+        finally:
+            graph._run = None
+    run._raise_failure()
+
+
+async def _quietly(closing: Coroutine[Any, Any, None]) -> None:
+    """The failure of the run is raised by whoever waits for it, not by its clean-up."""
+    with contextlib.suppress(HfgError):
+        await closing

@@ -1,0 +1,190 @@
+"""The state of one run, shared by the modules that decide over it.
+
+`sending` says what leaves a node, `firing` what a node does next, `wiring` which edges are live, `quiet` what
+happens when nothing moves, `steps` how the common shapes go fast. None of them waits: time, threads and coroutines
+are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asyncio.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from types import CoroutineType
+from typing import Any, Protocol
+
+from hfg.engine.model.scopes import Scope
+from hfg.engine.model.worker import Worker
+from hfg.errors import HfgError
+from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
+from hfg.token import Token
+from hfg.trace import TraceEvent
+
+__all__ = ["OF_ITS_OWN_KIND", "PENDING", "Core", "Host", "Timer", "Upstairs"]
+
+
+class _Pending:
+    def __repr__(self) -> str:
+        return "PENDING"
+
+
+PENDING = _Pending()
+"""What an executor returns for code that waits: its result comes later."""
+
+
+OF_ITS_OWN_KIND = frozenset({type(None), Token, CoroutineType})
+"""Types of results that do not simply leave: silence, a token passed on, code that is still to be awaited."""
+
+
+class Timer(Protocol):
+    """A call that has not happened yet."""
+
+    def cancel(self) -> None:
+        """Forget it."""
+
+
+class Host(Protocol):
+    """What the deciding part of the engine needs from the waiting part."""
+
+    def now(self) -> float:
+        """Seconds on the run's clock."""
+
+    def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> Timer:
+        """Call back at `when` on the run's clock.
+
+        If it counts it is one that could start something: quiet waits for it.
+        """
+
+    def kick(self) -> None:
+        """Something was queued from outside the pump: see to it that it goes on."""
+
+    def execute(
+        self,
+        worker: Worker,
+        call: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        done: Callable[[Any, BaseException | None], None],
+    ) -> None:
+        """Run a node's code where it belongs; `done(result, error)` follows, at once or later on the loop."""
+
+    def execute_aside(
+        self, worker: Worker, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]
+    ) -> None:
+        """Run a hook of activity beside whatever the worker is doing."""
+
+    def drive(self, worker: Worker, coroutine: Any, done: Callable[[Any, BaseException | None], None]) -> None:
+        """Take a coroutine of the worker's code to its end."""
+
+    def begin(self, worker: Worker) -> None:
+        """The worker's code waits now."""
+
+    def late(
+        self, worker: Worker, done: Callable[[Any, BaseException | None], None]
+    ) -> Callable[[Any, BaseException | None], None]:
+        """What to call when code that waited is over."""
+
+    def interrupt(self, worker: Worker) -> None:
+        """Cancel or abandon the code of the worker that is under way (X2)."""
+
+    def quiet(self) -> None:
+        """Nothing runs, nothing can start and no timer is pending."""
+
+    def finish(self, outcome: str, error: HfgError | None) -> None:
+        """End the run; only the first call counts."""
+
+
+class Upstairs(Protocol):
+    """What modules further up do when those below come to it, so that imports go down only."""
+
+    def idle_again(self, worker: Worker) -> None:
+        """What kept a worker busy is over."""
+
+    def fail(self, worker: Worker, what: str, error: BaseException, *, answer: bool) -> None:
+        """X1: a firing (`answer`: it still owes its outputs) or something beside one has failed."""
+
+    def fail_call(self, worker: Worker, slot: str, error: BaseException) -> None:
+        """X1: a slot call has failed."""
+
+    def operator_failed(self, edge: EventEdge, error: BaseException) -> None:
+        """An operator on an edge raised."""
+
+    def send_end(self, worker: Worker) -> None:
+        """END is to follow, and the outputs are free (F4)."""
+
+    def node_ended(self, worker: Worker) -> None:
+        """A node has sent END (P9, R5)."""
+
+    def activity_changed(self, worker: Worker, active: bool) -> None:
+        """A(v) of a watched node has changed (A9, A11, A12, G2)."""
+
+    def scopes_changed(self, core: Core) -> None:
+        """What subgraphs derive their activity from has changed (G2)."""
+
+    def deactivate_inside(self, scope: Scope, cause: Any) -> None:
+        """Activity leaves everything inside a subgraph (G2)."""
+
+    def rewire(self, worker: Worker) -> None:
+        """What a worker waits for has changed."""
+
+    def choose_step(self, worker: Worker) -> None:
+        """The wiring of a worker has changed: its shortest way may be another."""
+
+    def bind_ports(self, worker: Worker) -> None:
+        """A node is about to be set up: its ports lead into the run."""
+
+    def iteration(self, worker: Worker, flat: Any, groups: Any, loop: Any) -> Any:
+        """Make the inside of a subgraph that iterates (G4)."""
+
+
+class Core:
+    """One run.
+
+    Attributes:
+      trace: receives every event of the run, or None: nobody listens and nothing is built (R7).
+      in_flight: firings, calls and hooks that wait or run in a thread.
+      timers: pending calls that could start something.
+      pumping: the loop group is being drained; what is queued now is reached without a kick.
+      current: the worker whose code runs on the loop, for the watchdog.
+    """
+
+    def __init__(self, host: Host, upstairs: Upstairs) -> None:
+        self.host = host
+        self.upstairs = upstairs
+        self.now = host.now
+        self.workers: list[Worker] = []
+        self._numbers = itertools.count()
+        self.edges: list[SyncEdge | DelayEdge | EventEdge] = []
+        self.scopes: list[Scope] = []
+        self.by_path: dict[str, Worker] = {}
+        self.boundary: Worker | None = None
+        self.trace: Callable[[TraceEvent], None] | None = None
+        self.debug = False
+        self.fast = True
+        self.in_flight = 0
+        self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
+        self.timers = 0
+        self.pumping = False
+        self.futile = False  # the sources left feed only ended nodes (R5)
+        self.current: Worker | None = None
+        self.speaker: Worker | None = None  # whose short step runs: what it triggers may take a short way too
+        self.started = False
+        self.over = False
+        self.errors: list[HfgError] = []
+        self.lost_activity = 0
+        self.dirty_scopes: list[Scope] = []
+        self.late: list[Worker] | None = None  # those whose automatic events are told behind the change under way
+        self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
+        self.sources: list[Worker] = []
+        self.feeds: list[Worker] = []  # the graph's own inputs (P10)
+        self.readers: list[Worker] = []  # the graph's own outputs
+        self.piped: list[tuple[Any, tuple[Any, ...]]] = []  # edges with operators (P9)
+        self.inside: Any = None  # the iteration whose inside this is (G4)
+        self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
+        self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
+
+    def number_workers(self) -> int:
+        """Give a number that no worker of this run has yet."""
+        return next(self._numbers)
+
+    def after(self, delay_s: float, callback: Callable[[], None]) -> Timer:
+        """Call back `delay_s` seconds from now."""
+        return self.host.call_at(self.now() + delay_s, callback)

@@ -1,0 +1,95 @@
+"""Subgraphs at run time (rule G2) and gates (rule A11): what depends on the activity of something else.
+
+A scope is a dissolved subgraph that somebody watches: it has an automatic event with an edge, `active_for_s`, or
+gates a node. Its activity is derived, never stored by a token. Stands on `worker`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hfg.engine.model.worker import Worker
+
+__all__ = ["Gate", "Scope"]
+
+
+class Scope:
+    """A subgraph whose activity matters.
+
+    Attributes:
+      worker: its automatic ports live on a worker of their own, which never fires.
+      members: the running nodes inside, nested ones too.
+      inner_edges: the edges with both ends inside.
+      active: A(subgraph) as last derived.
+      told: A(subgraph) as its events have told it last.
+    """
+
+    __slots__ = (
+        "active",
+        "enabled",
+        "gates",
+        "index",
+        "inner_edges",
+        "members",
+        "parent",
+        "path",
+        "told",
+        "watched",
+        "worker",
+    )
+
+    def __init__(self, index: int, path: str, parent: Scope | None) -> None:
+        self.index = index
+        self.path = path
+        self.parent = parent
+        self.members: list[Worker] = []
+        self.inner_edges: list[Any] = []
+        self.worker: Worker | None = None
+        self.active = False
+        self.told = False
+        self.enabled = True
+        self.watched = False
+        self.gates: list[Gate] = []
+
+    def and_around(self) -> tuple[Scope, ...]:
+        """Give it and those around it, outermost first."""
+        return (*(self.parent.and_around() if self.parent is not None else ()), self)
+
+    def inside(self) -> list[Worker]:
+        """Give the workers of all nodes and subgraphs inside."""
+        assert self.worker is not None
+        owners = [scope.worker for scope in self.worker.core.scopes if scope is not self]
+        return [*self.members, *(owner for owner in owners if owner is not None and self in owner.around)]
+
+    def find_inner_edges(self) -> None:
+        """Note the edges with both ends inside; left until somebody asks, since most subgraphs are just boxes."""
+        assert self.worker is not None
+        inside = set(self.inside())
+        self.inner_edges = [edge for edge in self.worker.core.edges if edge.source in inside and edge.target in inside]
+
+    def derive(self) -> bool:
+        """Whether an inner node is active, or a token with +1 lies untaken inside or was drained and has yet to act.
+
+        (G2, F12).
+        """
+        return any(worker.active or (worker.deferred and 1 in worker.deferred) for worker in self.members) or any(
+            token.activity > 0 for edge in self.inner_edges for token in edge.contents()
+        )
+
+
+class Gate:
+    """Work coupled to the activity of a state node or subgraph (A11).
+
+    Attributes:
+      state: who must be active.
+      idle_rate_hz: how many firings a second run while it is not; None suspends.
+      workers: the gated running nodes.
+    """
+
+    __slots__ = ("idle_rate_hz", "state", "workers")
+
+    def __init__(self, state: Worker | Scope, idle_rate_hz: float | None) -> None:
+        self.state = state
+        self.idle_rate_hz = idle_rate_hz
+        self.workers: list[Worker] = []

@@ -1,0 +1,3 @@
+"""Who looks at a run: listeners, taps, statistics, reports."""
+
+__all__: list[str] = []

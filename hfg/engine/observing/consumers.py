@@ -1,0 +1,272 @@
+"""Who listens to a run (rule R7): consumers of the trace, called at once or behind a buffer of their own.
+
+A plain function is called with each event as it happens, on the loop: it loses nothing and its time is the graph's.
+One that is slow goes behind a buffer, a plain one on a thread of its own, an async one in a task: it loses its own
+oldest events, counted, and the graph does not wait. Stands on `trace`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from hfg.errors import UsageError
+from hfg.trace import TraceEvent
+
+if TYPE_CHECKING:
+    from hfg.engine.runtime.engine import Engine
+
+__all__ = ["Consumers", "Listener", "check_consumer"]
+
+_LOGGER = logging.getLogger("hfg.engine")
+_BUFFER = 10_000  # events, for an async consumer that does not say
+_LAST_S = 1.0  # how long those behind a buffer may go on when the run is over
+_CANCELLED_S = 0.3  # and when they were cancelled for that
+
+Take = Callable[[TraceEvent], Any]
+
+
+def check_consumer(consumer: Any) -> None:
+    """Refuse what can take no events.
+
+    Raises:
+      UsageError: it is neither callable nor a list or deque, to which events are appended.
+    """
+    if not callable(consumer) and not isinstance(consumer, list | deque):
+        raise UsageError(
+            f"trace must be a function that takes each event of the run, or a list to append them to, got {consumer!r}"
+        )
+
+
+class Listener:
+    """One consumer of a run's trace. Calling it removes the consumer, as `remove` does.
+
+    Attributes:
+      consumer: what was given.
+      error: what it raised, for which it was removed; None else.
+    """
+
+    def __init__(self, consumer: Any, consumers: Consumers) -> None:
+        self.consumer = consumer
+        self.error: BaseException | None = None
+        self._consumers = consumers
+        self._open = True
+        # The append of a list fails for want of memory only: no guard, and so a recorder costs half.
+        self.take: Take = consumer.append if isinstance(consumer, list | deque) else self._guarded
+
+    @property
+    def lost(self) -> int:
+        """Events that it will never see, because its buffer was full; 0 without a buffer."""
+        return 0
+
+    def remove(self) -> None:
+        """Let it see nothing more. Does nothing the second time."""
+        if self._open:
+            self._open = False
+            self._consumers.changed()
+
+    __call__ = remove
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it still takes events."""
+        return self._open
+
+    def _guarded(self, event: TraceEvent) -> None:
+        if self._open:
+            try:
+                self.consumer(event)
+            except (Exception, asyncio.CancelledError) as error:  # of something of its own: nobody cancels a function
+                self.failed(error)
+
+    def failed(self, error: BaseException) -> None:
+        """It raised: it is logged and removed, and the run goes on (R7)."""
+        self.error = error
+        _LOGGER.error("a consumer of the trace failed and was removed", exc_info=error)
+        self.remove()
+
+    async def end(self) -> None:
+        """The run is over."""
+
+
+class _Buffered(Listener):
+    """Behind a bounded buffer: what it is too slow for is dropped, oldest first."""
+
+    def __init__(self, consumer: Any, consumers: Consumers, size: int) -> None:
+        super().__init__(consumer, consumers)
+        self.kept: deque[TraceEvent] = deque(maxlen=size)
+        self.taken = 0  # written by the consumer's side alone, `put` by the run's: so no lock is needed
+        self.put = 0
+        self.idle = True
+        self.ended = False
+        self.take = self._put
+
+    @property
+    def lost(self) -> int:
+        """See `Listener`."""
+        return self.put - self.taken - len(self.kept)
+
+    def _put(self, event: TraceEvent) -> None:
+        self.put += 1
+        self.kept.append(event)
+        if self.idle:
+            self.idle = False
+            self.wake()
+
+    def wake(self) -> None:
+        """Something lies in the buffer, or the run is over."""
+
+    def remove(self) -> None:
+        """Let it see nothing more, not even what lies in its buffer."""
+        super().remove()
+        self.ended = True
+        self.wake()
+
+    __call__ = remove
+
+
+class _InTask(_Buffered):
+    """An async consumer, in a task of its own."""
+
+    def __init__(self, consumer: Any, consumers: Consumers, size: int, engine: Engine) -> None:
+        super().__init__(consumer, consumers, size)
+        self._something = asyncio.Event()
+        self._ending = False
+        self._task = engine.loop.create_task(self._live(), name="hfg consumer", context=engine.context.copy())
+
+    def wake(self) -> None:
+        self._something.set()
+
+    async def _live(self) -> None:
+        while self.kept or not self.ended:
+            while self.kept and self._open:
+                event = self.kept.popleft()
+                self.taken += 1
+                try:
+                    await self.consumer(event)
+                except asyncio.CancelledError as error:
+                    if self._ending:
+                        return
+                    self.failed(error)  # of something of its own
+                except Exception as error:
+                    self.failed(error)
+            if not self._open:
+                return
+            self.idle = True
+            self._something.clear()
+            if not self.ended:
+                await self._something.wait()
+
+    async def end(self) -> None:
+        self.ended = True
+        self.wake()
+        await asyncio.wait({self._task}, timeout=_LAST_S if self._open else 0)
+        self._ending = True
+        self._task.cancel()
+        await asyncio.wait({self._task}, timeout=_CANCELLED_S)
+        if not self._task.done():
+            _LOGGER.error("a consumer of the trace was cancelled at the end of the run and did not end; it was left")
+        self._open = False
+
+
+class _InThread(_Buffered):
+    """A plain consumer that may block, on a thread of its own."""
+
+    def __init__(self, consumer: Any, consumers: Consumers, size: int, engine: Engine) -> None:
+        super().__init__(consumer, consumers, size)
+        self._something = threading.Event()
+        self._loop = engine.loop
+        self._thread = threading.Thread(target=self._live, name="hfg consumer", daemon=True)
+        self._thread.start()
+
+    def wake(self) -> None:
+        self._something.set()
+
+    def _live(self) -> None:
+        while True:
+            self._something.wait()
+            self._something.clear()
+            while self._open:
+                try:
+                    event = self.kept.popleft()
+                except IndexError:
+                    break
+                self.taken += 1
+                try:
+                    self.consumer(event)
+                except BaseException as error:  # whatever it is, nobody else hears of it
+                    self._open = False
+                    self._loop.call_soon_threadsafe(self._has_failed, error)
+                    return
+            self.idle = True
+            if self.kept:  # put while we were about to rest
+                self._something.set()
+            elif self.ended:
+                return
+
+    def _has_failed(self, error: BaseException) -> None:
+        self._open = True
+        self.failed(error)
+
+    async def end(self) -> None:
+        self.ended = True
+        self.wake()
+        until = time.monotonic() + _LAST_S
+        while self._thread.is_alive() and time.monotonic() < until:
+            await asyncio.sleep(0)
+            self._thread.join(0.001)
+        self._open = False
+
+
+class Consumers:
+    """All consumers of one run's trace."""
+
+    def __init__(self, listen: Callable[[Take | None], None], engine: Engine) -> None:
+        self._listen = listen
+        self._engine = engine
+        self._listeners: list[Listener] = []
+
+    def add(self, consumer: Any, size: int | None = None) -> Listener:
+        """Let a consumer see every event from now on.
+
+        Raises:
+          UsageError: it cannot take events, or its buffer has no place.
+        """
+        check_consumer(consumer)
+        if size is not None and (type(size) is not int or size < 1):
+            raise UsageError(f"size is how many events the consumer's buffer holds, 1 or more, got {size!r}")
+        listener: Listener
+        if inspect.iscoroutinefunction(consumer) or inspect.iscoroutinefunction(getattr(consumer, "__call__", None)):  # noqa: B004
+            listener = _InTask(consumer, self, size or _BUFFER, self._engine)
+        elif size is not None:
+            listener = _InThread(consumer, self, size, self._engine)
+        else:
+            listener = Listener(consumer, self)
+        self._listeners.append(listener)
+        self.changed()
+        return listener
+
+    def changed(self) -> None:
+        """One came or went. Nobody listens: nothing is built. One: it is called. Several: one after the other."""
+        self._listeners = [listener for listener in self._listeners if listener.is_open]
+        takes = tuple(listener.take for listener in self._listeners)
+        if len(takes) < 2:
+            self._listen(takes[0] if takes else None)
+            return
+
+        def tell(event: TraceEvent) -> None:
+            for take in takes:
+                take(event)
+
+        self._listen(tell)
+
+    async def end(self) -> None:
+        """The run is over: those behind a buffer take what lies in it, within a second."""
+        for listener in self._listeners:
+            await listener.end()

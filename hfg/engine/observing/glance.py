@@ -1,0 +1,93 @@
+"""A glance at a run: the few counts that a live table shows, cheap enough to take many times a second.
+
+`Statistics` says more and costs ten times as much. Everything that grows is a count since the run began, so whoever
+looks twice knows rates and shares. Stands on `statistics`.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from hfg.engine.observing.measuring import doing
+
+if TYPE_CHECKING:
+    from hfg.engine.face.run import Run
+
+__all__ = ["Glance", "NodeGlance", "glance"]
+
+
+class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
+    """One node.
+
+    Attributes:
+      path: where it stands in the graph.
+      group: where it runs.
+      done: firings and slot calls so far.
+      busy_s: for how long its code kept its group busy, on the machine's clock, since somebody looks.
+      queued: untaken tokens in front of it.
+      failed: failed firings and calls so far.
+      active: A(v).
+      doing: "working", or what it waits for (`NodeStatistics.waiting`).
+    """
+
+    path: str
+    group: str
+    done: int
+    busy_s: float
+    queued: int
+    failed: int
+    active: bool
+    doing: str
+
+
+class Glance(msgspec.Struct, frozen=True):
+    """What a run is doing.
+
+    Attributes:
+      graph: its name.
+      outcome: "running", "paused", or how it ended.
+      duration_s: since it began, on its clock; 0 before.
+      machine_s: now, on the machine's monotonic clock.
+      nodes: in order of adding, those inside iterating subgraphs too.
+    """
+
+    graph: str
+    outcome: str
+    duration_s: float
+    machine_s: float
+    nodes: list[NodeGlance]
+
+
+def glance(run: Run) -> Glance:
+    """Look at a run; to be called on its loop. The first glance begins to measure, as `run.statistics()` does."""
+    engine = run._engine
+    if engine.measuring is None:
+        run.statistics()
+    now = engine.now() if engine.ended_at is None else engine.ended_at
+    nodes = []
+    for worker in engine.all_workers():
+        if worker.type is None or worker.scope is not None:
+            continue
+        meter = worker.meter
+        nodes.append(
+            NodeGlance(
+                worker.path,
+                worker.group.name,
+                worker.firings + worker.call_number,
+                0.0 if meter is None else meter.busy_s,
+                sum([edge.untaken for edge in (*worker.in_edges, *worker.slot_edges)]),
+                worker.failed + worker.calls_failed,
+                worker.active,
+                doing(worker),
+            )
+        )
+    return Glance(
+        graph=run.graph.name,
+        outcome="paused" if run.paused and engine.outcome == "running" else engine.outcome,
+        duration_s=now - engine.started_at if engine.core.started else 0.0,
+        machine_s=time.monotonic(),
+        nodes=nodes,
+    )

@@ -1,0 +1,274 @@
+"""Measuring a run while it runs, for its statistics (rule R7).
+
+Counts exist anyway. Times are measured from the first time somebody asks: the code of the nodes by `meters`, and what
+nodes wait for by looking at all of them, twenty times a second; under a virtual clock whenever time passes, which is
+exact. Stands on `meters` and `statistics`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from hfg.engine.fusion import steps
+from hfg.engine.model.worker import (
+    BACKOFF,
+    DISABLED,
+    ENDED,
+    FULL,
+    FUTILE,
+    RATE,
+    RESTING,
+    STARTING,
+    TORN_DOWN,
+    UNREADY,
+    UNWIRED,
+    Worker,
+)
+from hfg.engine.observing.meters import Distribution, Meter
+from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
+from hfg.engine.runtime.virtual import VirtualTimeLoop
+
+if TYPE_CHECKING:
+    from hfg.engine.runtime.engine import Engine
+
+__all__ = ["Measuring", "doing"]
+
+_LOOK_EVERY_S = 0.05
+_LOOKS_SHARE = 0.01  # of the loop's time at most
+_RATE_OVER_S = 1.0
+
+
+def doing(worker: Worker) -> str:
+    """Say what a node does or waits for now, in the words of `NodeStatistics.waiting`."""
+    if worker.busy:
+        return "working"
+    blocked = worker.blocked
+    if worker.queued and not blocked & TORN_DOWN:
+        return "turn"
+    if blocked:
+        word = next((word for bit, word in _BLOCKED if blocked & bit), "ended")
+        return "signal" if word == "unconnected" and worker.process is None else word
+    if worker.inputs.missing:
+        for edge in worker.live_inputs:
+            if not edge.untaken:
+                return f"input {edge.port_name}"
+    if worker.outputs.missing:
+        for name, edges in zip(worker.out_names, worker.out_edges, strict=False):
+            if any(edge.held for edge in edges):
+                return f"output {name}"
+    return "turn"
+
+
+_BLOCKED = (
+    (DISABLED, "disabled"),
+    (ENDED, "ended"),
+    (STARTING, "start"),
+    (BACKOFF, "restart"),
+    (RESTING, "gate"),
+    (FULL, "queue"),
+    (RATE, "rate"),
+    (UNREADY, "ready"),
+    (UNWIRED, "unconnected"),
+    (FUTILE, "ended"),
+)
+
+
+class Measuring:
+    """Measures a run from now on, until it ends."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._began = self._looked = engine.now()
+        self._began_on_machine = monotonic()
+        self._ended_on_machine: float | None = None
+        self._fold_at = 0.0
+        self._mark_at = self._before_at = self._began
+        self._marks: dict[Any, int] = {}
+        self._before: dict[Any, int] = {}
+        self._timer: Any = None
+        self._mark_edges()
+        self._before = self._marks
+        for worker in self._workers():
+            self._meter(worker)
+        loop: Any = engine.loop
+        if isinstance(loop, VirtualTimeLoop):
+            loop.watchers.append(self._passed)
+        else:
+            self._timer = loop.call_later(_LOOK_EVERY_S, self._look, context=engine.context)
+
+    def _workers(self) -> Iterator[Worker]:
+        return (worker for worker in self._engine.all_workers() if worker.type is not None and worker.scope is None)
+
+    def _meter(self, worker: Worker) -> Meter:
+        meter: Meter | None = worker.meter
+        if meter is None:
+            meter = Meter(worker)
+            meter.measure()
+            if worker.core.started:
+                steps.choose(worker)
+        return meter
+
+    def refit(self, workers: Iterable[Worker]) -> None:
+        """These workers have other nodes now: from here on the code of those is measured."""
+        for worker in workers:
+            if worker.meter is not None:
+                worker.meter.refit()
+                steps.choose(worker)
+
+    def end(self) -> None:
+        """The run is over."""
+        if self._ended_on_machine is not None:
+            return
+        self._ended_on_machine = monotonic()
+        loop: Any = self._engine.loop
+        if self._timer is not None:
+            self._timer.cancel()
+        else:
+            loop.watchers.remove(self._passed)
+
+    def pumped(self) -> None:
+        """A slice of the pump is over: twenty times a second what was measured is summed up."""
+        if monotonic() >= self._fold_at:
+            began = monotonic()
+            for worker in self._workers():
+                self._fold(worker)
+            now = monotonic()
+            self._fold_at = now + max(_LOOK_EVERY_S, (now - began) / _LOOKS_SHARE)
+
+    def _fold(self, worker: Worker) -> Meter:
+        meter = self._meter(worker)
+        meter.fold()
+        return meter
+
+    # --- looking ----------------------------------------------------------------------------------------------------
+
+    def _look(self) -> None:
+        """On the machine's clock: what a node does now it has done since the last look."""
+        began = monotonic()
+        now = self._engine.now()
+        self._passed(now - self._looked)
+        self._looked = now
+        cost = monotonic() - began
+        pause = max(_LOOK_EVERY_S, cost / _LOOKS_SHARE)
+        self._timer = self._engine.loop.call_later(pause, self._look, context=self._engine.context)
+
+    def _passed(self, seconds: float) -> None:
+        """So much time has passed on the run's clock."""
+        if self._engine.core.over:
+            return
+        for worker in self._workers():
+            meter = self._meter(worker)
+            what = doing(worker)
+            if what != "working":
+                meter.waiting[what] = meter.waiting.get(what, 0.0) + seconds
+            if worker.active:
+                meter.active += seconds
+        now = self._engine.now()
+        if now - self._mark_at >= _RATE_OVER_S:
+            self._before_at, self._mark_at = self._mark_at, now
+            for worker in self._workers():
+                meter = self._meter(worker)
+                meter.before, meter.mark = meter.mark, worker.firings + worker.call_number
+            self._before = self._marks
+            self._mark_edges()
+
+    def _mark_edges(self) -> None:
+        self._marks = {edge: edge.sent for edge in self._edges()}
+
+    def _edges(self) -> Iterator[Any]:
+        return (edge for core in self._engine.all_cores() for edge in core.edges)
+
+    # --- the snapshot -----------------------------------------------------------------------------------------------
+
+    def snapshot(self) -> Statistics:
+        """Say what the run has done so far."""
+        engine = self._engine
+        core = engine.core
+        now = engine.now() if engine.ended_at is None else engine.ended_at
+        machine = (self._ended_on_machine or monotonic()) - self._began_on_machine
+        passed = now - self._began
+        over = now - self._before_at
+        nodes: dict[str, NodeStatistics] = {}
+        parts: dict[str, list[tuple[Worker, NodeStatistics, float]]] = {name: [] for name in engine.groups}
+        for worker in self._workers():
+            node, busy = self._node(worker, passed, machine, over)
+            nodes[worker.path] = node
+            parts.setdefault(worker.group.name, []).append((worker, node, busy))
+        return Statistics(
+            outcome=engine.outcome,
+            time=now,
+            duration_s=now - engine.started_at,
+            measured_s=passed,
+            machine_s=machine,
+            firings=sum(node.firings for node in nodes.values()),
+            nodes=nodes,
+            edges={edge.label: self._edge(edge, over) for edge in self._edges()},
+            groups={name: _group(members, machine) for name, members in parts.items()},
+            lost_activity=core.lost_activity,
+            errors=[str(error) for error in core.errors],
+        )
+
+    def _node(self, worker: Worker, passed: float, machine: float, over: float) -> tuple[NodeStatistics, float]:
+        meter = self._fold(worker)
+        busy = meter.busy_s
+        pieces = worker.firings + worker.call_number
+        node = NodeStatistics(
+            group=worker.group.name,
+            firings=worker.firings,
+            processed=worker.firings - worker.silent - worker.end_firings,
+            silent=worker.silent,
+            calls=worker.call_number,
+            failed=worker.failed + worker.calls_failed,
+            restarts=worker.restarts,
+            active=worker.active,
+            ended=bool(worker.blocked & ENDED),
+            rate_hz=_per_second(pieces - meter.before, over),
+            busy=_times(meter.spent),
+            busy_share=_share(busy, machine),
+            latency=_times(meter.delays),
+            doing=doing(worker),
+            waiting=dict(meter.waiting),
+            active_share=_share(meter.active, passed),
+            queued=sum(edge.untaken for edge in (*worker.in_edges, *worker.slot_edges)),
+        )
+        return node, busy
+
+    def _edge(self, edge: Any, over: float) -> EdgeStatistics:
+        return EdgeStatistics(
+            sent=edge.sent,
+            rate_hz=_per_second(edge.sent - self._before.get(edge, 0), over),
+            dropped=edge.dropped,
+            drained=edge.drained,
+            untaken=edge.untaken,
+            deepest=max(edge.deepest, int(edge.sent > edge.dropped + edge.drained)),  # short ways count from two on
+            capacity=getattr(edge, "capacity", None),
+            grown=getattr(edge, "grown", 0),
+        )
+
+
+def _times(of: Distribution) -> Times:
+    median, slow = of.percentiles()
+    return Times(of.count, of.total, of.mean, of.longest, median, slow, tuple(of.newest))
+
+
+def _group(members: list[tuple[Worker, NodeStatistics, float]], machine: float) -> GroupStatistics:
+    busy = sum(seconds for _, _, seconds in members)
+    return GroupStatistics(
+        nodes=len(members),
+        firings=sum(node.firings for _, node, _ in members),
+        calls=sum(node.calls for _, node, _ in members),
+        rate_hz=sum(node.rate_hz for _, node, _ in members),
+        busy_s=busy,
+        busy_share=_share(busy, machine),
+        queued=sum(worker.queued for worker, _, _ in members),
+    )
+
+
+def _share(part: float, whole: float) -> float:
+    return min(1.0, part / whole) if whole > 0 else 0.0
+
+
+def _per_second(count: int, seconds: float) -> float:
+    return count / seconds if seconds > 0 else 0.0

@@ -1,0 +1,111 @@
+"""What a run has done, in numbers: frozen structs for people, tests and `--json`. Stands on `core`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from hfg.engine.model.core import Core
+from hfg.engine.model.worker import ENDED
+
+__all__ = ["EdgeReport", "NodeReport", "Report", "edge_reports", "node_reports"]
+
+
+class NodeReport(msgspec.Struct, frozen=True):
+    """One node.
+
+    Attributes:
+      firings: firings, silent ones and the one that ended it included.
+      processed: firings in which the function ran.
+      silent: firings without the function (F4).
+      calls: slot calls.
+      failed: failed firings and calls.
+      restarts: how often X1 restarted it.
+      active: A(v).
+      ended: whether it has sent END.
+    """
+
+    firings: int
+    processed: int
+    silent: int
+    calls: int
+    failed: int
+    restarts: int
+    active: bool
+    ended: bool
+
+
+class EdgeReport(msgspec.Struct, frozen=True):
+    """One edge.
+
+    Attributes:
+      sent: tokens put on it, markers and dropped ones included.
+      dropped: discarded, for whatever reason.
+      drained: processed without a firing because the consumer has ended (F12).
+      untaken: what still lies on it.
+      grown: places that F8 added.
+    """
+
+    sent: int
+    dropped: int
+    drained: int
+    untaken: int
+    grown: int
+
+
+class Report(msgspec.Struct, frozen=True):
+    """How a run went.
+
+    Attributes:
+      outcome: "done", "stopped" (slot `stop`, or the block was left), "until", "cancelled", "failed", "stalled",
+        "aborted".
+      duration_s: on the run's clock.
+      firings: all firings of all nodes.
+      nodes: by path.
+      edges: by label, "source -> target".
+      outputs: what came out of the graph's own outputs, where nobody read them.
+      errors: failures that did not end the run (X1, X3), as sentences.
+      lost_activity: how often activity was discarded with nobody to give it back to (A8).
+    """
+
+    outcome: str
+    duration_s: float
+    firings: int
+    nodes: dict[str, NodeReport]
+    edges: dict[str, EdgeReport]
+    outputs: dict[str, list[Any]]
+    errors: list[str]
+    lost_activity: int
+
+
+def node_reports(core: Core) -> dict[str, NodeReport]:
+    """Count what every running node has done so far."""
+    return {
+        worker.path: NodeReport(
+            firings=worker.firings,
+            processed=worker.firings - worker.silent - worker.end_firings,
+            silent=worker.silent,
+            calls=worker.call_number,
+            failed=worker.failed + worker.calls_failed,
+            restarts=worker.restarts,
+            active=worker.active,
+            ended=bool(worker.blocked & ENDED),
+        )
+        for worker in core.workers
+        if worker.node is not None and worker.scope is None
+    }
+
+
+def edge_reports(core: Core) -> dict[str, EdgeReport]:
+    """Count what every edge has carried so far."""
+    return {
+        edge.label: EdgeReport(
+            sent=edge.sent,
+            dropped=edge.dropped,
+            drained=edge.drained,
+            untaken=edge.untaken,
+            grown=getattr(edge, "grown", 0),
+        )
+        for edge in core.edges
+    }

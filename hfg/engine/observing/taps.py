@@ -1,0 +1,295 @@
+"""Taps: looking at what passes a port or an edge while the graph runs.
+
+A tap keeps the newest tokens in a buffer of its own. The graph never waits for it; what it is too slow for is skipped
+and counted. Only the node in front of what is tapped leaves its shortest way. Stands on `ports`, `relays` and `steps`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from hfg.engine.fusion import steps
+from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.runtime import ports, relays
+from hfg.engine.runtime.places import Ends, behind, labels_at, place_of
+from hfg.errors import GraphError, UsageError
+from hfg.graph.edges import Edge as DrawnEdge
+from hfg.graph.naming import suggest
+from hfg.nodetype import Node
+from hfg.ports import InnerSource, InnerTarget, Port
+from hfg.token import Token
+
+if TYPE_CHECKING:
+    from hfg.engine.runtime.engine import Engine
+
+__all__ = ["Tap", "Taps"]
+
+_SIZE = 100
+
+Look = Callable[[Token[Any]], None]
+
+
+class Tap:
+    """Tokens as they pass a port or an edge of a run, markers too: an async iterator that ends with the run.
+
+    It looks from the moment it is made until `close()`, the end of a `with` block, or until nobody holds it any more.
+    """
+
+    def __init__(self, buffer: _Buffer, max_rate_hz: float | None, detach: Callable[[], None]) -> None:
+        self._buffer = buffer
+        self._detach = detach
+        self._pause_s = 1.0 / max_rate_hz if max_rate_hz else 0.0
+        self._next_at = float("-inf")
+        self._given = 0
+
+    @property
+    def seen(self) -> int:
+        """How many tokens have passed."""
+        return self._buffer.seen
+
+    @property
+    def latest(self) -> Token[Any] | None:
+        """The newest token that passed, iterated over or not; None before the first."""
+        return self._buffer.latest
+
+    @property
+    def skipped(self) -> int:
+        """How many tokens were not iterated over and never will be."""
+        return self._buffer.seen - self._given - len(self._buffer.kept)
+
+    def close(self) -> None:
+        """Look no more; the iteration ends behind what is kept. Does nothing the second time."""
+        self._detach()
+        self._buffer.end()
+
+    def __enter__(self) -> Tap:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+    def __aiter__(self) -> Tap:
+        return self
+
+    async def __anext__(self) -> Token[Any]:
+        buffer = self._buffer
+        while not buffer.kept:
+            if buffer.over.is_set():
+                raise StopAsyncIteration
+            buffer.more.clear()
+            await buffer.more.wait()
+        if self._pause_s:
+            await self._pause()
+        self._given += 1
+        return buffer.kept.popleft()
+
+    async def _pause(self) -> None:
+        """Keep to the rate; meanwhile newer tokens take the place of older ones. At the end of the run, do not wait."""
+        loop = asyncio.get_running_loop()
+        left = self._next_at - loop.time()
+        if left > 0:
+            try:
+                async with asyncio.timeout(left):
+                    await self._buffer.over.wait()
+            except TimeoutError:
+                pass
+        self._next_at = loop.time() + self._pause_s
+
+    def __del__(self) -> None:
+        self._detach()
+
+
+class _Buffer:
+    """What a tap keeps; held by what it looks at, while the tap is held by whoever reads it."""
+
+    def __init__(self, size: int) -> None:
+        self.kept: deque[Token[Any]] = deque(maxlen=size)
+        self.seen = 0
+        self.latest: Token[Any] | None = None
+        self.more = asyncio.Event()
+        self.over = asyncio.Event()
+
+    def put(self, token: Token[Any]) -> None:
+        """A token passes."""
+        self.seen += 1
+        self.latest = token
+        self.kept.append(token)
+        self.more.set()
+
+    def end(self) -> None:
+        """No more will pass."""
+        self.over.set()
+        self.more.set()
+
+
+class Taps:
+    """All taps of one run."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._buffers: dict[_Buffer, tuple[Any, list[tuple[Any, Look]]]] = {}  # what each looks at, and where that is
+        self._looks: dict[Any, list[Look]] = {}  # by edge, event, or (worker, slot) for edges still to come
+
+    def add(self, what: Any, size: int | None, max_rate_hz: Any) -> Tap:
+        """Begin to look at a port or an edge, given itself or by path.
+
+        Raises:
+          UsageError: nothing passes there, or the size or the rate cannot be.
+          GraphError: there is no such path.
+        """
+        if size is not None and (type(size) is not int or size < 1):
+            raise UsageError(f"size is how many tokens a tap keeps, 1 or more, got {size!r}")
+        if max_rate_hz is not None and not (isinstance(max_rate_hz, int | float) and max_rate_hz > 0):
+            raise UsageError(f"max_rate_hz is how many tokens a second a tap gives at most, got {max_rate_hz!r}")
+        what = self._outside(what) or place_of(self._engine.flat, what)
+        places = self._places(what)
+        buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1))
+        self._attach(buffer, what, places)
+        if self._engine.core.over:
+            buffer.end()
+        return Tap(buffer, max_rate_hz, partial(self._remove, buffer))
+
+    def find_again(self, swapped: Mapping[Any, Any]) -> None:
+        """The graph was edited: what is looked at may be elsewhere, or nowhere for now (R4).
+
+        Args:
+          swapped: nodes that were replaced, and by what.
+        """
+        for buffer, (where, _) in list(self._buffers.items()):
+            what = behind(where, swapped)
+            self._remove(buffer)
+            try:
+                places = self._places(what)
+            except (GraphError, UsageError):
+                places = []
+            self._attach(buffer, what, places)
+
+    def _attach(self, buffer: _Buffer, what: Any, places: list[tuple[Any, list[Any]]]) -> None:
+        looks = [(place, _first_live(group, place, buffer.put) if group else buffer.put) for place, group in places]
+        self._buffers[buffer] = (what, looks)
+        for place, look in looks:
+            self._looks.setdefault(place, []).append(look)
+            self._install(place)
+
+    def adopt(self, edge: Any) -> None:
+        """An edge into a slot was made while the graph runs: whoever looks at the slot looks at it too."""
+        for look in self._looks.get((edge.target, edge.port_name), ()):
+            self._looks.setdefault(edge, []).append(look)
+            self._install(edge)
+
+    def end(self) -> None:
+        """The run is over."""
+        for buffer in self._buffers:
+            buffer.end()
+
+    def _remove(self, buffer: _Buffer) -> None:
+        gone = [look for _, look in self._buffers.pop(buffer, (None, []))[1]]
+        for place in list(self._looks) if gone else ():
+            left = [look for look in self._looks[place] if look not in gone]
+            if len(left) != len(self._looks[place]):
+                self._looks[place] = left
+                self._install(place)
+                if not left:
+                    del self._looks[place]
+
+    def _install(self, place: Any) -> None:
+        """Let the engine see who looks at an edge or event now."""
+        looks = tuple(self._looks[place])
+        if isinstance(place, RunningEvent):
+            self._tell_event(place)
+        elif not isinstance(place, tuple):
+            place.tap = looks[0] if len(looks) == 1 else partial(_all_of, looks) if looks else None
+            source: Worker = place.source
+            if source.core.started and not self._engine.core.over:
+                steps.choose(source)
+            for event in source.events.values():
+                if place in event.edges:
+                    self._tell_event(event)
+
+    def _tell_event(self, event: RunningEvent) -> None:
+        looks = tuple(self._looks.get(event, ()))
+        event.tap = looks if looks or any(edge.tap is not None for edge in event.edges) else None
+        if event.tap is not None and event.port is not None and event.port._observers is None:
+            event.port._observe([])  # the short way of `trigger` asks for no more
+
+    # --- finding ----------------------------------------------------------------------------------------------------
+
+    def _outside(self, path: Any) -> Any:
+        """An edge by which signals come from outside the graph."""
+        edges = (edge for core in self._engine.all_cores() for edge in core.outside.values())
+        return next((edge for edge in edges if edge.label == path), None)
+
+    def _edges(self) -> Iterator[Any]:
+        return (edge for core in self._engine.all_cores() for edge in core.edges)
+
+    def _places(self, what: Any) -> list[tuple[Any, list[Any]]]:
+        """Where to look: edges, events, slots; with an edge come those that carry the same tokens."""
+        if isinstance(what, Node):
+            kind = what._type
+            names = dict.fromkeys([*kind.inputs, *kind.outputs, *kind.events, *kind.slots])
+            raise UsageError(
+                f'"{what.place.path}" is a node, and a tap looks at a port or an edge: name one of its ports; '
+                f"{suggest('', names)}"
+            )
+        if any(what is edge for edge in self._edges()):
+            return [(what, [])]
+        if not isinstance(what, Port | InnerSource | InnerTarget | DrawnEdge | Ends):
+            raise UsageError(f"a tap looks at a port or an edge of this run, given itself or by path, got {what!r}")
+        if isinstance(what, Port) and (what.graph is None or what.graph._root is not self._engine.flat.graph):
+            raise UsageError(
+                f'"{what.path}" is in no graph that runs here, so no token passes there: '
+                f'this is a run of graph "{self._engine.flat.graph.name}"'
+            )
+        if isinstance(what, Port) and what.kind == "event":
+            events = relays.events_behind(what) if relays.is_relay(what) else [what]
+            return [(event, []) for event in map(self._running, events) if event is not None]
+        labels = set(labels_at(self._engine.flat, what))
+        carrying: dict[str, list[Any]] = {}
+        for edge in self._edges():
+            if edge.label in labels:
+                carrying.setdefault(edge.label.partition(" -> ")[0], []).append(edge)
+        places = [(edge, group if len(group) > 1 else []) for group in carrying.values() for edge in group]
+        if isinstance(what, Port) and what.kind == "slot" and not relays.is_relay(what):
+            worker = self._worker(what)
+            places.append(((worker, what.name), []))
+            edge = worker.core.outside.get((worker.index, what.name))
+            if edge is not None:
+                places.append((edge, []))
+        if not places:
+            name = what.path if isinstance(what, Port | InnerSource | InnerTarget) else _label(what)
+            raise UsageError(f'"{name}" has no edge in this run, so no token passes there: connect it before the run')
+        return places
+
+    def _running(self, event: Any) -> RunningEvent | None:
+        worker = self._worker(event)
+        return worker.events.get(event.name) if worker.node is None else ports.bind_event(worker, event.name)
+
+    def _worker(self, port: Any) -> Worker:
+        if port.node is self._engine.flat.graph:
+            boundary = self._engine.core.boundary
+            assert boundary is not None
+            return boundary
+        return next(worker for worker in self._engine.all_workers() if worker.node is port.node)
+
+
+def _label(edge: Any) -> str:
+    return f"{edge.source.path} -> {edge.target.path}" if isinstance(edge, Ends) else str(edge.label)
+
+
+def _first_live(group: list[Any], edge: Any, put: Look) -> Look:
+    """Fan-out carries the same token on each edge: look at the first that is live only."""
+
+    def look(token: Token[Any]) -> None:
+        if edge is next((one for one in group if one.live), None):
+            put(token)
+
+    return look
+
+
+def _all_of(looks: tuple[Look, ...], token: Token[Any]) -> None:
+    for look in looks:
+        look(token)

@@ -1,0 +1,185 @@
+"""What follows when A(v) changes: hooks, automatic events, time-outs, gates, subgraphs (rules A9, A11, A12, G2).
+
+And reset (A14).
+
+Only workers marked `watched` come here. Stands on `sending`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import msgspec
+
+from hfg.engine.model.core import Core
+from hfg.engine.model.scopes import Scope
+from hfg.engine.model.worker import AMID_NOTHING, RATE, RESTING, Worker
+from hfg.engine.rules.agenda import block, consider, must_wait, unblock
+from hfg.engine.rules.modifiers import automatic, set_active, touch
+from hfg.engine.rules.sending import flush_automatic, tell, trigger
+
+__all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
+
+
+def changed(worker: Worker, active: bool) -> None:
+    """A(v) has just become `active`."""
+    core = worker.core
+    automatic(worker, "activated" if active else "deactivated")
+    _time_out_later(worker, active)
+    gate_changed(worker.gates)
+    if worker.scopes:
+        touch(core, worker.scopes)
+        for scope in worker.scopes:
+            if scope.gates:
+                _look_at(scope)
+    if worker.has_hooks:
+        _call_hook(worker, "on_activated" if active else "on_deactivated")
+    if worker.busy in AMID_NOTHING:
+        tell(worker)
+
+
+def _call_hook(worker: Worker, name: str) -> None:
+    hook = worker.node._hook(name)
+    if hook is None:
+        return
+
+    def done(_result: Any, error: BaseException | None) -> None:
+        if error is not None:
+            worker.core.upstairs.fail(worker, f"{name}()", error, answer=False)
+
+    worker.core.host.execute_aside(worker, hook, done)
+
+
+def _time_out_later(worker: Worker, active: bool) -> None:
+    """A12: the time runs from the change from 0 to 1; the timer counts only if the event leads somewhere."""
+    if worker.active_timer is not None:
+        worker.active_timer.cancel()
+        worker.active_timer = None
+    limit = worker.active_for_s
+    if active and limit is not None:
+        core = worker.core
+        leads = worker.timeout_leads_somewhere()
+        worker.active_timer = core.host.call_at(core.now() + limit, lambda: _time_out(worker), counts=leads)
+
+
+def _time_out(worker: Worker) -> None:
+    worker.active_timer = None
+    event = worker.events.get("timeout")
+    if event is None:
+        return
+    trigger(event, stamp=worker.core.now(), extend_right=False)
+    worker.right = False  # behind the sending, which may have given it (A3)
+    scopes_changed(worker.core)
+    if worker.busy in AMID_NOTHING:  # else after the firing (A9)
+        flush_automatic(worker)
+
+
+def gate_changed(gates: Any) -> None:
+    """A11: sources rest while the state is inactive; the others look when they fire."""
+    for gate in gates:
+        for worker in gate.workers:
+            if worker.is_source:
+                rest(worker)
+
+
+def rest(worker: Worker) -> None:
+    """Let a source rest, or go on, as its gates say now."""
+    if worker.rate_timer is not None:
+        worker.rate_timer.cancel()
+        worker.rate_timer = None
+        worker.blocked &= ~RATE
+    if any(gate.idle_rate_hz is None and not gate.state.active for gate in worker.gates_over):
+        block(worker, RESTING)
+        return
+    unblock(worker, RESTING)
+    if worker.placed and must_wait(worker):  # throttled from now on (D7)
+        worker.placed = False
+    else:
+        consider(worker)
+
+
+# --- subgraphs ------------------------------------------------------------------------------------------------------
+
+
+def scopes_changed(core: Core) -> None:
+    """G2: derive A(subgraph) anew for all that were touched, then tell it.
+
+    Inner ones first, the last of those side by side.
+    """
+    while core.dirty_scopes:
+        for scope in core.dirty_scopes:
+            _look_at(scope)
+        scope = max(core.dirty_scopes, key=_index)
+        core.dirty_scopes.remove(scope)
+        if scope.told == scope.active:
+            continue
+        scope.told = active = scope.active
+        owner = scope.worker
+        assert owner is not None
+        # the scope's worker shows A(subgraph), but nothing is transferred by itself
+        owner.active = active
+        owner.node._active = active
+        automatic(owner, "activated" if active else "deactivated")
+        _time_out_later(owner, active)
+        flush_automatic(owner)
+
+
+def _look_at(scope: Scope) -> None:
+    """Derive A(subgraph); what it gates follows at once."""
+    active = scope.derive()
+    if active != scope.active:
+        scope.active = active
+        gate_changed(scope.gates)
+
+
+def _index(scope: Scope) -> int:
+    return scope.index
+
+
+def deactivate_inside(scope: Scope, cause: Literal["sent", "slot"]) -> None:
+    """Take all activity from the inside: of nodes, and of tokens under way."""
+    if not scope.watched:
+        scope.find_inner_edges()
+    assert scope.worker is not None
+    core = scope.worker.core
+    for edge in scope.inner_edges:
+        _strip(edge, also_taking=False)
+        touch(core, edge.target.scopes)
+    for worker in scope.members:
+        _forget(worker)
+        set_active(worker, False, cause)
+        touch(core, worker.scopes)
+    touch(core, (scope,))
+
+
+def _forget(worker: Worker) -> None:
+    """Take the right of A3, and what the tokens that were drained are to do (F12)."""
+    worker.right = False
+    if worker.deferred:
+        worker.deferred = [0] * len(worker.deferred)
+
+
+def _strip(edge: Any, *, also_taking: bool) -> None:
+    """Set the modifiers of what lies on an edge to 0 (A14): those of +1, also those of -1."""
+    queue = edge.queue if hasattr(edge, "queue") else [edge.token] if edge.token is not None else []
+    for position, token in enumerate(queue):
+        if token.activity > 0 or (also_taking and token.activity):
+            queue[position] = msgspec.structs.replace(token, activity=0)
+    if not hasattr(edge, "queue") and queue:
+        edge.token = queue[0]
+
+
+def reset_activity(core: Core) -> None:
+    """A14: all A(v) := 0, modifiers := 0, the right of A3 ends, then `start` is triggered."""
+    for edge in core.edges:
+        _strip(edge, also_taking=True)
+    for worker in core.workers:
+        _forget(worker)
+        if worker.scope is None:
+            set_active(worker, False, "reset")
+    touch(core, core.scopes)
+    scopes_changed(core)
+    assert core.boundary is not None
+    start = core.boundary.events.get("start")
+    if start is not None:
+        trigger(start, explicit=1)

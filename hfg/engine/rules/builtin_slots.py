@@ -1,0 +1,53 @@
+"""What the automatic slots of every node do: enable, disable, activate, deactivate, reset (rules A7, A9).
+
+And the graph's own: stop, abort (A10).
+
+Stands on `lifecycle` and `sending`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules import lifecycle, subgraphs
+from hfg.engine.rules.modifiers import set_active
+from hfg.errors import Aborted
+from hfg.token import Token
+
+__all__ = ["run"]
+
+
+def run(worker: Worker, name: str, token: Token[Any], then: Callable[[], None]) -> None:
+    """Do what the slot says; `then` follows, at once unless setup or teardown waits."""
+    host = worker.core.host
+    if worker.scope is not None:
+        subgraphs.run_slot(worker.scope, name, then)
+    elif name == "activate":
+        set_active(worker, True, "slot")
+        then()
+    elif name == "deactivate":
+        worker.right = False
+        set_active(worker, False, "slot")
+        then()
+    elif name == "enable":
+        lifecycle.enable(worker, then)
+    elif name == "disable":
+        lifecycle.disable(worker)
+        then()
+    elif name == "reset":
+        lifecycle.reset(worker, then)
+    elif name == "stop":
+        then()
+        host.finish("stopped", None)
+    else:
+        caller = _caller(worker)
+        then()
+        reason = "" if token.value is None else f": {token.value!r:.200}"
+        host.finish("aborted", Aborted(f'the graph\'s slot "abort" was called by "{caller}"{reason}'))
+
+
+def _caller(worker: Worker) -> str:
+    edge = worker.call_edge
+    return edge.label.split(" -> ")[0] if edge is not None else "outside"

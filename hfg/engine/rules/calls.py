@@ -1,0 +1,126 @@
+"""Slot calls (rules F6, F9, A6, P8). Stands on `releasing`; a node's code is run by the host."""
+
+from __future__ import annotations
+
+from types import CoroutineType
+from typing import Any
+
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules import builtin_slots
+from hfg.engine.rules.agenda import freed, idle_again
+from hfg.engine.rules.modifiers import derive_scopes, lose, receive, touch
+from hfg.engine.rules.releasing import release
+from hfg.engine.rules.sending import flush_automatic
+from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.trace import CallEnded, CallStarted, ParameterSet, TokenTaken
+
+__all__ = ["await_call", "call", "finish_call", "refuse_coroutine", "set_parameter"]
+
+
+def call(worker: Worker) -> None:
+    """Take the oldest waiting slot token and run its handler (F9)."""
+    core = worker.core
+    assert worker.calls is not None
+    edge = worker.calls.popleft()
+    if worker.placed and worker.ahead:
+        worker.ahead -= 1
+    if type(edge) is SyncEdge:
+        token = edge.token
+        edge.token = None
+        assert token is not None
+    else:
+        token = edge.queue.popleft()
+    worker.busy = "call"
+    worker.call_number += 1
+    worker.ticket += 1
+    worker.call_edge = edge
+    worker.stamp = token.stamp
+    name = edge.port_name
+    if core.trace is not None:
+        now = core.now()
+        core.trace(CallStarted(now, worker.path, worker.call_number, name, edge.label))
+        core.trace(TokenTaken(now, edge.label, token))
+    if token.activity:
+        if worker.scopes:
+            touch(core, worker.scopes)
+        if worker.scope is None:
+            receive(worker, (token.activity,))
+        elif token.activity > 0:  # a subgraph has no activity but that of its nodes (G2)
+            lose(edge)
+    if type(edge) is EventEdge:
+        freed(edge)
+    if edge.target_kind == "parameter":
+        set_parameter(worker, name, token.value)
+        finish_call(worker, "done")
+        return
+    handler = worker.handlers.get(name)
+    if handler is None:
+        builtin_slots.run(worker, name, token, lambda: finish_call(worker, "done"))
+        derive_scopes(core)  # behind what `activate` does (A7)
+        return
+    derive_scopes(core)
+    ticket = worker.ticket
+
+    def done(result: Any, error: BaseException | None) -> None:
+        if worker.ticket != ticket:
+            return
+        if type(result) is CoroutineType:
+            if not worker.group.threaded:
+                await_call(worker, name, result)
+                return
+            error = refuse_coroutine(worker, result)
+        if error is None:
+            finish_call(worker, "done")
+        else:
+            worker.core.upstairs.fail_call(worker, name, error)
+
+    core.host.execute(worker, handler, (token,), done)
+
+
+def await_call(worker: Worker, name: str, coroutine: Any) -> None:
+    """A handler of a short step turned out to wait."""
+
+    def done(_result: Any, error: BaseException | None) -> None:
+        if error is None:
+            finish_call(worker, "done")
+        else:
+            worker.core.upstairs.fail_call(worker, name, error)
+
+    worker.core.host.drive(worker, coroutine, done)
+
+
+def refuse_coroutine(worker: Worker, coroutine: Any) -> TypeError:
+    """Close what came from a thread, where nothing can await it, and say what to do."""
+    coroutine.close()
+    return TypeError(
+        f'it gave back a coroutine, but its group "{worker.group.name}" is a thread and async code runs on the loop; '
+        "write `async def` and leave out group="
+    )
+
+
+def finish_call(worker: Worker, outcome: Any) -> None:
+    """The automatic events follow (A9), then the call is over: an O->S token is processed (F6)."""
+    core = worker.core
+    derive_scopes(core)
+    flush_automatic(worker)
+    if core.trace is not None:
+        core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
+    worker.busy = "over"
+    edge = worker.call_edge
+    worker.call_edge = None
+    if type(edge) is SyncEdge:
+        release((edge,))
+    worker.right = False
+    worker.stamp = None
+    idle_again(worker)
+
+
+def set_parameter(worker: Worker, name: str, value: Any) -> None:
+    """Give a parameter a value that came by a token; one out of its limits is an error of the node (X1)."""
+    try:
+        worker.node._set_parameter(name, value)
+    except Exception as error:
+        worker.core.upstairs.fail(worker, f"parameter {name}", error, answer=False)
+        return
+    if worker.core.trace is not None:
+        worker.core.trace(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))

@@ -1,0 +1,99 @@
+"""The end of a node: its `end()`, what it writes there, END behind it (rules F2, F4, F12).
+
+Stands on `releasing`; a node's code is run by the host.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hfg.engine.model.worker import DISABLED, ENDED, Worker
+from hfg.engine.rules.agenda import block, cancel_limit, freed, idle_again
+from hfg.engine.rules.releasing import release
+from hfg.engine.rules.sending import flush_automatic, put_outputs, send_end
+from hfg.ports.edges import EventEdge
+from hfg.token import Marker, Token
+from hfg.trace import FiringEnded, TokenDrained, TokenDropped
+
+__all__ = ["drain_left", "end", "source_ended"]
+
+
+def source_ended(worker: Worker) -> None:
+    """F2: the generator returned or the code raised EndOfStream; what the firing wrote before stays unsent."""
+    worker.generator = None  # nothing is left to close
+    worker.written = None
+    end(worker, (), ())
+
+
+def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+    """F4(1): `end()` is called, what it writes leaves as one full firing, END follows (F12 begins here)."""
+    core = worker.core
+    for edge, token in zip(edges, tokens, strict=True):
+        if type(token.value) is not Marker:
+            edge.dropped += 1
+            if core.trace is not None:
+                core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
+    worker.end_firings += 1
+    block(worker, ENDED)
+    for edge in worker.in_edges:  # what comes now is drained: the short ways of those before it do not look
+        core.upstairs.choose_step(edge.source)
+    worker.deferred = []
+    cancel_limit(worker)
+    for edge in worker.in_edges:
+        drain_left(edge)
+    hook = worker.node._hook("end") if worker.node is not None else None
+    if hook is None:
+        _ended(worker, None, None)
+        return
+    worker.busy = "ending"
+    core.host.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
+
+
+def drain_left(edge: Any) -> None:
+    """F12: what still lies on an input of an ended node is processed without a firing."""
+    if type(edge) is EventEdge and edge.target_kind == "parameter":
+        return
+    worker: Worker = edge.target
+    core = worker.core
+    for token in edge.clear():
+        edge.drained += 1
+        if core.trace is not None:
+            core.trace(TokenDrained(core.now(), edge.label, token))
+        if token.activity and worker.deferred is not None:
+            worker.deferred.append(token.activity)
+    if type(edge) is EventEdge:
+        freed(edge)
+    elif edge.held:
+        release((edge,))
+
+
+def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
+    core = worker.core
+    worker.busy = "firing"
+    if error is None and result is not None:
+        error = TypeError(f"end() gave back {result!r:.80}, but it writes with send(): self.out.send(...)")
+    if error is not None:
+        worker.written = None
+        worker.core.upstairs.fail(worker, "end()", error, answer=False)
+    written = worker.written
+    worker.written = None
+    wrote = written is not None and any(entry is not None for entry in written)
+    if wrote:
+        put_outputs(worker, written)
+    flush_automatic(worker)
+    if core.trace is not None:
+        core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended"))
+    worker.busy = "over"
+    taken = worker.taken
+    worker.taken = ()
+    release(taken)
+    worker.end_stamp = worker.stamp
+    worker.right = False  # the firing is over; END is not part of it (A3)
+    if worker.outputs.missing and not worker.blocked & DISABLED:
+        worker.pending_end = True
+    else:
+        send_end(worker)
+    worker.right = False
+    worker.stamp = None
+    idle_again(worker)

@@ -1,0 +1,114 @@
+"""What becomes of a failure in a node's code: stop, skip, disable or restart (rules X1, X2).
+
+Stands on `sending`; the firing and calling modules bring failures here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hfg.engine.model.worker import BACKOFF, Worker
+from hfg.engine.rules import calls, firing, lifecycle
+from hfg.engine.rules.agenda import block
+from hfg.engine.rules.modifiers import automatic, report_error
+from hfg.engine.rules.sending import flush_automatic, put_outputs
+from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit, in_words
+from hfg.ports.edges import EventEdge, SyncEdge
+
+__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "fail_taken", "operator_failed", "time_out"]
+
+
+def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
+    """Wrap what was raised so that it names the path and the firing (X1)."""
+    if isinstance(error, NodeError):
+        return error
+    cause: BaseException | str = error
+    if isinstance(error, EndOfStream) and not worker.is_source:
+        cause = "EndOfStream was raised, but only a source can end its stream: return None for silence"
+    problem = NodeError(worker.path, what, cause)
+    problem.__cause__ = error
+    return problem
+
+
+def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> None:
+    """A firing (`answer`: it still owes its outputs) or something beside one has failed."""
+    if isinstance(error, QueueLimit):
+        worker.core.host.finish("failed", error)
+        return
+    worker.failed += 1
+    apply_policy(worker, as_node_error(worker, what, error), answer=answer)
+
+
+def fail_taken(worker: Worker, stamp: float, taken: tuple[SyncEdge, ...], error: BaseException) -> None:
+    """The function of a short step raised: the firing is one like any other from here."""
+    worker.busy = "firing"
+    worker.stamp = stamp
+    worker.taken = taken
+    fail(worker, f"firing {worker.firings}", error, answer=True)
+
+
+def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
+    """A slot call has failed: it owes no outputs, so with every policy but `stop` it is only counted."""
+    worker.calls_failed += 1
+    problem = as_node_error(worker, f"slot {slot}, call {worker.call_number}", error)
+    policy = worker.options.on_error
+    report_error(worker, problem.what, in_words(error), policy)
+    if policy == "stop":
+        worker.core.host.finish("failed", problem)
+        return
+    worker.core.errors.append(problem)
+    calls.finish_call(worker, "failed")
+
+
+def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any = None) -> None:
+    """X1: the node's policy decides."""
+    core = worker.core
+    policy = worker.options.on_error if worker.options is not None else "stop"
+    restarts = policy == "restart" and not worker.blocked & BACKOFF  # else that is under way
+    if restarts and worker.restarts >= worker.options.restart_limit:
+        policy = "stop"
+    report_error(worker, problem.what, in_words(problem.__cause__ or problem), policy)
+    worker.written = None
+    if policy == "stop":
+        core.host.finish("failed", problem)
+        return
+    core.errors.append(problem)
+    automatic(worker, "failed", problem)
+    if answer and policy != "disable":
+        put_outputs(worker, None)
+    if restarts:
+        worker.restarts += 1
+        block(worker, BACKOFF)
+    if answer:
+        firing.finish_firing(worker, "failed")
+    elif then is not None:
+        then()
+    elif not worker.busy:
+        flush_automatic(worker)
+    if policy == "disable":
+        lifecycle.disable(worker)
+    elif restarts:
+        lifecycle.restart(worker, worker.options.restart_backoff_s * 2 ** (worker.restarts - 1))
+
+
+def time_out(worker: Worker) -> None:
+    """X2: the firing has taken longer than `max_duration_s`: it is given up, its late result ignored."""
+    worker.limit_timer = None
+    limit = worker.options.max_duration_s
+    what = f"firing {worker.firings}"
+    worker.ticket += 1
+    worker.core.host.interrupt(worker)
+    problem = FiringTimeout(worker.path, what, f"it took longer than max_duration_s = {limit:g} s and was given up")
+    worker.failed += 1
+    apply_policy(worker, problem, answer=True)
+
+
+def operator_failed(edge: EventEdge, error: BaseException) -> None:
+    """An operator on the edge raised: the consumer's `on_error` decides (ARCHITECTURE §3)."""
+    target: Worker = edge.target
+    problem = NodeError(target.path, f'an operator on edge "{edge.label}"', error)
+    problem.__cause__ = error
+    if target in (target.core.current, target.core.speaker):  # it has triggered into itself: that is over first
+        target.core.after(0.0, lambda: apply_policy(target, problem, answer=False))
+    else:
+        apply_policy(target, problem, answer=False)

@@ -1,0 +1,383 @@
+"""What a node does next: a firing (rules F1-F4, F9, F11, P6, P8, A6, A11, T5).
+
+The general way; `steps` has shorter ones for the common shapes, which fall back to this one. Stands on `ending` and
+`calls`; a node's code is run by the host.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from types import CoroutineType
+from typing import Any
+
+from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, UNREADY, Worker
+from hfg.engine.rules.agenda import SAME_MOMENT_S, cancel_limit, consider, freed, idle_again, unplace
+from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
+from hfg.engine.rules.ending import end, source_ended
+from hfg.engine.rules.modifiers import automatic, derive_scopes, receive, touch
+from hfg.engine.rules.releasing import release
+from hfg.engine.rules.sending import flush_automatic, put_outputs
+from hfg.engine.rules.wiring import rewire
+from hfg.errors import EndOfStream, UsageError
+from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
+from hfg.token import END, NO_MESSAGE, Marker, Token
+from hfg.trace import FiringEnded, FiringStarted, TokenTaken
+from hfg.types import accepts, describe
+
+__all__ = ["complete_firing", "finish_firing", "fire", "merge", "step", "write"]
+
+
+def step(worker: Worker) -> None:
+    """Do the next piece of work on the agenda of a worker that was taken from its run queue."""
+    worker.queued = False
+    if worker.busy:
+        return
+    calls = worker.calls
+    if worker.placed and not (calls and worker.ahead):
+        if worker.ready_hook is None:
+            fire(worker)
+        else:
+            _ask_ready(worker)
+    elif calls and not worker.blocked & CALLS_BLOCKED:
+        call(worker)
+
+
+def _ask_ready(worker: Worker) -> None:
+    """F1: the node's own `ready()` is asked last."""
+    hook = worker.ready_hook
+    assert hook is not None
+    worker.busy = "asking"
+
+    def answered(ready: Any, error: BaseException | None) -> None:
+        worker.busy = ""
+        if isinstance(error, EndOfStream) and worker.is_source and worker.placed:
+            worker.busy = "firing"
+            worker.firings += 1
+            source_ended(worker)
+        elif error is not None:  # no answer is no: else it would be asked, and fail, without end
+            worker.placed = False
+            worker.blocked |= UNREADY
+            worker.core.upstairs.fail(worker, "ready()", error, answer=False)
+            if not worker.busy:  # else its restart has begun
+                idle_again(worker, asked=True)
+        elif ready and worker.placed and worker.on_idle is None:
+            fire(worker)
+        elif ready and worker.placed:  # an edit was faster, and asks to be before the firing
+            idle_again(worker)
+        elif worker.placed:
+            worker.placed = False
+            worker.blocked |= UNREADY
+            idle_again(worker, asked=True)
+        else:
+            idle_again(worker)
+
+    worker.core.host.execute(worker, hook, (), answered)
+
+
+def fire(worker: Worker) -> None:
+    """Take one token from every live input and decide by F4 what becomes of them."""
+    core = worker.core
+    worker.placed = False
+    worker.busy = "firing"
+    worker.firings += 1
+    worker.ticket += 1
+    worker.special = False
+    edges = worker.live_inputs
+    tokens = [_take(edge) for edge in edges]
+    worker.tokens = tokens
+    worker.taken = tuple(edge for edge in edges if type(edge) is SyncEdge)
+    now = core.now()
+    worker.stamp = now if worker.is_source else _newest_stamp(tokens, now)
+    modifiers = [token.activity for token in tokens if token.activity]
+    kind = _kind(worker, edges, tokens)
+    if core.trace is not None:
+        core.trace(FiringStarted(now, worker.path, worker.firings, kind))
+        for edge, token in zip(edges, tokens, strict=True):
+            core.trace(TokenTaken(now, edge.label, token))
+    for edge in edges:
+        if type(edge) is EventEdge:
+            freed(edge)
+            if not edge.live and not edge.queue:
+                rewire(worker)
+        elif type(edge) is DelayEdge and edge.held and len(edge.queue) <= edge.delay:
+            release((edge,))
+    if modifiers:
+        if worker.scopes:
+            touch(core, worker.scopes)
+        receive(worker, modifiers)
+        derive_scopes(core)
+    _set_parameters(worker, edges, tokens)
+    if kind == "end":
+        end(worker, edges, tokens)
+    elif kind == "silent":
+        worker.silent += 1
+        _place_next(worker)
+        put_outputs(worker, None)
+        finish_firing(worker, "silent")
+    else:
+        options = worker.options
+        if options.max_rate_hz:
+            worker.next_start = now + 1.0 / options.max_rate_hz
+        worker.gate_next = now
+        if worker.paced:
+            unplace(worker)  # what an input that has ended gave a place to is held by the rate from now on
+        _place_next(worker)
+        _run_process(worker, edges, tokens)
+
+
+def _place_next(worker: Worker) -> None:
+    """What the next firing asks for may hold already: then it has its place before the calls that come now (F9, D1)."""
+    if worker.calls is not None and not worker.inputs.missing:
+        consider(worker)
+
+
+def _take(edge: Any) -> Token[Any]:
+    """Remove the oldest token (rule F3); its place is freed by the caller once the firing is on record."""
+    barrier = edge.target.inputs
+    if type(edge) is SyncEdge:
+        token: Any = edge.token
+        edge.token = None
+        barrier.missing += 1
+    else:
+        token = edge.queue.popleft()
+        if not edge.queue:
+            barrier.missing += 1
+        elif type(edge.queue[0].value) is Marker:
+            edge.target.special = True
+    return token  # type: ignore[no-any-return]
+
+
+def _newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
+    """T5: the newest stamp of the values it took, else of all it took."""
+    values = [token.stamp for token in tokens if type(token.value) is not Marker]
+    return max(values or [token.stamp for token in tokens], default=now)
+
+
+def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> Any:
+    """F4: "end", "silent" or "process"; a closed gate makes it silent (A11)."""
+    end = silent = has_value = has_mandatory = False
+    for edge, token in zip(edges, tokens, strict=True):
+        value = token.value
+        edge.ended = value is END
+        if value is END:
+            end = end or edge.mandatory
+        elif value is NO_MESSAGE:
+            silent = silent or edge.mandatory
+        else:
+            has_value = True
+        has_mandatory = has_mandatory or edge.mandatory
+    if any(edge.ended for edge in worker.in_edges):
+        if end or _all_ended(worker, edges):
+            return "end"
+        if any(edge.ended for edge in edges):
+            rewire(worker)
+    if silent or (edges and not has_mandatory and not has_value):
+        return "silent"
+    if not worker.is_source:
+        for gate in worker.gates_over:
+            if not gate.state.active and not _idle_turn(worker, gate.idle_rate_hz):
+                return "silent"
+    return "process"
+
+
+def _idle_turn(worker: Worker, idle_rate_hz: float | None) -> bool:
+    """A11: a throttled node runs its function as often as the idle rate allows."""
+    return idle_rate_hz is not None and worker.core.now() + SAME_MOMENT_S >= worker.gate_next + 1.0 / idle_rate_hz
+
+
+def _all_ended(worker: Worker, taking_part: Sequence[Any]) -> bool:
+    """F4(1): every live input has ended; edges with initial tokens do not count, and one other must have.
+
+    Args:
+      worker: whose inputs.
+      taking_part: the edges of this firing; also one whose source was disabled and that still delivers (F10).
+    """
+    live = [
+        edge
+        for edge in worker.in_edges
+        if edge in taking_part or (edge.live and not (type(edge) is EventEdge and edge.target_kind == "parameter"))
+    ]
+    counted = [edge for edge in live if not getattr(edge, "initial", ())]
+    return bool(counted) and all(edge.ended for edge in counted)
+
+
+def _set_parameters(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+    """P8: a token sets the parameter when it is taken, also in a silent firing."""
+    for edge, token in zip(edges, tokens, strict=True):
+        if edge.target_kind == "parameter" and type(token.value) is not Marker:
+            set_parameter(worker, edge.port_name, token.value)
+
+
+def _arguments(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:
+    """One argument per declared input: the value, the token if asked for, the default if absent (P6)."""
+    arguments = list(worker.unset)
+    for edge, token in zip(edges, tokens, strict=True):
+        if edge.target_kind == "input" and type(token.value) is not Marker:
+            arguments[edge.position] = token if worker.wants_token[edge.position] else token.value
+    return arguments
+
+
+def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+    arguments = tuple(_arguments(worker, edges, tokens))
+    iteration = worker.iteration
+    if iteration is not None:
+        iteration.begin(arguments)
+        return
+    kind = worker.type.process_kind
+    call: Any = worker.process
+    if kind in ("generator", "async generator"):
+        step: Any = next if kind == "generator" else anext
+        if worker.generator is None:
+            call = partial(_open, worker, step)
+        else:
+            call, arguments = step, (worker.generator,)
+    worker.core.host.execute(worker, call, arguments, _done(worker))
+
+
+def _open(worker: Worker, step: Callable[[Any], Any]) -> Any:
+    """Begin a source that is a generator, or a function that gives back an iterator, and take its first value."""
+    iterator = worker.process()  # type: ignore[misc]  # a source has one
+    method = "__next__" if step is next else "__anext__"
+    if not hasattr(iterator, method):
+        if type(iterator) is CoroutineType:
+            iterator.close()
+        raise TypeError(
+            f"it is annotated as an iterator but gave back {type(iterator).__name__}, not one; write `yield` in it, or "
+            "`return iter(...)`"
+        )
+    worker.generator = iterator
+    return step(iterator)
+
+
+def _done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
+    """What follows when the process function is over."""
+    ticket = worker.ticket
+
+    def done(result: Any, error: BaseException | None) -> None:
+        if worker.ticket != ticket:
+            return  # X2: it came too late, its firing was given up
+        if error is None:
+            complete_firing(worker, result)
+        elif worker.is_source and isinstance(error, (StopIteration, StopAsyncIteration, EndOfStream)):
+            source_ended(worker)
+        else:
+            worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
+
+    return done
+
+
+def complete_firing(worker: Worker, result: Any) -> None:
+    """The process function ran to its end: its outputs leave together (F3)."""
+    if type(result) is CoroutineType and not worker.group.threaded:
+        # a plain function has called an async one, or a generator has yielded a call of one
+        worker.core.host.drive(worker, result, _done(worker))
+        return
+    try:
+        if type(result) is CoroutineType:
+            raise refuse_coroutine(worker, result)
+        written = merge(worker, result)
+    except Exception as error:
+        worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
+        return
+    put_outputs(worker, written)
+    if "processed" in worker.events:
+        automatic(worker, "processed")
+    finish_firing(worker, "done")
+
+
+def merge(worker: Worker, result: Any) -> list[Any] | None:
+    """Join what was returned with what was sent; both for one output is writing twice (F3)."""
+    written = worker.written
+    node_type = worker.type
+    if result is not None:
+        values = worker.node._split(result)
+        if written is None:
+            written = [None] * len(worker.out_edges)
+        for position, value in enumerate(values):
+            if value is None:
+                continue
+            if written[position] is not None:
+                raise UsageError(
+                    f'output "{worker.path}.{worker.out_names[position]}" was written twice in one '
+                    f"firing: return or send, once"
+                )
+            written[position] = _entry(value)
+    if worker.core.debug and written is not None:
+        for position, name in enumerate(node_type.outputs):
+            entry = written[position]
+            hint = node_type.outputs[name].type
+            if entry is not None and not accepts(entry[0], hint):
+                raise TypeError(
+                    f'output "{worker.path}.{name}" is declared {describe(hint)}, got '
+                    f"{describe(type(entry[0]))}: {entry[0]!r:.80}"
+                )
+    if node_type is not None and node_type.parameters:
+        written = _add_parameters(worker, written)
+    return written
+
+
+def _add_parameters(worker: Worker, written: list[Any] | None) -> list[Any]:
+    """P8: a connected parameter sends its value with each firing that is not silent."""
+    if written is None:
+        written = [None] * len(worker.out_edges)
+    for position in range(len(worker.type.outputs), len(worker.out_names)):
+        written[position] = (worker.node._parameters[worker.out_names[position]], None, None)
+    return written
+
+
+def _entry(value: Any) -> tuple[Any, int | None, float | None]:
+    if type(value) is Token:
+        return (value.value, value.activity, value.stamp)
+    return (value, None, None)
+
+
+def write(worker: Worker, position: int, value: Any, activity: int | None, stamp: float | None) -> None:
+    """A node's code writes to an output: it leaves when the firing is over (F3).
+
+    Raises:
+      UsageError: outside a firing (also in a slot handler, F9), or twice in one firing.
+    """
+    path = f"{worker.path}.{worker.out_names[position]}"
+    if worker.busy not in ("firing", "ending"):
+        where = "in a slot handler" if worker.busy == "call" else "outside a firing"
+        raise UsageError(
+            f'output "{path}" was written {where}: outputs belong to process() and end(); trigger an event instead'
+        )
+    if value is None:
+        return
+    if worker.written is None:
+        worker.written = [None] * len(worker.out_edges)
+    if worker.written[position] is not None:
+        raise UsageError(
+            f'output "{path}" was written twice in one firing: it takes one token, merge the values or use an event'
+        )
+    if type(value) is Token:
+        activity = value.activity if activity is None else activity
+        stamp = value.stamp if stamp is None else stamp
+        value = value.value
+    worker.written[position] = (value, activity, stamp)
+
+
+def finish_firing(worker: Worker, outcome: Any) -> None:
+    """The automatic events follow (A9), then the firing is over and releases what it took (F5)."""
+    core = worker.core
+    cancel_limit(worker)
+    flush_automatic(worker)
+    if core.trace is not None:
+        if outcome == "done" and worker.blocked & DISABLED:
+            outcome = "abandoned"  # disabled meanwhile, with a subgraph around it: its outputs went nowhere (F10)
+        core.trace(FiringEnded(core.now(), worker.path, worker.firings, outcome))
+    worker.busy = "over"
+    taken = worker.taken
+    worker.written = None
+    worker.tokens = []
+    if worker.outputs.missing:
+        worker.held = True
+        if taken:
+            release([edge for edge in taken if not edge.sequential])
+    elif taken:
+        release(taken)
+    worker.right = False
+    worker.stamp = None
+    idle_again(worker)

@@ -1,0 +1,284 @@
+"""Beginning, ending, disabling and enabling single nodes (rules F10, A9 reset, X1 restart).
+
+Each setup is followed by a teardown before the next one, whatever happens to a node meanwhile. Stands on `sending` and
+`wiring`; hooks are run by the host, one after another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from hfg.engine.model.core import Core
+from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, ENDED, FUTILE, REMOVED, TORN_DOWN, Worker
+from hfg.engine.rules import wiring
+from hfg.engine.rules.agenda import block, consider, unblock
+from hfg.engine.rules.modifiers import derive_scopes, discard
+from hfg.engine.rules.releasing import release
+from hfg.engine.rules.sending import send_end, telling_behind
+from hfg.errors import NodeError
+from hfg.ports.edges import EventEdge
+from hfg.trace import NodeEnabled
+
+__all__ = [
+    "Then",
+    "disable",
+    "disable_around",
+    "enable",
+    "enable_around",
+    "not_ended",
+    "nothing",
+    "reset",
+    "restart",
+    "set_up",
+    "tear_down",
+    "when_idle",
+]
+
+Then = Callable[[NodeError | None], None]
+
+
+def nothing() -> None:
+    """What follows when nobody waits for it."""
+
+
+def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], None], then: Callable[[], None]) -> None:
+    """Do it when the node's firing or call under way is over, and let none begin meanwhile (F9, F10)."""
+
+    def begin() -> None:
+        worker.busy = "setup"
+        action(worker, over)
+
+    def over() -> None:
+        worker.core.upstairs.idle_again(worker)
+        then()
+
+    if not worker.busy:
+        begin()
+        return
+    if worker.on_idle is None:
+        worker.on_idle = []
+        worker.core.upstairs.choose_step(worker)  # the short ways do not look whether somebody waits
+    worker.on_idle.append(begin)
+
+
+def _run_hook(worker: Worker, name: str, then: Then) -> None:
+    hook = worker.node._hook(name) if worker.node is not None else None
+    if hook is None:
+        then(None)
+        return
+
+    def done(_result: Any, error: BaseException | None) -> None:
+        if error is None:
+            then(None)
+            return
+        problem = NodeError(worker.path, f"{name}()", error)
+        problem.__cause__ = error
+        then(problem)
+
+    worker.core.host.execute(worker, hook, (), done)
+
+
+def set_up(worker: Worker, then: Then) -> None:
+    """Give the node fresh state and run its `setup()`; `then(error)` follows."""
+    if worker.node is None:
+        then(None)
+        return
+    worker.is_up = True  # from here on, for `teardown` follows a setup that fails half-way too
+    try:
+        worker.node._reset_states()
+    except Exception as error:  # a default that cannot be copied, a factory that fails
+        problem = NodeError(worker.path, "its state", error)
+        problem.__cause__ = error
+        then(problem)
+        return
+    worker.core.upstairs.bind_ports(worker)
+    _run_hook(worker, "setup", then)
+
+
+def tear_down(worker: Worker, then: Then) -> None:
+    """Close the node's generator and run its `teardown()`, unless nothing was set up since the last time."""
+    if worker.node is None or not worker.is_up:
+        then(None)
+        return
+    worker.is_up = False
+    generator, worker.generator = worker.generator, None
+
+    def closed(_result: Any, error: BaseException | None) -> None:
+        if error is not None:
+            problem = NodeError(worker.path, "closing its generator", error)
+            problem.__cause__ = error
+            _run_hook(worker, "teardown", lambda later: then(later or problem))
+        else:
+            _run_hook(worker, "teardown", then)
+
+    close = getattr(generator, "close", None) or getattr(generator, "aclose", None)
+    if close is None:  # none, or an iterator that has nothing to close
+        closed(None, None)
+    else:
+        worker.core.host.execute(worker, close, (), closed)
+
+
+def disable(worker: Worker) -> None:
+    """F10: discard what lies on its edges, and let producers neither send to it nor wait for it."""
+    worker.own_enabled = False
+    if worker.blocked & DISABLED:
+        return
+    core = worker.core
+    block(worker, DISABLED)
+    if core.trace is not None:
+        core.trace(NodeEnabled(core.now(), worker.path, False))
+    _settle_disabled([worker])
+    derive_scopes(core)
+
+
+def disable_around(workers: Iterable[Worker]) -> None:
+    """A subgraph around them is disabled; their own flags stay (G2)."""
+    newly = [worker for worker in workers if not worker.blocked & DISABLED]
+    for worker in newly:
+        block(worker, DISABLED)
+    _settle_disabled(newly)
+
+
+def enable_around(owner: Worker) -> None:
+    """The subgraphs around the worker of one are enabled; it has nothing to set up."""
+    owner.blocked &= ~DISABLED
+    wiring.refresh(owner)
+
+
+def _settle_disabled(workers: Sequence[Worker]) -> None:
+    """Rewire the neighbours of nodes that were disabled, then empty their edges."""
+    if not workers:
+        return
+    untaken = {edge for worker in workers for edges in worker.wired_out for edge in edges if edge.untaken}
+    for worker in workers:  # first: activity that is given back may trigger, but not over edges that are dead now
+        wiring.refresh(worker)
+    with telling_behind(workers[0].core):
+        for worker in workers:
+            incoming = [
+                one for one in worker.edges_in() if not (one.port_name == "enable" and one.target_kind == "slot")
+            ]
+            outgoing = [edge for edges in worker.wired_out for edge in edges]
+            for edge in (*incoming, *outgoing):
+                discard(edge, "disabled")
+            # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
+            worker.taken = ()
+            free = (*incoming, *(edge for edge in outgoing if edge in untaken))
+            release([edge for edge in free if type(edge) is not EventEdge and edge.held])
+        for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
+            if worker.pending_end and worker.busy in AMID_NOTHING:
+                send_end(worker)
+
+
+def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> None:
+    """F10: the node starts afresh, unless it is `fresh` already; A(v) is kept.
+
+    In the back-off of a restart that sets it up, when it is over.
+    """
+    core = worker.core
+    itself, worker.own_enabled = not worker.own_enabled, True
+    if not worker.blocked & DISABLED or not all(scope.enabled for scope in worker.around):
+        then()
+        return
+
+    def up() -> None:
+        if not worker.own_enabled or not all(scope.enabled for scope in worker.around):
+            then()  # disabled again meanwhile
+            return
+        worker.blocked &= ~(DISABLED | ENDED)
+        not_ended(worker)
+        if itself and core.trace is not None:  # else the subgraph around it was, and that is told
+            core.trace(NodeEnabled(core.now(), worker.path, True))
+        wiring.refresh(worker)
+        consider(worker)
+        _sources_matter_again(core)
+        then()
+
+    if fresh:
+        up()
+    else:
+        _afresh(worker, up)
+
+
+def _afresh(worker: Worker, then: Callable[[], None]) -> None:
+    """Teardown of what is set up, then setup; a failure ends the run. A restart under way does it in its time (X1)."""
+    host = worker.core.host
+
+    def down(error: NodeError | None) -> None:
+        if error is not None:
+            host.finish("failed", error)
+        else:
+            set_up(worker, up)
+
+    def up(error: NodeError | None) -> None:
+        if error is not None:
+            host.finish("failed", error)
+        else:
+            then()
+
+    if worker.blocked & BACKOFF:
+        then()
+    else:
+        tear_down(worker, down)
+
+
+def not_ended(worker: Worker) -> None:
+    """The node starts afresh: it has not ended, nor have the inputs that it must have."""
+    worker.pending_end = False
+    worker.deferred = None
+    for edge in worker.in_edges:
+        edge.ended = edge.ended and not edge.mandatory  # who has said END to an optional input has said it (F4)
+
+
+def _sources_matter_again(core: Core) -> None:
+    """A node that had ended is back: sources that fed only ended nodes are not futile any more (R5)."""
+    if core.futile:
+        core.futile = False
+        for source in core.sources:
+            unblock(source, FUTILE)
+
+
+def reset(worker: Worker, then: Callable[[], None]) -> None:
+    """The slot `reset`: teardown, setup, not ended; tokens and A(v) stay (A9)."""
+
+    def up() -> None:
+        not_ended(worker)
+        unblock(worker, ENDED)
+        wiring.refresh(worker)
+        _sources_matter_again(worker.core)
+        then()
+
+    _afresh(worker, up)
+
+
+def restart(worker: Worker, backoff_s: float) -> None:
+    """X1: teardown, a pause, setup; a node that is disabled by then is set up when it is enabled.
+
+    The caller has blocked it with `BACKOFF`.
+    """
+    core = worker.core
+
+    def down(worker: Worker, then: Callable[[], None]) -> None:
+        tear_down(worker, lambda _error: then())
+
+    def rested() -> None:
+        worker.backoff_timer = None
+        when_idle(worker, up, nothing)
+
+    def up(worker: Worker, then: Callable[[], None]) -> None:
+        if worker.blocked & (DISABLED | REMOVED):
+            over(None, then)
+        else:
+            set_up(worker, lambda error: over(error, then))
+
+    def over(error: NodeError | None, then: Callable[[], None]) -> None:
+        if error is not None:
+            core.host.finish("failed", error)
+        elif not worker.blocked & TORN_DOWN:
+            worker.blocked &= ~BACKOFF  # before those that wait have their turn: they may enable or reset it
+            then()
+
+    def rest() -> None:
+        worker.backoff_timer = core.after(backoff_s, rested)
+
+    when_idle(worker, down, rest)

@@ -1,0 +1,132 @@
+"""What activity does to a node, and what is lost or given back (rules A5-A8, F10).
+
+Stands on `agenda`; what follows from a change is decided upstairs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hfg.activity.rules import after_receipt
+from hfg.engine.model.core import Core
+from hfg.engine.model.scopes import Scope
+from hfg.engine.model.worker import REMOVED, Worker
+from hfg.engine.rules.agenda import freed, remove_call, unplace
+from hfg.ports.edges import Edge, EventEdge
+from hfg.token import Token
+from hfg.trace import ActivityChanged, ActivityLost, ErrorRaised, TokenDropped
+
+__all__ = [
+    "automatic",
+    "derive_scopes",
+    "discard",
+    "drop",
+    "give_back",
+    "lose",
+    "receive",
+    "report_error",
+    "set_active",
+    "touch",
+]
+
+
+def receive(worker: Worker, modifiers: Sequence[int]) -> None:
+    """A6: only the net change counts."""
+    active = after_receipt(worker.active, modifiers)
+    if active != worker.active:
+        set_active(worker, active, "token")
+
+
+def set_active(worker: Worker, active: bool, cause: Any) -> None:
+    """A(v) := active, and everything that follows a change."""
+    if worker.active == active:
+        return
+    worker.active = active
+    core = worker.core
+    node = worker.node
+    # under the virtual clock code in a thread sees what was when it began, or chance would say what it sees (R6)
+    if node is not None and (worker.job is None or worker.job.held is None):
+        node._active = active
+    if core.trace is not None:
+        core.trace(ActivityChanged(core.now(), worker.path, active, cause))
+    if not worker.watched:
+        return
+    core.upstairs.activity_changed(worker, active)
+
+
+def touch(core: Core, scopes: Sequence[Scope]) -> None:
+    """Something these subgraphs derive their activity from has changed."""
+    for scope in scopes:
+        if scope not in core.dirty_scopes:
+            core.dirty_scopes.append(scope)
+
+
+def derive_scopes(core: Core) -> None:
+    """After a step that may have moved activity: derive A(subgraph) anew where it is watched (G2).
+
+    Amid a change of several edges that is left to its end.
+    """
+    if core.dirty_scopes and core.late is None:
+        core.upstairs.scopes_changed(core)
+
+
+def automatic(worker: Worker, name: str, value: Any = None) -> None:
+    """An automatic event has arisen; it leaves after the firing or call under way, or at the next flush."""
+    if name in worker.events:
+        if worker.events_due is None:
+            worker.events_due = []
+        worker.events_due.append((name, value))
+
+
+def discard(edge: Any, reason: Any) -> None:
+    """Take everything from an edge, counted and with its activity given back (F10, A8)."""
+    tokens = edge.clear()
+    target: Worker = edge.target
+    if not tokens:
+        return
+    for token in tokens:
+        drop(edge, token, reason)
+    if edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge):
+        for _ in tokens:
+            remove_call(target, edge)
+    elif edge in target.live_inputs:
+        target.inputs.missing += 1
+        unplace(target)
+    if type(edge) is EventEdge:
+        freed(edge)
+
+
+def drop(edge: Edge, token: Token[Any], reason: Any) -> None:
+    """Count a token that goes nowhere; its activity goes back (A8)."""
+    edge.dropped += 1
+    core: Core = edge.target.core
+    if core.trace is not None:
+        core.trace(TokenDropped(core.now(), edge.label, token, reason))
+    if token.activity > 0:
+        give_back(edge)
+        touch(core, edge.target.scopes)
+
+
+def give_back(edge: Edge) -> None:
+    """A8: activity is never lost unseen: the sender has it again, or its loss is counted."""
+    sender: Worker = edge.source
+    if sender.node is None or sender.scope is not None or sender.blocked & REMOVED:
+        lose(edge)
+    else:
+        set_active(sender, True, "returned")
+
+
+def lose(edge: Edge) -> None:
+    """Nobody can have the activity that came over the edge."""
+    core: Core = edge.target.core
+    core.lost_activity += 1
+    if core.trace is not None:
+        core.trace(ActivityLost(core.now(), edge.label))
+
+
+def report_error(worker: Worker, what: str, error: str, policy: str) -> None:
+    """Tell whoever listens that a node's code failed."""
+    core = worker.core
+    if core.trace is not None:
+        core.trace(ErrorRaised(core.now(), worker.path, what, error, policy))

@@ -1,0 +1,253 @@
+"""What happens when nothing moves: queues grow, events end, the run ends or has stalled (rules F8, F13, P9, R5).
+
+Decides only; `run` asks when it sees that no code runs, no worker is queued and no timer is pending. Stands on
+`sending`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hfg.engine.model.core import Core
+from hfg.engine.model.worker import (
+    BACKOFF,
+    CALLS_BLOCKED,
+    DISABLED,
+    ENDED,
+    FULL,
+    FUTILE,
+    RATE,
+    RESTING,
+    UNREADY,
+    UNWIRED,
+    Worker,
+)
+from hfg.engine.rules.agenda import block, freed, must_wait, unblock
+from hfg.engine.rules.sending import enqueue, put_outputs
+from hfg.errors import QueueLimit, Stalled
+from hfg.ports.edges import EventEdge
+from hfg.token import END
+from hfg.trace import QueueGrown
+
+__all__ = [
+    "complete_edge",
+    "complete_operators",
+    "end_events",
+    "grow",
+    "judge_sources",
+    "node_ended",
+    "only_futile_in_flight",
+    "only_waiting_for_room",
+    "stall",
+    "waits_for",
+]
+
+
+def grow(core: Core) -> bool:
+    """F8: if only full queues hold nodes back, the smallest of them gets one more place."""
+    if any(reader.inputs_ready() for reader in core.readers):
+        return False  # somebody outside holds a node back: growing would not help, only fill memory
+    if any([_rate_holds(worker) for worker in core.workers]):  # noqa: C419 - each sets its timer
+        return False
+    held = [worker for worker in core.workers if _held_by_queue_alone(worker)]
+    full = [edge for worker in held for edge in worker.event_edges() if edge.full]
+    if not full:
+        return False
+    edge = min(full, key=lambda one: (one.capacity, one.index))
+    if edge.capacity_limit is not None and edge.capacity >= edge.capacity_limit:
+        core.host.finish(
+            "failed",
+            QueueLimit(
+                f'queue of "{edge.label}" holds {len(edge.queue)} signals, nothing else can move, and its '
+                f"capacity_limit = "
+                f"{edge.capacity_limit} forbids it to grow: raise the limit or let the consumer take more "
+                f"than it is sent"
+            ),
+        )
+        return True
+    edge.capacity += 1
+    edge.grown += 1
+    if core.trace is not None:
+        core.trace(QueueGrown(core.now(), edge.label, edge.capacity))
+    freed(edge)
+    core.host.kick()
+    return True
+
+
+def _held_by_queue_alone(worker: Worker) -> bool:
+    if not worker.blocked & FULL:
+        return False
+    if worker.waiting_room:
+        return True
+    if worker.calls and worker.blocked & CALLS_BLOCKED == FULL:
+        return True
+    return worker.blocked == FULL and not worker.inputs.missing and not worker.outputs.missing
+
+
+def _rate_holds(worker: Worker) -> bool:
+    """Its rate holds it beside a full queue: that is to be over first, for a timer is pending (SEMANTICS "quiet")."""
+    if not worker.paced or worker.blocked != FULL or worker.inputs.missing or worker.outputs.missing:
+        return False
+    return must_wait(worker)
+
+
+def complete_operators(core: Core) -> bool:
+    """P9: before the run ends each event with operators completes, so that they give out what they hold."""
+    edges = [edge for edge in core.edges if type(edge) is EventEdge and edge.complete is not None]
+    came_out = [complete_edge(edge) for edge in edges]  # each of them, not only up to the first
+    return any(came_out)
+
+
+def complete_edge(edge: EventEdge) -> bool:
+    """Complete the operators of one edge; whether anything came out."""
+    complete, edge.complete = edge.complete, None
+    if complete is None:
+        return False
+    before = edge.sent
+    complete()
+    return edge.sent != before
+
+
+def end_events(core: Core) -> bool:
+    """F13: all live event edges into inputs whose queue is empty get END, at the same moment and once.
+
+    Graph inputs that nobody feeds likewise.
+    """
+    edges = [
+        edge
+        for edge in core.edges
+        if type(edge) is EventEdge
+        and edge.target_kind == "input"
+        and edge.live
+        and not edge.end_sent
+        and not edge.queue
+        and not edge.target.blocked & ENDED
+    ]
+    feeds = [feed for feed in core.feeds if not feed.blocked & ENDED and not feed.outputs.missing]
+    now = core.now()
+    for edge in edges:
+        edge.end_sent = True
+        enqueue(edge, END, 0, now)
+    for feed in feeds:
+        feed.blocked |= ENDED
+        put_outputs(feed, [(END, None, None)])
+    return bool(edges or feeds)
+
+
+def node_ended(worker: Worker) -> None:
+    """A node is over: its operators complete (P9), and sources may feed nobody any more (R5)."""
+    core = worker.core
+    if not worker.slot_edges:
+        for edge in worker.event_edges():
+            complete_edge(edge)
+    _note_futile(core)
+
+
+def judge_sources(core: Core) -> None:
+    """The structure has changed: sources that fed only the dead may matter again, or others do not any more (R5)."""
+    if core.futile:
+        core.futile = False
+        for source in core.sources:
+            unblock(source, FUTILE)
+    _note_futile(core)
+
+
+def _note_futile(core: Core) -> None:
+    """Sources that only feed the dead are futile when no other is left."""
+    sources = [one for one in core.sources if not one.blocked & (ENDED | DISABLED)]
+    if sources and all(_feeds_only_ended(source) for source in sources):
+        core.futile = True
+        for source in sources:
+            block(source, FUTILE)
+            if source.rate_timer is not None:
+                source.rate_timer.cancel()
+                source.rate_timer = None
+
+
+def _feeds_only_ended(source: Worker) -> bool:
+    edges = list(source.all_out_edges())
+    return bool(edges) and all(edge.target.blocked & ENDED and not _is_called(edge) for edge in edges)
+
+
+def _is_called(edge: Any) -> bool:
+    """Whether it leads to slot calls, which go on when the node has ended (F12)."""
+    return edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge)
+
+
+def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
+    """R5: a source that feeds only ended nodes does not keep the run alive.
+
+    Even while it waits or works in a thread.
+    """
+    busy = [worker for worker in core.workers if worker.in_flight]
+    return bool(busy) and all(worker.blocked & FUTILE and (threads_too or not worker.group.threaded) for worker in busy)
+
+
+def only_waiting_for_room(core: Core) -> bool:
+    """F8: all code under way waits until a full queue has room, so it does not keep the graph from being quiet."""
+    return sum(worker.in_flight for worker in core.workers if worker.waiting_room) >= core.in_flight
+
+
+def stall(core: Core) -> Stalled | None:
+    """R5: say who waits for what, if a source is blocked or tokens lie where they can never be taken."""
+    reasons: list[str] = []
+    stuck: dict[int, list[Any]] = {}
+    for edge in core.edges:
+        if (
+            edge.untaken
+            and (edge.live or edge.source.blocked & DISABLED)
+            and not edge.target.blocked & (DISABLED | ENDED)
+            and not (edge.target.is_boundary_output and all(token.value is END for token in edge.contents()))
+        ):
+            stuck.setdefault(edge.target.index, [edge.target]).append(edge)
+    for target, *edges in stuck.values():
+        lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
+        who = "" if target.is_boundary_output else f'"{target.path}" '
+        reasons.append(f"{who}{waits_for(target)}, while tokens lie on {lies}")
+    reasons.extend(
+        f'source "{source.path}" has not ended and {waits_for(source)}'
+        for source in core.sources
+        if not source.blocked & (ENDED | DISABLED | RESTING | FUTILE)
+    )
+    if not reasons:
+        return None
+    shown = "; ".join(reasons[:5]) + (f"; and {len(reasons) - 5} more" if len(reasons) > 5 else "")
+    return Stalled(
+        f"the run has stalled: {shown}. Nothing can change this from inside: connect or end what is "
+        f"missing, or run with allow_idle=True "
+        f"if something outside will"
+    )
+
+
+_WAITS = (
+    (DISABLED, "is disabled"),
+    (ENDED, "has ended"),
+    (UNREADY, "says by ready() that it is not ready"),
+    (FULL, "is held back by a full queue"),
+    (BACKOFF, "is being restarted"),
+    (RESTING, "rests, for its gate is closed"),
+    (FUTILE, "has nobody left to work for"),
+)
+
+
+def waits_for(worker: Worker) -> str:
+    """Say what keeps a node from moving, as the end of a sentence about it."""
+    if worker.is_boundary_output:
+        return f'graph output "{worker.port_name}" is not read (`async for value in run.read(...)` would)'
+    blocked = worker.blocked
+    if blocked & UNWIRED:
+        fed = {edge.port_name for edge in worker.live_inputs}
+        names = [name for name in worker.mandatory_ports if name not in fed]
+        if names:
+            return "waits for its unconnected input " + ", ".join(f'"{name}"' for name in names)
+        return "has no process function" if worker.process is None else "has no live input"
+    waits = next((words for bit, words in _WAITS if blocked & bit), None)
+    if waits is not None:
+        return waits
+    if worker.inputs.missing:
+        names = [edge.port_name for edge in worker.live_inputs if not edge.untaken]
+        return "waits for " + ", ".join(f'"{name}"' for name in names)
+    if worker.outputs.missing:
+        edges = [edge.label for edge in worker.all_out_edges() if getattr(edge, "held", False)]
+        return "waits until its token is processed on " + ", ".join(f'"{label}"' for label in edges[:3])
+    return "is held back by its rate" if blocked & RATE else "cannot move"

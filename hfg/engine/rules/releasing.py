@@ -1,0 +1,102 @@
+"""When what was sent counts as processed, and who goes on by that (rules F5, P7, P10).
+
+Stands on `sending`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules.agenda import consider, freed
+from hfg.engine.rules.sending import send_end
+from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.token import Token
+from hfg.trace import TokenProcessed, TokenTaken, TraceEvent
+
+__all__ = ["outputs_done", "outputs_free", "release", "take_from_reader"]
+
+
+def release(edges: Sequence[Any]) -> None:
+    """These tokens are processed: free the producers' places, and transitively what waited for them (F5).
+
+    Without recursion.
+    """
+    stack: list[Any] = list(reversed(edges))
+    while stack:
+        edge = stack.pop()
+        if not edge.held:
+            continue
+        edge.held = False
+        producer: Worker = edge.source
+        core = producer.core
+        if core.trace is not None:
+            core.trace(TokenProcessed(core.now(), edge.label))
+        outputs = producer.outputs
+        outputs.missing -= 1
+        if not outputs.missing:
+            stack.extend(reversed(outputs_free(producer)))
+
+
+def outputs_free(worker: Worker) -> Sequence[Any]:
+    """All its tokens are processed: it may go on; gives back the edges that are released by that (F5 sequential)."""
+    released: Sequence[Any] = ()
+    if worker.held:
+        worker.held = False
+        released = [upstream for upstream in worker.taken if upstream.sequential]
+    if worker.outputs.waiters is not None:
+        worker.outputs.notify()
+    if worker.pending_end and worker.busy in ("", "edit"):
+        send_end(worker)
+    else:
+        consider(worker)
+    return released
+
+
+def outputs_done(worker: Worker, trace: Callable[[TraceEvent], None] | None = None, time: float = 0.0) -> None:
+    """All its tokens are processed: the short form of `release`, up a chain; `trace` hears of it, at `time`."""
+    while True:
+        taken = worker.taken
+        if worker.outputs.waiters is not None or worker.pending_end or len(taken) > 1:
+            release(outputs_free(worker))
+            return
+        held = worker.held
+        worker.held = False
+        if not worker.inputs.missing and not worker.blocked and not worker.placed:
+            consider(worker)
+        if not held or not taken:
+            return
+        upstream: Any = taken[0]
+        if not upstream.sequential or not upstream.held:
+            return
+        upstream.held = False
+        if trace is not None:
+            trace(TokenProcessed(time, upstream.label))
+        worker = upstream.source
+        outputs = worker.outputs
+        outputs.missing -= 1
+        if outputs.missing:
+            return
+
+
+def take_from_reader(worker: Worker) -> Token[Any]:
+    """Take the token that lies before a reader; its place is free at once."""
+    edge = worker.live_inputs[0]
+    token: Token[Any]
+    if isinstance(edge, SyncEdge):
+        token = edge.token  # type: ignore[assignment]  # the caller has seen that one lies there
+        edge.token = None
+    else:
+        token = edge.queue.popleft()
+    if not edge.untaken:
+        worker.inputs.missing += 1
+    worker.placed = False
+    core = worker.core
+    if core.trace is not None:
+        core.trace(TokenTaken(core.now(), edge.label, token))
+    if isinstance(edge, EventEdge):
+        freed(edge)
+    elif isinstance(edge, SyncEdge) or (edge.held and len(edge.queue) <= edge.delay):
+        release((edge,))
+    return token

@@ -1,0 +1,329 @@
+"""What leaves a node: one token per output edge, signals, END, automatic events (rules T, P4-P7, F3, F8, A3-A5, A9).
+
+A sending is on all its edges before anything comes of it. Stands on `modifiers`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from hfg.activity.rules import leaving
+from hfg.engine.model.core import Core
+from hfg.engine.model.worker import AMID_NOTHING, ENDED, RunningEvent, Worker
+from hfg.engine.rules.agenda import add_call, arrived, note_full, remove_call, unplace
+from hfg.engine.rules.modifiers import derive_scopes, drop, receive, set_active, touch
+from hfg.errors import EngineInternalError, QueueOverflow
+from hfg.ports.edges import Edge, EventEdge, SyncEdge
+from hfg.token import END, NO_MESSAGE, Marker, Token
+from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenSent
+
+__all__ = ["enqueue", "flush_automatic", "put", "put_outputs", "send_end", "tell", "telling_behind", "trigger"]
+
+
+Written = Sequence[tuple[Any, int | None, float | None] | None] | None
+
+
+def put_outputs(worker: Worker, written: Written) -> None:
+    """Put exactly one token on every live edge of every output, all together (F3), and let activity leave (A3, A5).
+
+    Args:
+      worker: whose firing is over.
+      written: per output (value, explicit modifier, explicit stamp); None, or None in it, is NO_MESSAGE.
+    """
+    _put_outputs(worker, written)
+    _sent(worker.core)
+
+
+def _put_outputs(worker: Worker, written: Written) -> None:
+    may_carry = worker.active or worker.right
+    stamp = worker.stamp
+    if stamp is None:
+        stamp = worker.core.now()
+    for_slots: list[tuple[Edge, Any, int, float]] = []
+    for_inputs: list[tuple[Edge, Any, int, float]] = []
+    carried = False
+    for position, edges in enumerate(worker.out_edges):
+        if not edges:
+            continue
+        entry = written[position] if written is not None else None
+        if entry is None:
+            value, explicit, own_stamp = NO_MESSAGE, None, stamp
+        else:
+            value, explicit, given = entry
+            own_stamp = stamp if given is None else given
+        for edge in edges:
+            modifier = leaving(may_carry, edge.active, explicit, value is NO_MESSAGE)
+            carried = carried or (modifier == 1 and explicit is None)
+            (for_slots if edge.target_kind == "slot" else for_inputs).append((edge, value, modifier, own_stamp))
+    for edge, value, modifier, own_stamp in for_slots:
+        put(edge, value, modifier, own_stamp)
+    for edge, value, modifier, own_stamp in for_inputs:
+        put(edge, value, modifier, own_stamp)
+    if worker.outputs.missing:
+        unplace(worker)
+    if carried:
+        _activity_left(worker)
+
+
+def _activity_left(worker: Worker) -> None:
+    """A5: the first sending that carried +1 took the activity.
+
+    The right of A3 stays until the firing or call is over.
+    """
+    if worker.scope is not None:  # by its events it leaves everything inside (G2)
+        worker.active = worker.node._active = False
+        worker.core.upstairs.deactivate_inside(worker.scope, "sent")
+    elif worker.active:
+        worker.right = worker.stamp is not None  # in a firing or call
+        set_active(worker, False, "sent")
+
+
+def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
+    """Put one token on a synchronous edge."""
+    edge.sent = number = edge.sent + 1
+    token = Token(value, modifier, stamp, number)
+    target: Worker = edge.target
+    core = target.core
+    if core.trace is not None:
+        core.trace(TokenSent(core.now(), edge.label, token))
+    if edge.tap is not None:
+        edge.tap(token)
+    if edge.target_kind == "slot":
+        if type(value) is Marker:  # T4: processed at once, the handler is not called
+            _drain(edge, token)
+            return
+        edge.token = token
+        edge.held = True
+        edge.source.outputs.missing += 1
+        add_call(target, edge)
+    elif target.blocked & ENDED:
+        _drain(edge, token)
+        return
+    elif type(edge) is SyncEdge:
+        if edge.token is not None or edge.held:
+            raise EngineInternalError(f'a second token on synchronous edge "{edge.label}"')
+        edge.token = token
+        edge.held = True
+        edge.source.outputs.missing += 1
+        if type(value) is Marker:
+            target.special = True
+        arrived(edge)
+    else:
+        edge.queue.append(token)
+        edge.deepest = max(edge.deepest, len(edge.queue))
+        if len(edge.queue) > edge.delay:
+            edge.held = True
+            edge.source.outputs.missing += 1
+        if type(value) is Marker:
+            target.special = True
+        if len(edge.queue) == 1:
+            arrived(edge)
+    if modifier > 0 and target.scopes:
+        touch(core, target.scopes)
+
+
+def _drain(edge: Edge, token: Token[Any]) -> None:
+    """T4, F12: the token is processed at once, without a firing or call; its modifier acts behind the sending."""
+    target: Worker = edge.target
+    core = target.core
+    into_slot = edge.target_kind == "slot"
+    if not into_slot:
+        edge.drained += 1
+    if core.trace is not None:
+        core.trace(TokenDrained(core.now(), edge.label, token))
+    if token.activity:
+        if target.deferred is not None and not into_slot:
+            target.deferred.append(token.activity)
+            if target.scopes:
+                touch(core, target.scopes)
+        else:
+            core.drained.append((target, token.activity))
+
+
+def _sent(core: Core) -> None:
+    """The sending is on its edges: the modifiers of what was drained act; then what arose by that leaves."""
+    drained = core.drained
+    if drained:
+        core.drained = []
+        for target, modifier in drained:
+            receive(target, (modifier,))
+    if core.dirty_scopes:
+        derive_scopes(core)
+    for target, _ in drained:
+        if target.busy in AMID_NOTHING:  # else it follows the firing or call under way
+            tell(target)
+
+
+def send_end(worker: Worker) -> None:
+    """END leaves on all outputs; from here the node, which is amid nothing, is over (F4, F12)."""
+    core = worker.core
+    worker.pending_end = False
+    end = (END, None, None)
+    with telling_behind(core):
+        worker.stamp = worker.end_stamp
+        _put_outputs(worker, [end] * len(worker.out_edges))
+        worker.stamp = None
+        _sent(core)
+        if core.trace is not None:
+            core.trace(NodeEnded(core.now(), worker.path))
+        deferred, worker.deferred = worker.deferred, None
+        for modifier in deferred or ():
+            receive(worker, (modifier,))
+        if deferred and worker.scopes:
+            touch(core, worker.scopes)
+    core.upstairs.node_ended(worker)
+
+
+def trigger(
+    event: RunningEvent,
+    value: Any = None,
+    explicit: int | None = None,
+    stamp: float | None = None,
+    *,
+    extend_right: bool = True,
+) -> None:
+    """Send a signal on every live edge of an event, at once (F8, T2, T5); activity leaves by A3 and A5.
+
+    Raises:
+      QueueOverflow: an edge with policy `error` is full; nothing was sent (P5).
+    """
+    worker = event.worker
+    core = worker.core
+    if core.over:
+        return  # code that was under way at the end speaks to nobody
+    if type(value) is Token:
+        explicit = value.activity if explicit is None else explicit
+        stamp = value.stamp if stamp is None else stamp
+        value = value.value
+    if stamp is None:
+        stamp = core.now() if worker.stamp is None else worker.stamp
+    edges = event.edges
+    for edge in edges:
+        if edge.overflow == "error" and edge.live and edge.overflows():
+            raise QueueOverflow(
+                f'queue of "{edge.label}" is full: {edge.capacity} signals wait, policy "error" allows no '
+                f"more; nothing was sent: raise "
+                f"capacity= or choose another overflow="
+            )
+    may_carry = worker.active or (extend_right and worker.right)
+    carried = False
+    loudest = 0 if explicit is None else explicit
+    sends: list[tuple[EventEdge, int]] = []
+    for edge in edges:
+        if edge.live:
+            modifier = leaving(may_carry, edge.active, explicit, False)
+            if modifier == 1 and explicit is None:
+                carried = True
+                loudest = 1
+            sends.append((edge, modifier))
+    port = event.port
+    if core.trace is not None:
+        core.trace(EventTriggered(core.now(), event.label, Token(value, loudest, stamp)))
+    if port is not None and port._observers:
+        port._notify(Token(value, loudest, stamp))
+    if event.tap:
+        token = Token(value, loudest, stamp)
+        for look in event.tap:
+            look(token)
+    for edge, modifier in sends:
+        if edge.pipeline is not None:
+            _into_operators(edge, Token(value, modifier, stamp))
+        else:
+            _append(edge, value, modifier, stamp)
+    if carried:
+        _activity_left(worker)
+    _sent(core)
+    if not core.pumping:
+        core.host.kick()
+
+
+def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
+    """P9: an operator that raises is an error of the edge, by the consumer's policy."""
+    assert edge.pipeline is not None
+    try:
+        edge.pipeline(token)
+    except Exception as error:
+        edge.target.core.upstairs.operator_failed(edge, error)
+
+
+def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
+    """One token on one event edge, a sending of its own."""
+    _append(edge, value, modifier, stamp)
+    _sent(edge.target.core)
+
+
+def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
+    """Put one token into the queue of an event edge, by its policy (P5, F8)."""
+    edge.sent = number = edge.sent + 1
+    token = Token(value, modifier, stamp, number)
+    target: Worker = edge.target
+    core = target.core
+    if core.trace is not None:
+        core.trace(TokenSent(core.now(), edge.label, token))
+    if edge.tap is not None:
+        edge.tap(token)
+    into_input = edge.target_kind == "input"
+    if into_input and target.blocked & ENDED:
+        _drain(edge, token)
+        return
+    if edge.overflows():
+        if edge.overflow == "drop_newest":
+            drop(edge, token, "overflow")
+            return
+        drop(edge, edge.queue.popleft(), "overflow")
+        if not into_input:
+            remove_call(target, edge)
+        elif not edge.queue:  # for the input nothing has changed: it still holds a token
+            edge.queue.append(token)
+            return
+    edge.queue.append(token)
+    edge.deepest = max(edge.deepest, len(edge.queue))
+    note_full(edge)
+    if into_input:
+        if type(value) is Marker:
+            target.special = True
+        if len(edge.queue) == 1:
+            arrived(edge)
+    else:
+        add_call(target, edge)
+    if modifier > 0 and target.scopes:
+        touch(core, target.scopes)
+
+
+def tell(worker: Worker) -> None:
+    """Send the automatic events of a node that is amid nothing: at once, or behind a change of several edges."""
+    late = worker.core.late
+    if late is None:
+        flush_automatic(worker)
+    else:
+        late.append(worker)
+
+
+@contextmanager
+def telling_behind(core: Core) -> Iterator[None]:
+    """What arises by a change of several edges is told when all of it is done (F10, R4), by subgraphs last (G2)."""
+    if core.late is not None:
+        yield
+        return
+    late: list[Worker] = []
+    core.late = late
+    try:
+        yield
+        for worker in late:  # which grows by what these come to
+            if worker.busy in AMID_NOTHING:
+                flush_automatic(worker)
+    finally:
+        core.late = None
+    derive_scopes(core)
+
+
+def flush_automatic(worker: Worker) -> None:
+    """A9: the automatic events follow as sendings of their own, in the order they arose (D3)."""
+    while worker.events_due:
+        due, worker.events_due = worker.events_due, None
+        for name, value in due:
+            event = worker.events.get(name)
+            if event is not None:
+                trigger(event, value, stamp=worker.core.now(), extend_right=False)  # T5: automatic signals: now

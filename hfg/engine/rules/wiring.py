@@ -1,0 +1,90 @@
+"""Which edges are live, and what that makes of a worker (SEMANTICS "live edge", rules F1, F5, F10, G1).
+
+Called when the plan is made and when something is enabled, disabled, ended or edited; never per token. Stands on
+`worker`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hfg.engine.model.scopes import Scope
+from hfg.engine.model.worker import DISABLED, UNWIRED, Worker
+from hfg.engine.rules.agenda import block, consider, note_full, unplace
+from hfg.ports.edges import EventEdge
+
+__all__ = ["is_live", "refresh", "refresh_via", "rewire"]
+
+
+def is_live(edge: Any) -> bool:
+    """Both ends enabled, or the target is an `enable` slot; and no relay on the way disabled."""
+    if edge.source.blocked & DISABLED:
+        return False
+    if edge.target.blocked & DISABLED and not (edge.target_kind == "slot" and edge.port_name == "enable"):
+        return False
+    around = (*edge.source.around, *edge.target.around)  # whether those are enabled is known by their nodes
+    return all(scope.enabled for scope in edge.via if scope not in around)
+
+
+def refresh(worker: Worker) -> None:
+    """Derive anew what is live around a worker: it and its neighbours."""
+    touched = {worker.index: worker}
+    for edge in worker.edges_in():
+        edge.live = is_live(edge)
+        touched[edge.source.index] = edge.source
+    for edge in worker.all_out_edges():
+        edge.live = is_live(edge)
+        touched[edge.target.index] = edge.target
+    for edge in (*worker.edges_in(), *worker.event_edges()):
+        if type(edge) is EventEdge:
+            note_full(edge)
+    for neighbour in touched.values():
+        rewire(neighbour)
+
+
+def refresh_via(scope: Scope) -> None:
+    """A subgraph was enabled or disabled: edges that only pass through it change too."""
+    if scope.worker is None:
+        return
+    for edge in scope.worker.core.edges:
+        if scope in edge.via:
+            edge.live = is_live(edge)
+            if type(edge) is EventEdge:
+                note_full(edge)
+            rewire(edge.source)
+            rewire(edge.target)
+
+
+def rewire(worker: Worker) -> None:
+    """Derive what a worker waits for and sends on from the liveness of its edges; its step is chosen anew."""
+    worker.out_edges = tuple(tuple(edge for edge in edges if edge.live) for edges in worker.wired_out)
+    live = []
+    for edge in worker.in_edges:
+        if edge.ended and not edge.untaken:
+            continue
+        if type(edge) is EventEdge:
+            if edge.target_kind == "parameter":
+                continue  # takes no part in the join (P8)
+            if edge.live or edge.queue:  # signals sent before the source was disabled are still delivered (F10)
+                live.append(edge)
+        elif edge.live:
+            live.append(edge)
+    worker.live_inputs = tuple(live)
+    missing = sum(1 for edge in live if not edge.untaken)
+    worker.inputs.missing = missing
+    fed = {edge.port_name for edge in live if edge.target_kind == "input"}
+    ended = {edge.port_name for edge in worker.in_edges if edge.ended}
+    wired = worker.process is not None and all(name in fed or name in ended for name in worker.mandatory_ports)
+    if not worker.is_source and not live:
+        wired = False
+    if worker.process is None and not worker.is_boundary_output:
+        wired = False
+    if wired or worker.is_boundary_output:
+        worker.blocked &= ~UNWIRED
+    else:
+        block(worker, UNWIRED)
+    if missing:
+        unplace(worker)
+    worker.core.upstairs.choose_step(worker)
+    if worker.core.started:
+        consider(worker)

@@ -1,0 +1,205 @@
+"""How an async node starts at once, and waits like a task if it suspends, for less.
+
+A coroutine stepped outside a task breaks `asyncio.timeout`, `anyio` and everything else that asks for the current
+task. So each async node has one dormant task, whose identity and context are entered around every step of its
+coroutines. The task itself sleeps on a future that hands cancellation on to the coroutine; what a coroutine waits
+for wakes the coroutine directly, as a task would, without a pass of the loop more.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import contextvars
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from hfg.engine.model.core import PENDING
+
+__all__ = ["Carrier"]
+
+Done = Callable[[Any, BaseException | None], None]
+
+if sys.version_info >= (3, 12):
+    from asyncio.tasks import _swap_current_task as _swap  # type: ignore[attr-defined]
+else:
+    from asyncio.tasks import _enter_task, _leave_task, current_task
+
+    def _swap(loop: asyncio.AbstractEventLoop, task: Any) -> Any:
+        previous = current_task(loop)
+        if previous is not None:
+            _leave_task(loop, previous)
+        if task is not None:
+            _enter_task(loop, task)
+        return previous
+
+
+class _Bed(asyncio.Future[None]):
+    """What a dormant task sleeps on; cancelling the task cancels what it lends its identity to."""
+
+    carrier: Carrier | None = None
+
+    def cancel(self, msg: Any = None) -> bool:
+        """Hand the cancellation on; without a coroutine under way the task itself ends."""
+        carrier = self.carrier
+        if carrier is not None:
+            if carrier.waiting:
+                carrier._cancelled(msg)
+                return True
+            if asyncio.current_task(carrier._loop) is carrier.task:  # a coroutine cancels itself in its first step
+                carrier._cancelled(msg)
+                carrier._loop.call_soon(carrier._forget_cancellation)
+                return True
+        return super().cancel(msg)
+
+
+class Carrier:
+    """The dormant task of one async node.
+
+    Attributes:
+      task: what `asyncio.current_task()` gives inside the node's code.
+      waiting: whether a coroutine is under way.
+    """
+
+    __slots__ = ("_context", "_coroutine", "_done", "_loop", "_must_cancel", "_outside", "_waits_for", "task")
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        name: str,
+        outside: contextvars.Context,
+        context: contextvars.Context | None = None,
+    ) -> None:
+        self._loop = loop
+        self._outside = outside  # in which the engine's own code goes on
+        self._context = outside.copy() if context is None else context
+        self._coroutine: Any = None
+        self._done: Done | None = None
+        self._waits_for: Any = None
+        self._must_cancel: asyncio.CancelledError | None = None
+        self.task: asyncio.Task[None] = loop.create_task(self._sleep(), name=name, context=self._context)
+
+    async def _sleep(self) -> None:
+        bed = _Bed(loop=self._loop)
+        bed.carrier = self
+        await bed
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a coroutine is under way."""
+        return self._coroutine is not None
+
+    def start(self, coroutine: Any, done: Done) -> Any:
+        """Run the first step now.
+
+        Returns:
+          What the coroutine returned, or `PENDING`: it waits, and `done(result, error)` follows on the loop.
+
+        Raises:
+          whatever the coroutine raised in its first step.
+        """
+        loop = self._loop
+        previous = _swap(loop, self.task)
+        try:
+            waits_for = self._context.run(coroutine.send, None)
+        except StopIteration as stop:
+            return stop.value
+        finally:
+            _swap(loop, previous)
+        self._coroutine = coroutine
+        self._done = done
+        self._wait(waits_for)
+        return PENDING
+
+    def cancel(self) -> None:
+        """Cancel the coroutine under way; without one, let the task end."""
+        if self.waiting:
+            self._cancelled(None)
+        else:
+            self.task.cancel()
+
+    def drop(self) -> None:
+        """Run the coroutine no further, whatever it does, and let the task end: the run is over (X3)."""
+        coroutine, self._coroutine = self._coroutine, None
+        future, self._waits_for = self._waits_for, None
+        self._done = self._must_cancel = None
+        if future is not None:
+            future.remove_done_callback(self._wake)
+        if coroutine is not None:
+            previous = _swap(self._loop, self.task)
+            try:
+                with contextlib.suppress(Exception):  # it ignores even this
+                    self._context.run(coroutine.close)
+            finally:
+                _swap(self._loop, previous)
+        self.task.cancel()
+
+    def _cancelled(self, message: Any) -> None:
+        """As `asyncio.Task.cancel`: cancel what it waits for, else throw at the next step."""
+        future = self._waits_for
+        if future is None or not future.cancel(msg=message):
+            self._must_cancel = asyncio.CancelledError() if message is None else asyncio.CancelledError(message)
+
+    def _forget_cancellation(self) -> None:
+        """It was meant for a coroutine that has ended without ever waiting."""
+        if not self.waiting:
+            self._must_cancel = None
+            while self.task.cancelling():
+                self.task.uncancel()
+
+    def _wait(self, waits_for: Any) -> None:
+        """Go on when what the coroutine yielded is done; the protocol between coroutines, futures and tasks."""
+        if waits_for is None:
+            self._loop.call_soon(self._step, context=self._outside)
+            return
+        if getattr(waits_for, "_asyncio_future_blocking", None):
+            waits_for._asyncio_future_blocking = False
+            self._waits_for = waits_for
+            waits_for.add_done_callback(self._wake, context=self._outside)
+            if self._must_cancel is not None and waits_for.cancel():
+                self._must_cancel = None
+            return
+        problem = RuntimeError(f"async code awaited something that asyncio does not know: {waits_for!r}")
+        self._loop.call_soon(self._step, problem, context=self._outside)
+
+    def _wake(self, future: asyncio.Future[Any]) -> None:
+        try:
+            future.result()
+        except BaseException as error:
+            self._step(error)
+        else:
+            self._step()
+
+    def _step(self, error: BaseException | None = None) -> None:
+        coroutine = self._coroutine
+        self._waits_for = None
+        if coroutine is None:
+            return  # dropped
+        if self._must_cancel is not None:
+            error, self._must_cancel = self._must_cancel, None
+        result: Any = None
+        over: BaseException | None = None
+        loop = self._loop
+        previous = _swap(loop, self.task)
+        try:
+            waits_for = (
+                self._context.run(coroutine.send, None) if error is None else self._context.run(coroutine.throw, error)
+            )
+        except StopIteration as stop:
+            result = stop.value
+        except BaseException as problem:
+            over = problem
+        else:
+            self._wait(waits_for)
+            return
+        finally:
+            _swap(loop, previous)
+        done = self._done
+        assert done is not None
+        self._coroutine = self._done = self._must_cancel = None
+        while self.task.cancelling():
+            self.task.uncancel()  # the cancellation ends with the firing it was meant for
+        done(result, over)
+        if isinstance(over, KeyboardInterrupt | SystemExit):
+            raise over

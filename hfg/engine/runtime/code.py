@@ -1,0 +1,291 @@
+"""Runs the code of nodes where it belongs: on the loop, as a coroutine, or in the thread of a group (rules R1, R6, X2).
+
+What a node's code gives back is handed to whoever asked, at once or later, always on the loop. Stands on `carrier`,
+`groups` and `virtual`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import contextvars
+import inspect
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from types import CoroutineType
+from typing import TYPE_CHECKING, Any
+
+from hfg.engine.model.core import PENDING
+from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.rules import errors
+from hfg.engine.rules.sending import trigger
+from hfg.engine.runtime.carrier import Carrier
+from hfg.engine.runtime.groups import Job
+from hfg.engine.runtime.virtual import VirtualTimeLoop
+
+if TYPE_CHECKING:
+    from hfg.engine.runtime.engine import Engine
+
+__all__ = ["CodeRunner", "answer", "whose_code"]
+
+_code_of: contextvars.ContextVar[Worker | None] = contextvars.ContextVar("hfg.code_of", default=None)
+
+Done = Callable[[Any, BaseException | None], None]
+
+
+def whose_code() -> Worker | None:
+    """Give the async node in whose code, or in a task it has started, this is called."""
+    return _code_of.get()
+
+
+def answer(waiter: asyncio.Future[Any], value: Any) -> None:
+    """Give a waiting future its result, unless whoever waited has gone."""
+    if not waiter.done():
+        waiter.set_result(value)
+
+
+class CodeRunner:
+    """Runs the code of the nodes of one engine.
+
+    Attributes:
+      given_up: carriers of firings that took too long, until their code has ended.
+      aside: hooks of activity that wait.
+      came_back: set when code that was under way at the end of the run is over.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self.loop = engine.loop
+        self.core = engine.core
+        self.context = engine.context
+        self.given_up: set[Any] = set()
+        self.aside: set[asyncio.Task[None]] = set()
+        self.came_back = asyncio.Event()
+        self._early_signals: dict[int, list[Callable[[], None]]] = {}
+
+    def execute(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+        """See `Host`."""
+        if worker.group.threaded and not inspect.iscoroutinefunction(call):
+            self._in_thread(worker, call, arguments, done)
+            return
+        core = self.core
+        core.current = worker
+        try:
+            result = call(*arguments)
+        except Exception as error:
+            core.current = None
+            done(None, error)
+            return
+        core.current = None
+        if type(result) is CoroutineType or (worker.is_async and hasattr(result, "__await__")):
+            self.drive(worker, result, done)
+        else:
+            done(result, None)
+
+    def drive(self, worker: Worker, coroutine: Any, done: Done) -> None:
+        """See `Host`."""
+        carrier = worker.carrier
+        if carrier is None:
+            carrier = worker.carrier = self.carrier(worker)
+        self.core.current = worker
+        try:
+            result = carrier.start(coroutine, self.late(worker, done))
+        except Exception as error:
+            self.core.current = None
+            done(None, error)
+            return
+        self.core.current = None
+        if result is not PENDING:
+            done(result, None)
+            return
+        self.begin(worker)
+        self._limit(worker)
+
+    def carrier(self, worker: Worker) -> Carrier:
+        """Make the dormant task of an async node, in a context that tells whose code runs."""
+        context = self.context.copy()
+        context.run(_code_of.set, worker)
+        return Carrier(self.loop, f"hfg {worker.path}", self.context, context)
+
+    def _limit(self, worker: Worker) -> None:
+        """X2: the firing may not take longer than its limit."""
+        options = worker.options
+        if options is not None and options.max_duration_s is not None and worker.busy == "firing":
+            worker.limit_timer = self.core.after(options.max_duration_s, lambda: errors.time_out(worker))
+
+    def begin(self, worker: Worker) -> None:
+        """See `Host`."""
+        worker.in_flight = True
+        worker.core.in_flight += 1
+
+    def late(self, worker: Worker, done: Done) -> Done:
+        """See `Host`."""
+        closing = self.core.over  # a hook of the teardown; what began before the end is not listened to after it
+
+        def over(result: Any, error: BaseException | None) -> None:
+            if worker.in_flight and (worker.carrier is carrier or carrier is None):
+                worker.in_flight = False
+                worker.core.in_flight -= 1
+            elif carrier in self.given_up:
+                self.given_up.discard(carrier)
+                carrier.drop()  # its task has nothing to do any more
+            if outer.over:
+                self.came_back.set()
+                if not closing:
+                    return
+            try:
+                done(result, error)
+            except Exception as fault:
+                self._engine.internal_fault(fault)
+            if inside is not None:
+                inside.look_later()
+            engine.go_on()
+
+        inside = worker.core.inside
+        outer = self.core
+        engine = self._engine
+        carrier = worker.carrier
+        return over
+
+    def _in_thread(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+        group: Any = worker.group
+        closing = self.core.over
+        self.begin(worker)
+
+        def back(job: Job) -> None:
+            if job is not worker_job:
+                return
+            group.returned(job)
+            self._is_back(worker)
+            if self.core.over:
+                self.came_back.set()
+            if not self.core.over or closing:
+                done(job.result, job.error)
+            if worker.core.inside is not None:
+                worker.core.inside.look_later()
+
+        worker_job = Job(worker, back, call, arguments, done)
+        worker.job = worker_job
+        if isinstance(self.loop, VirtualTimeLoop):
+            limit = worker.options.max_duration_s if worker.busy == "firing" else None
+            worker_job.held = self.loop.hold(limit, lambda: self._engine.guard(partial(errors.time_out, worker)))
+        else:
+            self._limit(worker)
+        group.submit(worker_job)
+
+    def _is_back(self, worker: Worker) -> None:
+        """Its code is over, or given up."""
+        worker.in_flight = False
+        worker.core.in_flight -= 1
+        if worker.job is not None:
+            worker.job = None
+            worker.node._active = worker.active
+
+    def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Done) -> None:
+        """See `Host`."""
+        try:
+            result = call()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            done(None, error)
+            return
+        if type(result) is not CoroutineType:
+            done(result, None)
+            return
+        self.core.in_flight += 1
+
+        async def aside() -> None:
+            error: BaseException | None = None
+            try:
+                await result
+            except Exception as problem:
+                error = problem
+            finally:
+                self.core.in_flight -= 1
+            if not self.core.over:
+                done(None, error)
+                self._engine.kick()
+
+        task = self.loop.create_task(aside(), context=self.context)
+        self.aside.add(task)
+        task.add_done_callback(self.aside.discard)
+
+    def interrupt(self, worker: Worker) -> None:
+        """See `Host`."""
+        if not worker.in_flight:
+            return
+        job = worker.job
+        self._is_back(worker)
+        group: Any = worker.group
+        if group.threaded:
+            job.owner = lambda _job: None
+            if isinstance(self.loop, VirtualTimeLoop):
+                self.loop.drop(job.held)
+                job.held = None
+            group.abandon(f'"{worker.path}", firing {worker.firings}', job)
+        else:
+            carrier, worker.carrier = worker.carrier, None
+            self.given_up.add(carrier)
+            carrier.cancel()
+
+    async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+        """Trigger, then wait until no `wait` queue behind the node's events is full (F8)."""
+        trigger(event, value, activity, stamp)
+        worker = event.worker
+        core = worker.core
+        own = whose_code() is worker  # its own code waits for us, not we for it
+        while worker.full_edges and core.started and not core.over:
+            waiter: asyncio.Future[None] = self.loop.create_future()
+            if worker.room_waiters is None:
+                worker.room_waiters = []
+            worker.room_waiters.append(partial(answer, waiter, None))
+            worker.waiting_room += own
+            core.waiting_room += own
+            core.host.kick()
+            try:
+                await waiter
+            finally:
+                worker.waiting_room -= own
+                core.waiting_room -= own
+
+    # --- from threads -----------------------------------------------------------------------------------------------
+
+    def deliver(self, box: deque[Any]) -> None:
+        """From a thread: one wake-up for all that it has put into its box by then."""
+        with contextlib.suppress(RuntimeError):  # the loop is closed: the run is over, nobody waits for this
+            self.loop.call_soon_threadsafe(self._collect, box, context=self.context)
+
+    def _collect(self, box: deque[Any]) -> None:
+        while box:
+            item = box.popleft()
+            if isinstance(self.loop, VirtualTimeLoop):
+                self._hold_back(self.loop, box, item)
+            elif isinstance(item, Job):
+                self._engine.guard(partial(item.owner, item))
+            elif not self.core.over:
+                self._engine.guard(item)
+        self._engine.go_on()
+
+    def _hold_back(self, loop: VirtualTimeLoop, box: deque[Any], item: Any) -> None:
+        """In virtual time what a thread brings comes in when the clock says so.
+
+        A job with the signals before it (R6).
+        """
+        if not isinstance(item, Job):
+            self._early_signals.setdefault(id(box), []).append(item)
+            return
+        signals = self._early_signals.pop(id(box), [])
+
+        def arrive() -> None:
+            for signal in signals:
+                if not self.core.over:
+                    self._engine.guard(signal)
+            self._engine.guard(partial(item.owner, item))
+            self._engine.go_on()
+
+        if item.held is None:
+            arrive()
+        else:
+            item.held.deliver = arrive

@@ -1,0 +1,496 @@
+"""The part of a run that waits: the pump, timers, coroutines and threads (rules R1, R5, R6, X2, X3).
+
+What is to happen is decided in `firing`, `sending` and `quiet`; here it is made to happen on one event loop, without
+a task per hop. Stands on all of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+from hfg.clock import current_clock
+from hfg.engine.editing.edits import Edits
+from hfg.engine.editing.pausing import Halt, Pausing
+from hfg.engine.fusion import steps
+from hfg.engine.model.core import Core
+from hfg.engine.model.policies import make_policy
+from hfg.engine.model.worker import TORN_DOWN, Worker
+from hfg.engine.observing.consumers import Consumers
+from hfg.engine.observing.measuring import Measuring
+from hfg.engine.observing.taps import Taps
+from hfg.engine.rules import quiet
+from hfg.engine.runtime import plan, rx
+from hfg.engine.runtime.code import CodeRunner, answer
+from hfg.engine.runtime.groups import Dispatching, Group, LoopGroup, SideGroup, ThreadGroup
+from hfg.engine.runtime.lifetime import Lifetime
+from hfg.engine.runtime.settings import Settings
+from hfg.engine.runtime.upstairs import Deciders
+from hfg.engine.runtime.virtual import VirtualTimeLoop
+from hfg.errors import EngineInternalError, HfgError, NodeError, RunError
+from hfg.graph.flat import FlatGraph
+from hfg.trace import TraceEvent
+
+__all__ = ["Engine"]
+
+_LOGGER = logging.getLogger("hfg.engine")
+_SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
+_SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
+_VIRTUAL_SLICE_STEPS = 2048  # in virtual time a slice must not depend on how fast the machine is
+_VIRTUAL_LOOK_STEPS = 8  # it ends sooner only where code has spent virtual time
+
+_MOST_AT_ONE_INSTANT = 3_000_000  # firings, before a run with `until_s` is taken to stand still
+
+Done = Callable[[Any, BaseException | None], None]
+
+
+class _Timer:
+    """A pending call that keeps the run from being quiet."""
+
+    __slots__ = ("_callback", "_counts", "_engine", "_handle")
+
+    def __init__(self, engine: Engine, when: float, callback: Callable[[], None], counts: bool) -> None:
+        self._engine = engine
+        self._callback = callback
+        self._counts = counts
+        self._handle: asyncio.TimerHandle | None = engine.loop.call_at(when, self._run, context=engine.context)
+        engine.core.timers += counts
+
+    def _run(self) -> None:
+        self._handle = None
+        engine = self._engine
+        engine.core.timers -= self._counts
+        if not engine.core.over:
+            engine.guard(self._callback)
+            engine.go_on()
+
+    def recount(self, counts: bool) -> None:
+        if self._handle is not None:
+            self._engine.core.timers += counts - self._counts
+            self._counts = counts
+
+    def cancel(self) -> None:
+        if self._handle is not None:
+            self._handle.cancel()
+            self._handle = None
+            self._engine.core.timers -= self._counts
+            self._engine.kick()
+
+
+class Engine:
+    """Runs one flattened graph on the running event loop, once.
+
+    Attributes:
+      core: the state the deciding modules work on.
+      epoch: what the run's clock is ahead of the machine's monotonic one; None: it follows another.
+      consumers: who listens to the trace.
+      taps: who looks at ports and edges.
+      measuring: what keeps statistics, from the first time somebody asks.
+      finished: done when the run is over and torn down; its result is the outcome, its exception what went wrong.
+      holds: people outside who may still bring something (R5).
+      readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
+      read_out: those whose END somebody has read.
+    """
+
+    def __init__(self, flat: FlatGraph, settings: Settings) -> None:
+        self.loop = asyncio.get_running_loop()
+        self.settings = settings
+        self.virtual = isinstance(self.loop, VirtualTimeLoop)
+        self._epoch = 0.0 if self.virtual else time.time() - self.loop.time()
+        standard = type(self.loop).time is asyncio.BaseEventLoop.time
+        self.epoch = self._epoch if standard else None
+        self.context = contextvars.copy_context()
+        self.context.run(current_clock.set, self.now)
+        self.core: Core = Core(self, Deciders())
+        self.consumers = Consumers(self._listen, self)
+        self.measuring: Measuring | None = None
+        self.taps = Taps(self)
+        self.core.debug = settings.debug
+        self.core.fast = settings.fast
+        self.flat: FlatGraph = flat
+        self.holds = 0
+        self.readers: list[Worker] = []
+        self.read_out: set[Worker] = set()
+        self.senders: list[Worker] = []  # feeds for which somebody outside has a token, once for each
+        self._quiet_waiters: list[asyncio.Future[None]] = []
+        self.ended_how: tuple[str, HfgError | None] | None = None
+        self.ending: asyncio.Event = asyncio.Event()
+        self._scheduled = False
+        self._thread = threading.get_ident()
+        self._ready_groups: deque[Dispatching] = deque()
+        self.scheduler = rx.RunScheduler(self)
+        self.code = code = CodeRunner(self)
+        self.lifetime = Lifetime(self)
+        # the host's part that others do for it
+        self.execute = code.execute
+        self.drive = code.drive
+        self.begin = code.begin
+        self.late = code.late
+        self.execute_aside = code.execute_aside
+        self.interrupt = code.interrupt
+        self.trigger_wait = code.trigger_wait
+        self.start = self.lifetime.start
+        self.close = self.lifetime.close
+        self.groups = self._make_groups()
+        self.pausing = Pausing(self)
+        self.edits = Edits(self)
+        self._loop_group = self.groups["loop"]
+        self.started_at = 0.0
+        self.hurried = asyncio.Event()
+        self._leave_by = float("inf")
+        self.ended_at: float | None = None
+        self._instant = -1.0
+        self._instant_steps = 0
+        plan.build(self.core, flat, self.groups, loop=self._loop_group)
+        if settings.trace is not None:
+            self.consumers.add(settings.trace)
+
+    # --- time -------------------------------------------------------------------------------------------------------
+
+    def now(self) -> float:
+        """Seconds on the run's clock."""
+        return self.loop.time() + self._epoch
+
+    def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> _Timer:
+        """See `Host`."""
+        return _Timer(self, when - self._epoch, callback, counts)
+
+    # --- groups -----------------------------------------------------------------------------------------------------
+
+    def all_cores(self) -> Iterator[Core]:
+        """The run itself and those inside iterations."""
+        stack = [self.core]
+        while stack:
+            core = stack.pop()
+            yield core
+            stack.extend(worker.iteration.core for worker in core.workers if worker.iteration is not None)
+
+    def all_workers(self) -> Iterator[Worker]:
+        """Those inside iterations too."""
+        return (worker for core in self.all_cores() for worker in core.workers)
+
+    def _make_groups(self) -> dict[str, Group]:
+        groups: dict[str, Group] = {}
+        settings = self.settings
+        clock = self.now if self.virtual else time.perf_counter  # a run in virtual time is the same each time (R6)
+        for name, spec in self.flat.groups.items():
+            seed = settings.seed if spec.seed is None else spec.seed
+            policy = make_policy(settings.policy or spec.policy, seed)
+            if spec.threads:
+                groups[name] = ThreadGroup(name, policy, clock, self._ready_groups, self.code.deliver, self.context)
+            elif name == "loop":
+                groups[name] = LoopGroup(name, policy, clock)
+            else:
+                groups[name] = SideGroup(name, policy, clock, self._ready_groups)
+        return groups
+
+    def on_loop(self) -> bool:
+        """Whether the caller is on the run's own thread."""
+        return threading.get_ident() == self._thread
+
+    def from_any_thread(self, call: Callable[[], None]) -> None:
+        """Do this on the loop; calls of one thread keep their order."""
+        if self.on_loop():
+            call()
+        else:
+            self.loop.call_soon_threadsafe(call, context=self.context)
+
+    def bring_in(self, call: Callable[[], None]) -> None:
+        """From a thread that is none of ours: do this on the loop, in order, unless the run is over by then."""
+
+        def arrive() -> None:
+            if not self.core.over:
+                self.guard(call)
+                self.go_on()
+
+        self.loop.call_soon_threadsafe(arrive, context=self.context)
+
+    # --- the pump ---------------------------------------------------------------------------------------------------
+
+    def kick(self) -> None:
+        """Something may be queued: see to it that the pump runs."""
+        if not self._scheduled and not self.core.pumping:
+            self._scheduled = True
+            self.loop.call_soon(self._pump, context=self.context)
+
+    def go_on(self) -> None:
+        """At the end of a callback of the loop: pump at once, which saves a pass of the loop.
+
+        In virtual time not before everything else that is due at this instant has had its turn.
+        """
+        if not self._scheduled and not self.core.pumping:
+            if self.virtual and self.loop._ready:  # type: ignore[attr-defined]
+                self.kick()
+            else:
+                self._pump()
+
+    def _pump(self) -> None:
+        """Drain the loop group within a slice; a hop is a few function calls."""
+        self._scheduled = False
+        core = self.core
+        if core.over or not core.started:
+            return
+        if self._rests():
+            return
+        policy: Any = self._loop_group.policy
+        core.pumping = True
+        try:
+            self._drain(policy, self._loop_group.take, self._ready_groups)
+        except Halt:
+            pass
+        except Exception as error:
+            self.internal_fault(error)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            self.misused(core.current or core.speaker, error)
+        finally:
+            core.pumping = False
+            core.current = core.speaker = None
+        if self.measuring is not None:
+            self.measuring.pumped()
+        if self.ended_how is not None:
+            return
+        if self._rests():
+            return
+        if policy or self._ready_groups:
+            self.kick()
+        else:
+            self._settle()
+
+    def _rests(self) -> bool:
+        """R3: paused, so nothing new starts: it is quiet when nothing is under way, but does not end by that."""
+        if self.pausing.paused:
+            if not self.pausing.is_under_way():
+                self._answer_quiet()
+            self.pausing.rest()
+        return self.pausing.paused
+
+    def internal_fault(self, error: BaseException) -> None:
+        """A fault of ours must end the run, not hang it."""
+        problem = (
+            error
+            if isinstance(error, HfgError)
+            else EngineInternalError(f"{type(error).__name__}: {error}; please report this")
+        )
+        if problem is not error:
+            problem.__cause__ = error
+        self.finish("failed", problem)
+
+    def misused(self, worker: Worker | None, error: BaseException, what: str = "its code") -> None:
+        """A node's code raised what is no error but Python's way to end a task or the program: without us a hang."""
+        cause: BaseException | str = error
+        if isinstance(error, SystemExit):
+            cause = "it left the program (sys.exit): end the run by an event that is connected to graph.stop"
+        problem = NodeError(worker.path if worker is not None else "", what, cause)
+        problem.__cause__ = error
+        self.finish("failed", problem)
+
+    def guard(self, call: Callable[[], None]) -> None:
+        """Call something of ours in a callback of the loop; what it raises ends the run."""
+        try:
+            call()
+        except KeyboardInterrupt:
+            raise
+        except Exception as error:
+            self.internal_fault(error)
+        except BaseException as error:
+            self.misused(self.core.current or self.core.speaker, error)
+
+    def _drain(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
+        """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock."""
+        core = self.core
+        between_looks = _VIRTUAL_LOOK_STEPS if self.virtual else _SLICE_STEPS
+        left = between_looks
+        looks = _VIRTUAL_SLICE_STEPS // _VIRTUAL_LOOK_STEPS
+        instant = self.loop.time() if self.virtual else 0.0
+        until = 0.0
+        while True:
+            if ready_groups:
+                ready_groups.popleft().dispatch()
+            if policy:
+                worker = take()
+                worker.step(worker)
+            elif not ready_groups:
+                return
+            left -= 1
+            if not left:
+                if core.over:
+                    return
+                if self.virtual:
+                    looks -= 1
+                    if not looks:
+                        self._same_instant()
+                    if not looks or self.loop.time() != instant:  # what is due by now has its turn
+                        return
+                    left = between_looks
+                    continue
+                now = time.monotonic()
+                if not until:
+                    until = now + _SLICE_S
+                elif now >= until:
+                    return
+                left = between_looks
+
+    def _same_instant(self) -> None:
+        """R6: with `until_s`, something that goes on and on without letting time pass is refused in the end."""
+        now = self.loop.time()
+        if now != self._instant:
+            self._instant, self._instant_steps = now, 0
+        self._instant_steps += _VIRTUAL_SLICE_STEPS
+        if self._instant_steps > _MOST_AT_ONE_INSTANT and self.settings.until_s is not None:
+            busiest = max(self.core.workers, key=lambda worker: worker.firings + worker.call_number)
+            self.finish(
+                "failed",
+                RunError(
+                    f"virtual time has stood still at {now:g} s for {self._instant_steps:,} firings, so until_s would "
+                    f'never come; "{busiest.path}" fired most: give the source in front of it max_rate_hz='
+                ),
+            )
+
+    def _settle(self) -> None:
+        """The run queues are empty: is the graph quiet, and if so, what follows?"""
+        core = self.core
+        if core.timers:
+            return
+        if core.in_flight and not (
+            (core.futile and self._only_futile_works()) or (core.waiting_room and quiet.only_waiting_for_room(core))
+        ):
+            return
+        self.quiet()
+
+    def _only_futile_works(self) -> bool:
+        """R5: only sources that feed ended nodes are under way, and nobody stands behind them in their group."""
+        if any(isinstance(group, ThreadGroup) and len(group.policy) for group in self.groups.values()):
+            return False
+        return quiet.only_futile_in_flight(self.core, threads_too=not self.virtual)
+
+    def quiet(self) -> None:
+        """Nothing runs, nothing can start, no timer is pending (F8, P9, F13, R5)."""
+        core = self.core
+        if any(not feed.outputs.missing for feed in self.senders):
+            return  # a token is about to come
+        if quiet.grow(core) or core.timers:
+            return
+        self._answer_quiet()
+        if self.holds or any(reader.inputs_ready() for reader in self.readers):
+            return
+        if quiet.complete_operators(core):
+            self.kick()
+            return
+        if core.timers > 0:
+            return
+        if quiet.end_events(core):
+            self.kick()
+            return
+        stalled = quiet.stall(core)
+        self.finish("done" if stalled is None else "stalled", stalled)
+
+    def _answer_quiet(self) -> None:
+        waiters, self._quiet_waiters = self._quiet_waiters, []
+        for waiter in waiters:
+            answer(waiter, None)
+
+    async def wait_quiet(self) -> None:
+        """Wait until only something outside can change anything; returns at once if the run is over."""
+        if self.core.over:
+            return
+        waiter: asyncio.Future[None] = self.loop.create_future()
+        self._quiet_waiters.append(waiter)
+        self.kick()
+        await waiter
+
+    def hold(self) -> None:
+        """Somebody outside may still bring something: the run stays open (R5)."""
+        self.holds += 1
+
+    def unhold(self) -> None:
+        """One fewer."""
+        self.holds -= 1
+        self.kick()
+
+    def adopt_event(self, port: Any) -> None:
+        """Give an event the run's scheduler and thread (ARCHITECTURE §3)."""
+        port._scheduler = self.scheduler
+        port._thread = self._thread
+
+    # --- the end ----------------------------------------------------------------------------------------------------
+
+    @property
+    def teardown_limit_s(self) -> float:
+        """X3: how long one node may take; when somebody wants to leave, what is left for all of them."""
+        return max(0.0, min(self.settings.teardown_limit_s, self._leave_by - time.monotonic()))
+
+    def hurry(self) -> None:
+        """Somebody wants to leave: tear down what can be torn down in 1.5 s, for in two the process is to be over."""
+        if not self.hurried.is_set():
+            self._leave_by = time.monotonic() + 1.5
+            self.hurried.set()
+
+    def leave_now(self) -> None:
+        """Somebody is tired of waiting: wait for nothing any more."""
+        self._leave_by = 0.0
+        self.hurried.set()
+
+    def finish(self, outcome: str, error: HfgError | None) -> None:
+        """See `Host`."""
+        if self.ended_how is not None:
+            return
+        self.ended_how = (outcome, error)
+        self.core.over = True
+        self.ended_at = self.now()
+        for worker in self.all_workers():
+            worker.core.over = True
+            worker.blocked |= TORN_DOWN
+            worker.placed = False  # what is queued already does nothing
+            if worker.room_waiters is not None:
+                for waiter in worker.room_waiters:
+                    waiter()
+        if self.measuring is not None:
+            self.measuring.end()
+        self.taps.end()
+        self._answer_quiet()
+        self.pausing.rest()
+        self.ending.set()
+
+    @property
+    def outcome(self) -> str:
+        """How the run ended; "running" while it does."""
+        return "running" if self.ended_how is None else self.ended_how[0]
+
+    @property
+    def error(self) -> HfgError | None:
+        """What the run failed with, if it did."""
+        return None if self.ended_how is None else self.ended_how[1]
+
+    # --- the trace --------------------------------------------------------------------------------------------------
+
+    def measure(self) -> Measuring:
+        """Keep statistics, from now on if nobody has asked before."""
+        if self.measuring is None:
+            self.measuring = Measuring(self)
+            if self.ended_how is not None:
+                self.measuring.end()
+        return self.measuring
+
+    def looked_at_anew(self, workers: Sequence[Worker], swapped: Mapping[Any, Any]) -> None:
+        """The graph was edited: who looks at it finds its places again; these workers have another node (R4)."""
+        if self.measuring is not None:
+            self.measuring.refit(workers)
+        self.taps.find_again(swapped)
+        self.pausing.find_again(swapped)
+
+    def _listen(self, take: Callable[[TraceEvent], None] | None) -> None:
+        """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""
+        core = self.core
+        core.trace = take
+        core.speaker = None
+        if core.started:
+            for worker in core.workers:
+                steps.choose(worker)

@@ -1,0 +1,272 @@
+"""Where nodes run: the loop group, other groups on the loop, and thread groups (rules R1, R2, X2).
+
+Who of a group is next is for its policy. The loop group is drained by the pump in `engine`, the others dispatch when
+the pump lets them. Threads are our own and daemons: an executor's stuck job would hold the interpreter's exit. Stands
+on `worker` and `policies`.
+"""
+
+from __future__ import annotations
+
+import contextvars
+import queue
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from hfg.engine.model.policies import FairShare, Fifo, Policy
+from hfg.engine.model.worker import Worker
+from hfg.errors import UsageError
+
+__all__ = ["Dispatching", "Group", "Job", "LoopGroup", "SideGroup", "ThreadGroup"]
+
+
+_DISPATCH_STEPS = 16  # how much one group may do on the loop before others have their turn
+
+
+class Group:
+    """Nodes that never run at the same time.
+
+    Attributes:
+      push: takes in a worker that can move.
+      take: gives out what is to be stepped next.
+    """
+
+    threaded = False
+    held = False  # the run is paused: nobody of it moves
+
+    def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
+        self.name = name
+        self.policy = policy
+        self.push: Callable[[Worker], None] = policy.push
+        self.take: Callable[[], Any] = policy.popleft if isinstance(policy, Fifo) else policy.pop
+        self.fair = policy if isinstance(policy, FairShare) else None
+        self.clock = clock  # read only where time is shared
+
+    def charge(self, worker: Worker, busy_s: float) -> None:
+        """A worker has kept the group busy for so long."""
+        if self.fair is not None:
+            self.fair.charge(worker, busy_s)
+
+
+class LoopGroup(Group):
+    """The nodes that run on the event loop itself."""
+
+    def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
+        super().__init__(name, policy, clock)
+        if self.fair is not None:
+            self.take = _Turn(self).take
+
+
+class _Turn:
+    """Stands for the worker whose turn on the loop is measured; only where time is shared: others pay nothing."""
+
+    __slots__ = ("_clock", "_group", "_worker")
+
+    def __init__(self, group: Group) -> None:
+        self._group = group
+        self._clock = group.clock
+        self._worker: Any = None
+
+    def take(self) -> _Turn:
+        self._worker = self._group.policy.pop()
+        return self
+
+    def step(self, _: _Turn) -> None:
+        worker, began = self._worker, self._clock()
+        try:
+            worker.step(worker)
+        finally:
+            self._group.charge(worker, self._clock() - began)
+
+
+class SideGroup(LoopGroup):
+    """Nodes on the loop that are told apart from the loop group: they have a policy of their own."""
+
+    def __init__(self, name: str, policy: Policy, clock: Callable[[], float], ready_groups: deque[Dispatching]) -> None:
+        super().__init__(name, policy, clock)
+        self.push = self._push
+        self._ready_groups = ready_groups
+        self._stands = False  # in ready_groups
+
+    def _push(self, worker: Worker) -> None:
+        self.policy.push(worker)
+        self._stand()
+
+    def _stand(self) -> None:
+        if not self._stands and len(self.policy):
+            self._stands = True
+            self._ready_groups.append(self)
+
+    def dispatch(self) -> None:
+        """Let some nodes move; then others have their turn."""
+        self._stands = False
+        try:
+            for _ in range(_DISPATCH_STEPS):
+                if self.held or not len(self.policy):
+                    return
+                worker = self.take()
+                worker.step(worker)
+        finally:
+            self._stand()
+
+
+class Job:
+    """A call for a thread, and what came of it."""
+
+    __slots__ = ("arguments", "began", "call", "done", "error", "held", "owner", "result", "worker")
+
+    def __init__(
+        self,
+        worker: Worker,
+        owner: Any,
+        call: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        done: Callable[[Any, BaseException | None], None],
+    ) -> None:
+        self.worker = worker
+        self.owner = owner
+        self.call = call
+        self.arguments = arguments
+        self.done = done
+        self.began = 0.0  # where time is shared
+        self.held: Any = None  # what keeps virtual time from passing until it is back
+        self.result: Any = None
+        self.error: BaseException | None = None
+
+
+class ThreadGroup(Group):
+    """A thread of its own. The loop decides what it does next; results and signals come back in order.
+
+    Many with one wake-up.
+
+    Attributes:
+      running: jobs given to the thread and not yet back.
+      ready: set when it stands in the pump's list of groups that may dispatch.
+    """
+
+    threaded = True
+
+    def __init__(
+        self,
+        name: str,
+        policy: Policy,
+        clock: Callable[[], float],
+        ready_groups: deque[Dispatching],
+        deliver: Callable[[deque[Any]], None],
+        context: contextvars.Context,
+    ) -> None:
+        super().__init__(name, policy, clock)
+        self.push = self._push
+        self.running = 0
+        self._ready_groups = ready_groups
+        self._deliver = deliver
+        self._context = context
+        self._lane: _Lane | None = None
+        self.abandoned: list[tuple[str, threading.Thread]] = []
+
+    def _push(self, worker: Worker) -> None:
+        self.policy.push(worker)
+        if not self.running:
+            self._ready_groups.append(self)
+
+    def dispatch(self) -> None:
+        """Let nodes start until the thread is busy; on the loop."""
+        policy = self.policy
+        for _ in range(_DISPATCH_STEPS):
+            if self.held:
+                break
+            if self.running or not len(policy):
+                return
+            worker = self.take()
+            worker.step(worker)
+        if not self.running and len(policy):
+            self._ready_groups.append(self)  # silent firings need no thread: others have their turn
+
+    def submit(self, job: Job) -> None:
+        """Give the thread a job; on the loop."""
+        if self._lane is None:
+            self._lane = _Lane(self.name, self._deliver, self._context.copy())
+        self.running += 1
+        if self.fair is not None:
+            job.began = self.clock()
+        self._lane.jobs.put(job)
+
+    def returned(self, job: Job) -> None:
+        """A job came back; on the loop."""
+        self.running -= 1
+        if self.fair is not None:
+            self.charge(job.worker, self.clock() - job.began)
+        if not self.running and len(self.policy):
+            self._ready_groups.append(self)
+
+    def signal(self, call: Callable[[], None]) -> None:
+        """From the group's own thread: do this on the loop, before the result of the job under way (F3)."""
+        lane = _Lane.current()
+        if lane is None:
+            raise UsageError(
+                f'a signal of group "{self.name}" came from a thread that is none of the group\'s: use run.trigger'
+            )
+        lane.send(call)
+
+    def abandon(self, what: str, job: Job) -> None:
+        """X2: the job under way does not come back; the group goes on in a new thread."""
+        if self.fair is not None:
+            self.charge(job.worker, self.clock() - job.began)
+        lane, self._lane = self._lane, None
+        if lane is not None:
+            lane.given_up = True
+            lane.jobs.put(None)
+            self.abandoned.append((what, lane.thread))
+        self.running = 0
+        if len(self.policy):
+            self._ready_groups.append(self)
+
+    def stop(self) -> threading.Thread | None:
+        """Let the thread end after what it is doing."""
+        lane, self._lane = self._lane, None
+        if lane is None:
+            return None
+        lane.jobs.put(None)
+        return lane.thread
+
+
+Dispatching: TypeAlias = SideGroup | ThreadGroup
+"""Groups that let their nodes move when the pump comes to them."""
+
+
+class _Lane:
+    """One thread, its jobs, and what it has for the loop."""
+
+    _local = threading.local()
+
+    def __init__(self, name: str, deliver: Callable[[deque[Any]], None], context: contextvars.Context) -> None:
+        self.jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self.given_up = False
+        self._deliver = deliver
+        self._out: deque[Any] = deque()
+        self.thread = threading.Thread(target=context.run, args=(self._live,), name=f"hfg group {name}", daemon=True)
+        self.thread.start()
+
+    @classmethod
+    def current(cls) -> _Lane | None:
+        return getattr(cls._local, "lane", None)
+
+    def send(self, item: Any) -> None:
+        """Hand something to the loop: one wake-up for all that is there when it looks."""
+        if self.given_up:
+            return
+        first = not self._out
+        self._out.append(item)
+        if first:
+            self._deliver(self._out)
+
+    def _live(self) -> None:
+        self._local.lane = self
+        while (job := self.jobs.get()) is not None:
+            try:
+                job.result = job.call(*job.arguments)
+            except BaseException as error:
+                job.error = error
+            self.send(job)
+            del job

@@ -1,0 +1,197 @@
+"""A subgraph that iterates over collections (rule G4): the inside sees the elements one by one.
+
+Each to quiet before the next.
+
+The inside is a run of its own within the run: a core with its own idea of quiet, whose workers stand in the same
+groups. Outside, the subgraph is one node that fires. Stands on `plan` and `quiet`; waits for nothing itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from hfg.engine.model.core import Core, Timer
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules import errors, firing, quiet
+from hfg.engine.rules.releasing import take_from_reader
+from hfg.engine.rules.sending import put_outputs
+from hfg.engine.runtime import plan
+from hfg.engine.runtime.code import answer
+from hfg.graph.flat import FlatGraph
+from hfg.token import NO_MESSAGE, Marker
+
+__all__ = ["Iteration"]
+
+
+class _InnerHost:
+    """The engine, as the inside sees it: the same, but it is told what is under way inside."""
+
+    def __init__(self, outer: Any, iteration: Iteration) -> None:
+        self._outer = outer
+        self._iteration = iteration
+        self.now = outer.now
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._outer, name)
+
+    def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> Timer:
+        """A timer of the inside keeps the inside from being quiet too."""
+        if not counts:
+            return self._outer.call_at(when, callback, counts=False)  # type: ignore[no-any-return]
+        core = self._iteration.core
+        core.timers += 1
+
+        def due() -> None:
+            core.timers -= 1
+            callback()
+            self._iteration.settle()
+
+        timer: Timer = self._outer.call_at(when, due)
+        return _InnerTimer(timer, core)
+
+    def kick(self) -> None:
+        """Something inside may move, or the inside may be quiet now."""
+        self._outer.kick()
+        self._iteration.look_later()
+
+
+class _InnerTimer:
+    def __init__(self, timer: Timer, core: Core) -> None:
+        self._timer = timer
+        self._core = core
+        self._open = True
+
+    def cancel(self) -> None:
+        if self._open:
+            self._open = False
+            self._core.timers -= 1
+            self._timer.cancel()
+
+
+class Iteration:
+    """The inside of one iterating subgraph."""
+
+    def __init__(self, worker: Worker, flat: FlatGraph, groups: Any, loop: Any) -> None:
+        self.worker = worker
+        outer = worker.core
+        host: Any = _InnerHost(outer.host, self)
+        self.core = Core(host, outer.upstairs)
+        self.core.pumping = True  # whatever is queued inside kicks the pump by itself
+        self.core.debug = outer.debug
+        self.core.fast = False
+        self.core.inside = self
+        self._over = worker.options.iterate_over
+        self._elements: list[tuple[Any, ...]] = []
+        self._position = 0
+        self._results: list[list[Any]] = []
+        self._queued = 0
+        self._waiters: list[asyncio.Future[None]] = []
+        self._looking = False
+        plan.build(self.core, flat, groups, loop=loop)
+        for inner in self.core.workers:
+            if not inner.is_boundary_output:
+                inner.push = self._counted(inner.push)
+
+    def _counted(self, push: Callable[[Worker], None]) -> Callable[[Worker], None]:
+        def counted(inner: Worker) -> None:
+            self._queued += 1
+            inner.core.host.kick()
+            push(inner)
+
+        return counted
+
+    def step(self, inner: Worker) -> None:
+        """One worker of the inside does its next piece of work."""
+        self._queued -= 1
+        firing.step(inner)
+        self.settle()
+
+    def begin(self, arguments: Sequence[Any]) -> None:
+        """The subgraph fires: let the elements go in, one after the other.
+
+        Unequal lengths are an error of the firing (X1).
+        """
+        worker = self.worker
+        names = list(worker.type.inputs)
+        lengths = {name: len(list(value)) for name, value in zip(names, arguments, strict=True) if name in self._over}
+        if len(set(lengths.values())) > 1:
+            shown = ", ".join(f'"{name}" has {length}' for name, length in lengths.items())
+            problem = ValueError(f"it iterates over inputs of unequal length: {shown} elements")
+            errors.fail(worker, f"firing {worker.firings}", problem, answer=True)
+            return
+        count = next(iter(lengths.values()), 0)
+        columns = [
+            list(value) if name in self._over else [value] * count for name, value in zip(names, arguments, strict=True)
+        ]
+        self._elements = list(zip(*columns, strict=True))
+        self._position = 0
+        self._results = [[] for _ in self.worker.type.outputs]
+        self.worker.core.host.begin(self.worker)
+        self._next()
+
+    def _next(self) -> None:
+        core = self.core
+        if self._position == len(self._elements):
+            self._finished()
+            return
+        element = self._elements[self._position]
+        self._position += 1
+        names = list(self.worker.type.inputs)
+        for feed in core.feeds:
+            value = element[names.index(feed.port_name)]
+            put_outputs(feed, [(NO_MESSAGE if value is None else value, None, self.worker.stamp)])
+        self.look_later()
+
+    def _finished(self) -> None:
+        worker = self.worker
+        worker.in_flight = False
+        worker.core.in_flight -= 1
+        worker.written = [(values, None, None) for values in self._results]
+        firing.complete_firing(worker, None)
+        worker.core.host.kick()
+
+    def look_later(self) -> None:
+        """See at the loop's next pass whether the inside is quiet."""
+        if not self._looking and self.worker.in_flight:
+            self._looking = True
+            engine: Any = self.worker.core.host
+            engine.loop.call_soon(self._look, context=engine.context)
+
+    def _look(self) -> None:
+        self._looking = False
+        self.settle()
+        waiters, self._waiters = self._waiters, []
+        for waiter in waiters:
+            answer(waiter, None)
+
+    async def looked(self) -> None:
+        """Wait until it was seen whether the inside is quiet, and what follows has been done."""
+        engine: Any = self.worker.core.host
+        while self._looking:
+            waiter: asyncio.Future[None] = engine.loop.create_future()
+            self._waiters.append(waiter)
+            await waiter
+
+    def settle(self) -> None:
+        """If the inside is quiet, take what came out and go on with the next element."""
+        core = self.core
+        if not self.worker.in_flight or self.worker.core.over:
+            return
+        if self._queued or core.timers:
+            return
+        if core.in_flight and not (core.waiting_room and quiet.only_waiting_for_room(core)):
+            return
+        came_out = False
+        for reader in core.readers:
+            position = list(self.worker.type.outputs).index(reader.port_name)
+            while reader.live_inputs and not reader.inputs.missing:
+                token = take_from_reader(reader)
+                came_out = True
+                if type(token.value) is not Marker:
+                    self._results[position].append(token.value)
+        if came_out or quiet.grow(core):
+            self.look_later()
+            return
+        self._next()

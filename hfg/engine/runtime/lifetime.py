@@ -1,0 +1,332 @@
+"""The beginning and the end of a run: nodes are set up in order and torn down in reverse order (rules A10, R5, X3).
+
+Stands on `lifecycle`, `plan` and `code`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from hfg.engine.model.core import Core
+from hfg.engine.model.worker import STARTING, Worker
+from hfg.engine.rules import lifecycle, wiring
+from hfg.engine.rules.activity import gate_changed
+from hfg.engine.rules.agenda import consider, note_full
+from hfg.engine.rules.modifiers import discard
+from hfg.engine.rules.sending import trigger
+from hfg.engine.runtime import plan, rx
+from hfg.engine.runtime import ports as engine_ports
+from hfg.engine.runtime.code import answer
+from hfg.engine.runtime.groups import ThreadGroup
+from hfg.engine.runtime.watchdog import Watch, watchdog
+from hfg.errors import HfgError, NodeError, TeardownError
+from hfg.ports.edges import DelayEdge, EventEdge
+from hfg.token import Token
+from hfg.trace import RunEnded, RunStarted
+
+if TYPE_CHECKING:
+    from hfg.engine.runtime.engine import Engine
+
+__all__ = ["Lifetime"]
+
+
+class Lifetime:
+    """Begins and ends the run of one engine."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._was_set_up: list[Worker] = []
+        self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
+        self._watch: Watch | None = None
+
+    async def start(self) -> None:
+        """Set up all nodes, trigger `start`, then let the sources go (A10)."""
+        engine = self._engine
+        core = engine.core
+        engine.started_at = engine.now()
+        self._watch = watchdog.watch(core, engine.settings.block_warning_s)
+        if not await self._set_up_all(core):
+            return
+        if engine.settings.until_s is not None:
+            engine.loop.call_at(engine.loop.time() + engine.settings.until_s, self._until)
+        if core.trace is not None:
+            core.trace(RunStarted(engine.now()))
+        core.started = True
+        assert core.boundary is not None
+        start = engine_ports.bind_start(core.boundary, engine.flat.graph.start)
+        if start is not None:
+            trigger(start, explicit=1)
+        self._open_sources(core)
+        for source, edge, operators in core.observables:
+            self.feed(source, edge, operators)
+        engine.kick()
+
+    async def _set_up_all(self, core: Core) -> bool:
+        """Set up every node in order of adding, those inside an iteration right behind it; whether all went well."""
+        engine = self._engine
+        for worker in core.workers:
+            self.carry(worker)
+        for edge in core.edges:
+            if isinstance(edge, DelayEdge | EventEdge):
+                edge.queue.extend(Token(value, 0, engine.now(), 0) for value in edge.initial)
+                if isinstance(edge, EventEdge):
+                    note_full(edge)
+        for worker in core.workers:
+            if worker.scope is None:
+                await self._set_up_one(worker)
+            if engine.ended_how is not None:
+                return False
+            if worker.iteration is not None:
+                if not await self._set_up_all(worker.iteration.core):
+                    return False
+                worker.iteration.core.started = True
+        for worker in core.workers:
+            engine_ports.bind_automatic(worker)
+            plan.watch(worker)
+            if worker.watched:
+                engine_ports.bind(worker)
+            wiring.rewire(worker)
+        for edge, operators in core.piped:
+            self.pipe(edge, operators)
+        return True
+
+    def _open_sources(self, core: Core) -> None:
+        """Sources may fire from now on, as far as their gates allow."""
+        for worker in core.workers:
+            if worker.gates_over and worker.is_source:
+                gate_changed(worker.gates_over)
+            worker.blocked &= ~STARTING
+            consider(worker)
+            if worker.iteration is not None:
+                self._open_sources(worker.iteration.core)
+
+    def carry(self, worker: Worker) -> None:
+        """Give an async node its dormant task."""
+        if worker.type is not None and (worker.is_async or any(spec.is_async for spec in worker.type.slots.values())):
+            worker.carrier = self._engine.code.carrier(worker)
+
+    async def _set_up_one(self, worker: Worker) -> None:
+        engine = self._engine
+        waiter: asyncio.Future[HfgError | None] = engine.loop.create_future()
+        self._was_set_up.append(worker)
+        try:
+            lifecycle.set_up(worker, partial(answer, waiter))
+        except KeyboardInterrupt:
+            raise
+        except BaseException as problem:
+            engine.misused(worker, problem, "setup()")
+            return
+        error = waiter.result() if waiter.done() else await waiter
+        if error is not None:
+            engine.finish("failed", error)
+
+    def pipe(self, edge: Any, operators: tuple[Any, ...]) -> None:
+        """Put operators on an edge (P9)."""
+        self._disposables[edge] = rx.pipe_edge(edge, operators, self._engine.scheduler)
+
+    def came(self, worker: Worker) -> None:
+        """A node was set up while the run was under way (R4)."""
+        self._was_set_up.append(worker)
+
+    def forget(self, one: Any) -> None:
+        """An edge, or a node that was torn down, is no longer part of the run (R4)."""
+        if one in self._disposables:
+            self._disposables.pop(one)()
+        elif one in self._was_set_up:
+            self._was_set_up.remove(one)
+
+    def feed(self, source: Any, edge: Any, operators: tuple[Any, ...]) -> None:
+        """An outside observable holds the run open until it completes (R5)."""
+        engine = self._engine
+        engine.hold()
+        open_ = [True]
+
+        def over(error: BaseException | None) -> None:
+            if open_[0]:
+                open_[0] = False
+                if error is not None:
+                    problem = NodeError(edge.target.path, f'the observable that feeds "{edge.label}"', error)
+                    problem.__cause__ = error
+                    engine.finish("failed", problem)
+                engine.unhold()
+
+        dispose = rx.feed_from_observable(source, edge, operators, engine.scheduler, engine.from_any_thread, over)
+
+        def stop() -> None:
+            dispose()
+            over(None)
+
+        self._disposables[edge] = stop
+
+    def _until(self) -> None:
+        engine = self._engine
+        engine.finish("until", None)
+
+    async def close(self) -> None:
+        """Tear everything down, in reverse order of setup, each within its time limit (X3).
+
+        Whoever waits for it may be cancelled: it is then in a hurry, but comes to its end before the cancellation goes
+        on.
+        """
+        closing = asyncio.create_task(self._close(), name="hfg ending")
+        cancelled: asyncio.CancelledError | None = None
+        while not closing.done():
+            try:
+                await asyncio.shield(closing)
+            except asyncio.CancelledError as error:
+                cancelled = error
+                self._engine.hurry()
+            except Exception:
+                break  # it comes out below
+        if cancelled is not None:
+            raise cancelled
+        closing.result()
+
+    async def _close(self) -> None:
+        engine = self._engine
+        if engine.ended_how is None:
+            engine.finish("cancelled", None)
+            engine.hurry()
+        assert engine.ended_how is not None
+        core = engine.core
+        outcome, error = engine.ended_how
+        problems: list[NodeError] = []
+        try:
+            for dispose in self._disposables.values():
+                dispose()
+            for task in list(engine.edits.leaving):
+                await self._within_limit(task)
+            problems += await self._cancel_code()
+            for worker in reversed(self._was_set_up):
+                problem = await self._tear_down_one(worker)
+                if problem is not None:
+                    problems.append(problem)
+            for edge in core.edges:
+                if edge.untaken and error is None and outcome in ("stopped", "until", "cancelled"):
+                    discard(edge, "stopped")
+            await self._end_threads()
+            await self._end_carriers()
+        finally:
+            self._let_go()
+        core.errors.extend(problems)
+        if problems and error is None:
+            error, outcome = TeardownError(problems), "failed"
+        engine.ended_how = (outcome, error)
+        if core.trace is not None:
+            core.trace(RunEnded(engine.now(), outcome))
+        await engine.consumers.end()
+
+    def _let_go(self) -> None:
+        """Whatever happened: nothing of the run goes on, and the graph is free."""
+        engine = self._engine
+        for worker in engine.all_workers():
+            engine_ports.release_ports(worker)
+            for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
+                if timer is not None:
+                    timer.cancel()
+        for carrier in self._carriers():
+            carrier.drop()
+        for group in engine.groups.values():
+            if isinstance(group, ThreadGroup):
+                group.stop()
+        if self._watch is not None:
+            watchdog.forget(self._watch)
+
+    def _carriers(self) -> list[Any]:
+        engine = self._engine
+        return [worker.carrier for worker in engine.all_workers() if worker.carrier is not None] + list(
+            engine.code.given_up
+        )
+
+    async def _end_carriers(self) -> None:
+        carriers = self._carriers()
+        for carrier in carriers:
+            carrier.cancel()
+        for carrier in carriers:
+            await self._within_limit(carrier.task)
+
+    async def _within_limit(self, waiter: asyncio.Future[Any]) -> bool:
+        """Wait as long as a node may take for its teardown, which changes when somebody wants to leave (X3)."""
+        engine = self._engine
+        if not waiter.done():
+            hurried = asyncio.ensure_future(engine.hurried.wait())
+            await asyncio.wait({waiter, hurried}, timeout=engine.teardown_limit_s, return_when=asyncio.FIRST_COMPLETED)
+            if hurried.done() and not waiter.done():
+                await asyncio.wait({waiter}, timeout=engine.teardown_limit_s)
+            hurried.cancel()
+        return waiter.done()
+
+    async def _cancel_code(self) -> list[NodeError]:
+        """Cancel what still waits; threads get their time to come back. Gives back who did not."""
+        engine = self._engine
+        code = engine.code
+        busy = [worker for worker in engine.all_workers() if worker.in_flight and worker.iteration is None]
+        for worker in busy:
+            worker.ticket += 1
+            if worker.carrier is not None:
+                worker.carrier.cancel()
+        for task in code.aside:
+            task.cancel()
+        begun = time.monotonic()
+        while any(worker.in_flight for worker in busy):
+            code.came_back.clear()
+            back = asyncio.ensure_future(code.came_back.wait())
+            if not await self._within_limit(back):
+                back.cancel()
+                break
+        left = [worker for worker in busy if worker.in_flight]
+        for worker in left:
+            if worker.carrier is not None:
+                code.given_up.add(worker.carrier)
+                worker.carrier = None
+        seconds = time.monotonic() - begun
+        return [NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds)) for worker in left]
+
+    async def _tear_down_one(self, worker: Worker) -> NodeError | None:
+        engine = self._engine
+        if worker.node is None or worker.in_flight or not worker.is_up:
+            return None
+        if worker.generator is None and worker.node._hook("teardown") is None:
+            return None
+        waiter: asyncio.Future[NodeError | None] = engine.loop.create_future()
+        try:
+            lifecycle.tear_down(worker, partial(answer, waiter))
+        except KeyboardInterrupt:  # meant for this hook, which blocks; the others have their turn
+            engine.hurry()
+            return NodeError(worker.path, "teardown()", "it was interrupted")
+        except BaseException as error:
+            problem = NodeError(worker.path, "teardown()", error)
+            problem.__cause__ = error
+            return problem
+        begun = time.monotonic()
+        if await self._within_limit(waiter):
+            return waiter.result()
+        limit = f"{engine.settings.teardown_limit_s:g}"
+        if engine.hurried.is_set():
+            limit = f"{time.monotonic() - begun:.1f}"
+        return NodeError(worker.path, "teardown()", f"it took longer than {limit} s and was given up")
+
+    async def _end_threads(self) -> None:
+        """Let idle threads end; those that work have had their time and are left to themselves, as daemons."""
+        stuck = {worker.group for worker in self._engine.all_workers() if worker.in_flight}
+        for group in self._engine.groups.values():
+            thread = group.stop() if isinstance(group, ThreadGroup) else None
+            while thread is not None and thread.is_alive() and group not in stuck:
+                await asyncio.sleep(0)
+                thread.join(0.001)
+
+
+def _doing(worker: Worker) -> str:
+    if worker.call_edge is not None:
+        return f"slot {worker.call_edge.port_name}, call {worker.call_number}"
+    return f"firing {worker.firings}"
+
+
+def _did_not_end(worker: Worker, seconds: float) -> str:
+    if worker.group.threaded:
+        return f"its thread did not come back within {seconds:.1f} s of the end and was left behind"
+    return f"it was cancelled and did not end within {seconds:.1f} s"

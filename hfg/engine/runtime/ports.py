@@ -1,0 +1,144 @@
+"""Lets the ports of a node lead into the run: what `send` and `trigger` do while its graph runs (rules F3, F8, A4).
+
+Bound at each setup. Stands on `sending` and `firing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from hfg.engine.fusion import steps
+from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.rules import firing
+from hfg.engine.rules.sending import trigger
+from hfg.engine.runtime import plan, relays
+from hfg.ports.automatic import AUTOMATIC_EVENTS
+from hfg.ports.events import EventPort
+from hfg.token import Token
+from hfg.types import accepts, describe
+
+__all__ = ["bind", "bind_automatic", "bind_event", "bind_start", "release_ports"]
+
+
+def bind(worker: Worker) -> None:
+    """Install the run's functions on all ports through which the node's code can send."""
+    node = worker.node
+    node_type = worker.type
+    if node is None or worker.silent_code:
+        return
+    ports = node.ports
+    for position, name in enumerate(node_type.outputs):
+        ports.outputs[name]._emit = partial(firing.write, worker, position)
+    for name in node_type.events:
+        bind_event(worker, name)
+
+
+def bind_event(worker: Worker, name: str) -> RunningEvent:
+    """Make the running event of a declared or automatic event, and let the port trigger it."""
+    event = worker.events.get(name)
+    relayed = worker.scope is not None and name not in AUTOMATIC_EVENTS
+    if event is None:
+        event = worker.events[name] = RunningEvent(worker, name, None)
+        if relayed:
+            for inner in relays.events_behind(worker.node.ports.events[name]):
+                inner.subscribe(worker.node.ports.events[name]._notify)
+    if worker.node is None:  # the graph's own `start`
+        return event
+    port = event.port = worker.node.ports.events[name]
+    host: Any = worker.core.host
+    if relayed:
+        host.adopt_event(port)
+        return event
+    port.__dict__.pop("trigger", None)  # the short way, if it had one where it ran before (R4)
+    if worker.group.threaded:
+        port._emit = partial(_from_thread, worker, event)
+    elif worker.core.debug:
+        emit = steps.emitter(event, plainly=True)
+        port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
+    else:
+        emit = steps.emitter(event)
+        port.trigger = emit  # in place of the method, which would only call it
+        port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
+    port._emit_wait = partial(host.trigger_wait, event)
+    if worker.core.debug:
+        port._emit, port._emit_wait = _checked(port, port._emit), _checked(port, port._emit_wait)
+    host.adopt_event(port)
+    if name in AUTOMATIC_EVENTS and worker.scope is not None:
+        plan.watch_scope(worker.scope)
+    if name in AUTOMATIC_EVENTS and worker.core.started:
+        plan.watch(worker)
+        steps.choose(worker)
+        bind(worker)  # what it triggers may have consequences now
+    return event
+
+
+def _checked(port: EventPort[Any], emit: Callable[..., Any]) -> Callable[[Any, int | None, float | None], Any]:
+    """In debug mode a signal's value must be of its event's type; none at all always is (T2)."""
+
+    def checked(value: Any, activity: int | None, stamp: float | None) -> Any:
+        plain = value.value if type(value) is Token else value
+        if plain is not None and not accepts(plain, port.type):
+            raise TypeError(
+                f'event "{port.path}" is declared {describe(port.type)}, got {describe(type(plain))}: {plain!r:.80}'
+            )
+        return emit(value, activity, stamp)
+
+    return checked
+
+
+def bind_automatic(worker: Worker) -> None:
+    """Let the automatic events of a node.
+
+    Subgraph or graph that have edges or subscribers be triggered and listened to.
+    """
+    if worker.node is None:
+        return
+    made = [
+        port
+        for port in worker.node.__dict__.values()
+        if isinstance(port, EventPort) and (port.name in AUTOMATIC_EVENTS or worker.scope is not None)
+    ]
+    for port in made:
+        if port.name in worker.events or port._observers:
+            bind_event(worker, port.name)
+
+
+def _from_thread(worker: Worker, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+    """F3: a signal from a thread leaves at the loop's next pass, in order and before the outputs of its firing."""
+    host: Any = worker.core.host
+    if host.on_loop():
+        trigger(event, value, activity, stamp)
+    else:
+        worker.group.signal(partial(trigger, event, value, activity, stamp))  # type: ignore[attr-defined]
+
+
+def bind_start(boundary: Worker, port: EventPort[None]) -> RunningEvent | None:
+    """Let the graph's `start` reach its edges and subscribers; None if it has neither (A10)."""
+    event = boundary.events.get("start")
+    if event is None and port._observers:
+        event = boundary.events["start"] = RunningEvent(boundary, "start", port)
+    if event is not None:
+        host: Any = boundary.core.host
+        host.adopt_event(port)
+    return event
+
+
+def release_ports(worker: Worker) -> None:
+    """The run is over: what the ports led to is gone, their subscribers are told."""
+    node = worker.node
+    if node is not None:
+        node._active = False
+    for event in worker.events.values():
+        port = event.port
+        if port is not None:
+            port.__dict__.pop("trigger", None)
+            port._emit = port._refuse
+            port._emit_wait = port._refuse_wait
+            port._scheduler = port._thread = port._look = None
+            port._complete()
+    if node is not None and not worker.silent_code:
+        for name in worker.type.outputs:
+            port = node.ports.outputs[name]
+            port._emit = port._refuse

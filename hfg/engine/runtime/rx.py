@@ -1,0 +1,147 @@
+"""reactivex in a run: a scheduler on the run's clock, operators on edges, and observables that feed slots.
+
+(rule P9, ARCHITECTURE §3).
+
+`AsyncIOScheduler.now` is wall time, so in virtual time `delay` would never emit; and without a scheduler `debounce`
+runs on a thread. So the run brings its own. Stands on `sending`.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from datetime import datetime
+from typing import Any
+
+import reactivex
+from reactivex import abc, typing
+from reactivex.disposable import Disposable, SingleAssignmentDisposable
+from reactivex.observer import Observer
+from reactivex.scheduler.periodicscheduler import PeriodicScheduler
+from reactivex.subject import Subject
+
+from hfg.engine.model.core import Host
+from hfg.engine.rules.errors import operator_failed
+from hfg.engine.rules.sending import enqueue
+from hfg.ports.edges import EventEdge
+from hfg.token import Token
+
+__all__ = ["RunScheduler", "feed_from_observable", "kick", "pipe_edge"]
+
+
+class RunScheduler(PeriodicScheduler):
+    """Schedules on the run's clock, real or virtual; what it holds keeps the run from being quiet."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__()
+        self._host = host
+
+    @property
+    def now(self) -> datetime:
+        """The run's clock as reactivex wants it."""
+        return self.to_datetime(self._host.now())
+
+    def schedule(self, action: abc.ScheduledAction[Any], state: Any = None) -> abc.DisposableBase:
+        """Run the action at the loop's next pass."""
+        return self._at(self._host.now(), action, state)
+
+    def schedule_relative(
+        self, duetime: typing.RelativeTime, action: abc.ScheduledAction[Any], state: Any = None
+    ) -> abc.DisposableBase:
+        """Run the action `duetime` from now."""
+        return self._at(self._host.now() + max(0.0, self.to_seconds(duetime)), action, state)
+
+    def schedule_absolute(
+        self, duetime: typing.AbsoluteTime, action: abc.ScheduledAction[Any], state: Any = None
+    ) -> abc.DisposableBase:
+        """Run the action at `duetime`."""
+        return self._at(max(self._host.now(), self.to_seconds(duetime)), action, state)
+
+    def _at(self, when: float, action: abc.ScheduledAction[Any], state: Any) -> abc.DisposableBase:
+        inner = SingleAssignmentDisposable()
+
+        def run() -> None:
+            inner.disposable = self.invoke_action(action, state=state)
+
+        timer = self._host.call_at(when, run)
+
+        def forget() -> None:
+            timer.cancel()
+            inner.dispose()
+
+        return Disposable(forget)
+
+
+def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], scheduler: RunScheduler) -> Callable[[], None]:
+    """Put operators on an event edge, in front of its queue; gives back what takes them off."""
+    subject: Subject[Any] = Subject()
+    newest = [0.0]
+
+    def into(token: Token[Any]) -> None:
+        newest[0] = max(newest[0], token.stamp)
+        subject.on_next(token)
+
+    def out(item: Any) -> None:
+        if type(item) is Token:
+            enqueue(edge, item.value, 0, item.stamp)
+        else:
+            enqueue(edge, item, 0, newest[0])
+        kick(edge)
+
+    subscription: abc.DisposableBase = subject.pipe(*operators).subscribe(
+        Observer(out, lambda error: operator_failed(edge, error), lambda: None), scheduler=scheduler
+    )
+    edge.pipeline = into
+    edge.complete = subject.on_completed
+    return subscription.dispose
+
+
+def kick(edge: EventEdge) -> None:
+    """Something lies on the edge that came from outside a firing."""
+    core = edge.target.core
+    if not core.pumping:
+        core.host.kick()
+
+
+def feed_from_observable(
+    source: reactivex.Observable[Any],
+    edge: EventEdge,
+    operators: tuple[Any, ...],
+    scheduler: RunScheduler,
+    hand_over: Callable[[Callable[[], None]], None],
+    over: Callable[[BaseException | None], None],
+) -> Callable[[], None]:
+    """Let an observable feed a slot or input; each edge has an observer of its own, for one that completes is dead.
+
+    Args:
+      source: may emit on any thread.
+      edge: where its items go, as tokens.
+      operators: as with `through=`.
+      scheduler: the run's.
+      hand_over: brings a call to the loop, in order.
+      over: told once when the observable completes or fails.
+    """
+    loop_thread = threading.get_ident()
+
+    def deliver(item: Any) -> None:
+        if not edge.live:
+            return  # nothing is sent to a node that is disabled (F10)
+        if type(item) is Token:
+            enqueue(edge, item.value, item.activity if edge.active else 0, item.stamp)
+        else:
+            enqueue(edge, item, 0, edge.target.core.now())
+        kick(edge)
+
+    def on_loop(call: Callable[[], None]) -> None:
+        if threading.get_ident() == loop_thread:
+            call()
+        else:
+            hand_over(call)
+
+    observer: Observer[Any] = Observer(
+        lambda item: on_loop(lambda: deliver(item)),
+        lambda error: on_loop(lambda: over(error)),
+        lambda: on_loop(lambda: over(None)),
+    )
+    subscription: abc.DisposableBase = source.pipe(*operators).subscribe(observer, scheduler=scheduler)
+    return subscription.dispose

@@ -1,0 +1,28 @@
+"""Ties the deciding modules together: what those below ask of those above. Stands on all, decides nothing."""
+
+from __future__ import annotations
+
+from hfg.engine.fusion import steps
+from hfg.engine.rules import activity, agenda, errors, quiet, sending, wiring
+from hfg.engine.runtime import ports
+from hfg.engine.runtime.iteration import Iteration
+
+__all__ = ["Deciders"]
+
+
+class Deciders:
+    """See `core.Upstairs`."""
+
+    idle_again = staticmethod(agenda.idle_again)
+    fail = staticmethod(errors.fail)
+    fail_call = staticmethod(errors.fail_call)
+    operator_failed = staticmethod(errors.operator_failed)
+    send_end = staticmethod(sending.send_end)
+    node_ended = staticmethod(quiet.node_ended)
+    activity_changed = staticmethod(activity.changed)
+    scopes_changed = staticmethod(activity.scopes_changed)
+    deactivate_inside = staticmethod(activity.deactivate_inside)
+    rewire = staticmethod(wiring.rewire)
+    choose_step = staticmethod(steps.choose)
+    bind_ports = staticmethod(ports.bind)
+    iteration = staticmethod(Iteration)
