@@ -13,9 +13,9 @@ from collections.abc import Iterator
 
 from hfg.activity.explicit import may_give_activity
 from hfg.graph.checks import also
-from hfg.graph.checks_flow import never_fires
+from hfg.graph.checks.flow import never_fires
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, scope_end
-from hfg.graph.order import strongly_connected
+from hfg.graph.flat.order import strongly_connected
 from hfg.problem import Problem
 
 __all__ = ["ActivityAnalysis", "activity_problems"]

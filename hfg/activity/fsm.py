@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 from hfg.errors import MachineError
-from hfg.graph.naming import suggest
+from hfg.graph.structure.naming import suggest
 from hfg.problem import Problem
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Any, Final
 
 from hfg.activity.fsm import StateMachine, error, findings, reject, shape
-from hfg.graph.naming import suggest
+from hfg.graph.structure.naming import suggest
 from hfg.problem import Problem
 
 __all__ = ["read"]

@@ -14,9 +14,9 @@ from hfg.activity.fsm import StateMachine, both, error, reject
 from hfg.activity.states import StateNode, event_name, letter_name, one_by_one, state_type
 from hfg.errors import GraphError
 from hfg.graph import Graph
-from hfg.graph.boxes import is_box
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, flatten
-from hfg.graph.naming import candidates
+from hfg.graph.structure.boxes import is_box
+from hfg.graph.structure.naming import candidates
 from hfg.nodetype import Node
 from hfg.problem import Problem
 

@@ -15,7 +15,7 @@ from hfg.cli.options import TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import CheckFailed, HfgError, MachineError, TargetError
 from hfg.graph import Graph
-from hfg.graph.refusals import keep_refusals, problem_of
+from hfg.graph.structure.refusals import keep_refusals, problem_of
 from hfg.problem import SEVERITIES, Problem
 
 __all__ = ["check"]

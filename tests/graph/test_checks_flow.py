@@ -262,7 +262,7 @@ def test_all_findings_are_collected_before_one_error_is_raised(graph: Graph) -> 
 def test_every_check_has_a_name_and_is_explained() -> None:
     """The page lists exactly the names that findings can have."""
     sources = [
-        *(ROOT / "hfg" / "graph").glob("*.py"),
+        *(ROOT / "hfg" / "graph").rglob("*.py"),
         ROOT / "hfg" / "activity" / "analysis.py",
         ROOT / "hfg" / "activity" / "fsm.py",
         ROOT / "hfg/cli/check.py",

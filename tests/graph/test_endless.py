@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import hfg
-from hfg.graph.endless import endless, runs_for_ever
+from hfg.graph.checks.endless import endless, runs_for_ever
 from hfg.graph.flat import flatten
 
 LIMIT = 3

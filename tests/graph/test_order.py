@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hfg.graph.order import rings, shortest_ring, strongly_connected
+from hfg.graph.flat.order import rings, shortest_ring, strongly_connected
 
 
 def test_parts_of_a_small_graph() -> None:

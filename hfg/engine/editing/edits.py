@@ -27,12 +27,12 @@ from hfg.engine.runtime import ports as engine_ports
 from hfg.engine.runtime.code import answer
 from hfg.errors import GraphError, HfgError, NodeError, NotRunning
 from hfg.graph import Graph
-from hfg.graph.changes import Change, NodeSwap, OptionsChange, ParameterChange, undo_all
 from hfg.graph.checks import check_flat
-from hfg.graph.commands import Command, encode
 from hfg.graph.editing import Transaction, history_of, may_break, prepare, refuse_new_errors
+from hfg.graph.editing.changes import Change, NodeSwap, OptionsChange, ParameterChange, undo_all
+from hfg.graph.editing.commands import Command, encode
+from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat import flatten
-from hfg.graph.reloading import reloaded
 from hfg.trace import ParameterSet, StructureChanged
 
 if TYPE_CHECKING:

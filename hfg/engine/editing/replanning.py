@@ -17,8 +17,7 @@ from hfg.engine.model.core import Core
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 from hfg.graph import Graph
-from hfg.graph.boxes import iterated
-from hfg.graph.changes import (
+from hfg.graph.editing.changes import (
     Change,
     EdgeChange,
     NodeChange,
@@ -28,6 +27,7 @@ from hfg.graph.changes import (
     Renaming,
 )
 from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode, flatten
+from hfg.graph.structure.boxes import iterated
 from hfg.ports.edges import SyncEdge
 
 __all__ = ["Replan", "closes_a_ring", "replan"]

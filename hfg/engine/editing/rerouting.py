@@ -13,9 +13,9 @@ import msgspec
 
 from hfg.engine.model.core import Core
 from hfg.graph import Graph
-from hfg.graph.changes import Change, EdgeChange, EdgeSwap, OptionsChange, ParameterChange
-from hfg.graph.edges import Edge, is_feed, type_of
+from hfg.graph.editing.changes import Change, EdgeChange, EdgeSwap, OptionsChange, ParameterChange
 from hfg.graph.flat import EdgeFollower, FlatEdge, FlatGraph
+from hfg.graph.structure.edges import Edge, is_feed, type_of
 from hfg.ports import InnerSource
 from hfg.types import why_not
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from hfg.graph.commands import Command
+from hfg.graph.editing.commands import Command
 
 if TYPE_CHECKING:
     from hfg.engine.runtime.engine import Engine

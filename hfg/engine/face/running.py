@@ -21,7 +21,7 @@ from hfg.engine.runtime.virtual import VirtualTimeLoop
 from hfg.errors import CheckFailed, GraphError, HfgError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.checks import check_flat
-from hfg.graph.endless import endless
+from hfg.graph.checks.endless import endless
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.trace import TraceEvent
 

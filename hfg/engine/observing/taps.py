@@ -17,8 +17,8 @@ from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.runtime import ports, relays
 from hfg.engine.runtime.places import Ends, behind, labels_at, place_of
 from hfg.errors import GraphError, UsageError
-from hfg.graph.edges import Edge as DrawnEdge
-from hfg.graph.naming import suggest
+from hfg.graph.structure.edges import Edge as DrawnEdge
+from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 from hfg.token import Token

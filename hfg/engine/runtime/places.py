@@ -13,9 +13,9 @@ import msgspec
 
 from hfg.engine.runtime import relays
 from hfg.errors import GraphError
-from hfg.graph.edges import Edge as DrawnEdge
 from hfg.graph.flat import FlatGraph
-from hfg.graph.naming import suggest
+from hfg.graph.structure.edges import Edge as DrawnEdge
+from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import Port
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from hfg.graph.changes import Change, EdgeChange, NodeSwap, OptionsChange, ParameterChange, undo_all
-from hfg.graph.commands import decode
 from hfg.graph.editing import history_of, prepare
+from hfg.graph.editing.changes import Change, EdgeChange, NodeSwap, OptionsChange, ParameterChange, undo_all
+from hfg.graph.editing.commands import decode
 from hfg.testing.reference.calls import Calling
 from hfg.testing.reference.state import Line, Lying, Station, fresh
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of, is_box, whole

@@ -1,0 +1,66 @@
+"""What only the whole shows: every check is a function over the flat graph that gives what it finds.
+
+An error keeps the graph from running as its structure says; warnings and hints are told and the graph runs. Floors
+above add their own with `also`. Stands on `flat`, `checks_edges`, `checks_flow` and `checks_nodes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Final, TypeAlias
+
+from hfg.graph.checks.edges import borders, joined_edges, promotions
+from hfg.graph.checks.flow import (
+    endless_sources,
+    filling_rings,
+    signal_rings,
+    silent_events,
+    synchronous_rings,
+    unconnected_inputs,
+    unfed_slots,
+)
+from hfg.graph.checks.nodes import async_in_threads, names, unknown_groups, unused_scheduling
+from hfg.graph.flat.flattening import FlatGraph, flatten
+from hfg.graph.graph import Graph
+from hfg.problem import SEVERITIES, Problem
+
+__all__ = ["Check", "also", "check", "check_flat"]
+
+Check: TypeAlias = Callable[[FlatGraph], Iterable[Problem]]
+
+_OF_EACH_LEVEL: Final[list[Check]] = [
+    unknown_groups,
+    async_in_threads,
+    joined_edges,
+    synchronous_rings,
+    borders,
+    unconnected_inputs,
+    signal_rings,
+    filling_rings,
+    silent_events,
+    endless_sources,
+    unfed_slots,
+]
+_OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions]
+
+
+def also(check: Check) -> Check:
+    """Add a check, of the graph and of each that iterates inside it."""
+    _OF_EACH_LEVEL.append(check)
+    return check
+
+
+def check(graph: Graph) -> list[Problem]:
+    """Check a whole graph; the worst first."""
+    return check_flat(flatten(graph))
+
+
+def check_flat(flat: FlatGraph) -> list[Problem]:
+    """Check a graph that is flattened already; the worst first."""
+    problems = list(flat.findings)
+    for one in flat.walk():
+        for look in _OF_EACH_LEVEL:
+            problems += look(one)
+    for look in _OF_THE_WHOLE:
+        problems += look(flat)
+    return sorted(problems, key=lambda problem: SEVERITIES.index(problem.severity))

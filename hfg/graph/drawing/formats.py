@@ -1,0 +1,175 @@
+"""Draws graphs: Mermaid for pages and notebooks, DOT for Graphviz.
+
+Active edges are thick or double, edges from events are dashed, subgraphs are boxes; states are tinted, those that are
+active in a run have a thick border. Stands on `picture`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from hfg.errors import UsageError
+from hfg.graph.drawing.picture import Arrow, Box, Look, Picture, Shape, picture
+from hfg.graph.graph import Graph
+
+__all__ = ["FORMATS", "dot", "draw", "mermaid"]
+
+
+def draw(graph: Graph, path: str | os.PathLike[str] | None = None) -> str:
+    """Draw a graph into a file; see `Graph.draw`."""
+    if path is None:
+        return mermaid(graph)
+    file = Path(path)
+    write = FORMATS.get(file.suffix)
+    if write is None:
+        endings = " or ".join(FORMATS)
+        raise UsageError(f'{graph._title} cannot be drawn into "{file}": a drawing ends in {endings}; rename the file')
+    text = write(graph)
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(
+            f'{graph._title} cannot be drawn into "{file}": {error.strerror}; name a file in a folder that you can '
+            "write to"
+        ) from error
+    return text
+
+
+# --- Mermaid ---
+
+# What means something inside of quotes; `#name;` is how Mermaid writes an entity.
+_ENTITIES: Final = str.maketrans(
+    {
+        "#": "#35;",
+        '"': "#quot;",
+        "<": "#lt;",
+        ">": "#gt;",
+        "&": "#amp;",
+        "\\": "#92;#8203;",  # with what is not seen, or Mermaid takes the n behind it for the end of a line
+        "`": "#96;",
+        "\n": "<br/>",
+        "\r": " ",
+        "\t": " ",
+    }
+)
+_SHAPES: Final[Mapping[Look, tuple[str, str]]] = MappingProxyType(
+    {"node": ("[", "]"), "port": ("([", "])"), "start": ("((", "))"), "stop": ("(((", ")))"), "feed": ("{{", "}}")}
+)
+
+
+def mermaid(graph: Graph) -> str:
+    """Draw a graph as the text of a Mermaid flowchart."""
+    seen = picture(graph)
+    lines = ["flowchart LR"]
+    depth = 0
+    for level, item in seen.items:
+        lines += [f"{'    ' * (depth - up)}end" for up in range(depth - level)]
+        depth = level
+        indent = "    " * (depth + 1)
+        if isinstance(item, Box):
+            lines.append(f"{indent}subgraph {item.id}[{_quoted(item.label)}]")
+            depth += 1
+        else:
+            opening, closing = _SHAPES[item.look]
+            lines.append(f"{indent}{item.id}{opening}{_quoted(item.label)}{closing}")
+    lines += [f"{'    ' * (depth - up)}end" for up in range(depth)]
+    lines += [f"    {_mermaid_arrow(arrow)}" for arrow in seen.arrows]
+    lines += _mermaid_styles(seen)
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    return f'"{text.translate(_ENTITIES)}"'
+
+
+def _mermaid_arrow(arrow: Arrow) -> str:
+    line = "-.-o" if arrow.is_gate else "==>" if arrow.is_active else "-.->" if arrow.is_signal else "-->"
+    label = f"|{_quoted(arrow.label)}|" if arrow.label else ""
+    return f"{arrow.tail} {line}{label} {arrow.head}"
+
+
+def _mermaid_styles(seen: Picture) -> list[str]:
+    """Tint the states; Mermaid has no line that is both thick and dashed, so those are said one by one."""
+    lines = []
+    shapes = [item for _, item in seen.items if isinstance(item, Shape)]
+    states = [shape.id for shape in shapes if shape.is_state and not shape.is_active]
+    active = [shape.id for shape in shapes if shape.is_active]
+    if states:
+        lines += ["    classDef state fill:#fff3d0,stroke:#b8860b,color:#000", f"    class {','.join(states)} state"]
+    if active:
+        lines += [
+            "    classDef active fill:#ffd24d,stroke:#b8860b,stroke-width:4px,color:#000",
+            f"    class {','.join(active)} active",
+        ]
+    dashed = [str(number) for number, arrow in enumerate(seen.arrows) if arrow.is_active and arrow.is_signal]
+    if dashed:
+        lines.append(f"    linkStyle {','.join(dashed)} stroke-dasharray:7 4")
+    return lines
+
+
+# --- DOT ---
+
+# A backslash begins an escape of Graphviz, such as the name of the node; an ampersand an entity of HTML.
+_ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "&": "&amp;", "\n": "\\n", "\r": " "})
+_DOT_SHAPES: Final[Mapping[Look, str]] = MappingProxyType(
+    {
+        "node": "shape=box",
+        "port": "shape=box, style=rounded, height=0.3",
+        "start": "shape=circle",
+        "stop": "shape=doublecircle",
+        "feed": "shape=hexagon",
+    }
+)
+
+
+def dot(graph: Graph) -> str:
+    """Draw a graph as the text of a DOT file, for Graphviz."""
+    seen = picture(graph)
+    lines = [
+        f"digraph {_escaped(seen.title)} {{",
+        '    graph [rankdir=LR, fontname="sans-serif"]',
+        '    node [fontname="sans-serif"]',
+        '    edge [fontname="sans-serif", fontsize=11]',
+    ]
+    depth = 0
+    for level, item in seen.items:
+        lines += [f"{'    ' * (depth - up)}}}" for up in range(depth - level)]
+        depth = level
+        indent = "    " * (depth + 1)
+        if isinstance(item, Box):
+            lines.append(f"{indent}subgraph cluster_{item.id} {{")
+            lines.append(f"{indent}    label={_escaped(item.label)}")
+            depth += 1
+        else:
+            lines.append(f"{indent}{item.id} [label={_escaped(item.label)}, {_dot_look(item)}]")
+    lines += [f"{'    ' * (depth - up)}}}" for up in range(depth)]
+    lines += [f"    {arrow.tail} -> {arrow.head} [{_dot_line(arrow)}]" for arrow in seen.arrows]
+    return "\n".join([*lines, "}"]) + "\n"
+
+
+def _escaped(text: str) -> str:
+    return f'"{text.translate(_ESCAPES)}"'
+
+
+def _dot_look(shape: Shape) -> str:
+    look = _DOT_SHAPES[shape.look]
+    if shape.is_active:
+        return f'{look}, style=filled, fillcolor="#ffd24d", penwidth=4'
+    return f'{look}, style=filled, fillcolor="#fff3d0"' if shape.is_state else look
+
+
+def _dot_line(arrow: Arrow) -> str:
+    parts = [f"label={_escaped(arrow.label)}"]
+    if arrow.is_gate:
+        parts.append("style=dotted, arrowhead=odot, constraint=false")
+    else:
+        parts += ["style=dashed"] if arrow.is_signal else []
+        parts += ['color="black:invis:black"'] if arrow.is_active else []  # the double line of the paper
+    return ", ".join(parts)
+
+
+FORMATS: Final[Mapping[str, Callable[[Graph], str]]] = MappingProxyType({".mmd": mermaid, ".dot": dot})

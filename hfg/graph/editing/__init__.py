@@ -1,0 +1,31 @@
+"""Edits of a graph as data, carried out exactly and taken back exactly (rule R4).
+
+commands    what is to change            performing  what carries it out: pointing, making, copying, enclosing
+changes     its steps, to be taken back  transactions  all or nothing, undo and redo       reloading  of modules
+"""
+
+from hfg.graph.editing.transactions import (
+    History,
+    Transaction,
+    edit,
+    history_of,
+    may_break,
+    prepare,
+    redo,
+    refuse_new_errors,
+    reload,
+    undo,
+)
+
+__all__ = [
+    "History",
+    "Transaction",
+    "edit",
+    "history_of",
+    "may_break",
+    "prepare",
+    "redo",
+    "refuse_new_errors",
+    "reload",
+    "undo",
+]

@@ -1,0 +1,220 @@
+"""Edits of a graph as data: what is to change, by paths and references alone (rule R4).
+
+A command can be logged, sent over a wire and carried out again: `encode` and `decode`. It says what, never how:
+`performing` carries it out on a drawn graph, `editing` undoes it, and a run follows. Stands on errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias
+
+import msgspec
+
+from hfg.errors import GraphError
+from hfg.graph.structure.options import DEFAULT_CAPACITY, Overflow
+
+__all__ = [
+    "Add",
+    "AnyCommand",
+    "Command",
+    "Connect",
+    "Copy",
+    "Disable",
+    "Disconnect",
+    "Dissolve",
+    "Enable",
+    "Enclose",
+    "Gate",
+    "MakeActive",
+    "Move",
+    "Remove",
+    "Rename",
+    "Replace",
+    "SetParameter",
+    "Ungate",
+    "decode",
+    "encode",
+]
+
+
+class Command(msgspec.Struct, frozen=True, tag=True, tag_field="do", forbid_unknown_fields=True, omit_defaults=True):
+    """One edit. Paths are those of the whole graph: "fetch/go_to", "fetch/go_to.goal", "fetch.person.inner"."""
+
+
+class Add(Command, frozen=True):
+    """Add a node.
+
+    Attributes:
+      type: its reference, "my_robot.nodes:MapLookup".
+      path: where, and how it is called there.
+      parameters: by name.
+      options: as those of `graph.add`.
+    """
+
+    type: str
+    path: str
+    parameters: dict[str, Any] = {}
+    options: dict[str, Any] = {}
+
+
+class Remove(Command, frozen=True):
+    """Remove a node or subgraph, with its edges, gates and promotions."""
+
+    path: str
+
+
+class Copy(Command, frozen=True):
+    """Add a node with the type, parameters and options of another, or a subgraph with all that is inside; no edges."""
+
+    path: str
+    to: str
+
+
+class Rename(Command, frozen=True):
+    """Give a node another name; the paths of all inside follow."""
+
+    path: str
+    name: str
+
+
+class Move(Command, frozen=True):
+    """Let a node run in another group; None is that of the subgraph around it."""
+
+    path: str
+    group: str | None = None
+
+
+class Connect(Command, frozen=True):
+    """Draw an edge, as `graph.connect` does; operators are no data, so an edge with them is connected by hand."""
+
+    source: str
+    target: str
+    active: bool = False
+    capacity: int = DEFAULT_CAPACITY
+    overflow: Overflow = "wait"
+    capacity_limit: int | None = None
+    initial: tuple[Any, ...] = ()
+
+
+class Disconnect(Command, frozen=True):
+    """Remove an edge."""
+
+    source: str
+    target: str
+
+
+class MakeActive(Command, frozen=True):
+    """Let an edge transport activity, or no more."""
+
+    source: str
+    target: str
+    active: bool = True
+
+
+class Enable(Command, frozen=True):
+    """Enable a node or subgraph."""
+
+    path: str
+
+
+class Disable(Command, frozen=True):
+    """Disable a node or subgraph."""
+
+    path: str
+
+
+class Gate(Command, frozen=True):
+    """Couple the work of a node or subgraph to the activity of another, as `graph.gate` does (rule A11)."""
+
+    path: str
+    by: str
+    idle_rate_hz: float | None = None
+
+
+class Ungate(Command, frozen=True):
+    """Take the gate of a node or subgraph away."""
+
+    path: str
+
+
+class SetParameter(Command, frozen=True):
+    """Set a parameter, "lookup.tolerance"."""
+
+    path: str
+    value: Any
+
+
+class Enclose(Command, frozen=True):
+    """Group nodes of one graph into a new subgraph beside them, which is called `name` (rule G1)."""
+
+    paths: tuple[str, ...]
+    name: str
+
+
+class Dissolve(Command, frozen=True):
+    """Put what is inside a subgraph in its place (rule G1)."""
+
+    path: str
+
+
+class Replace(Command, frozen=True):
+    """Put a node of another type in a node's place: name, options, edges, gates stay.
+
+    Parameters that both have stay too, unless given.
+    """
+
+    path: str
+    type: str
+    parameters: dict[str, Any] = {}
+
+
+AnyCommand: TypeAlias = (
+    Add
+    | Remove
+    | Copy
+    | Rename
+    | Move
+    | Connect
+    | Disconnect
+    | MakeActive
+    | Enable
+    | Disable
+    | Gate
+    | Ungate
+    | SetParameter
+    | Enclose
+    | Dissolve
+    | Replace
+)
+
+_DECODER: msgspec.json.Decoder[list[AnyCommand]] = msgspec.json.Decoder(list[AnyCommand])
+
+
+def encode(commands: Iterable[Command]) -> str:
+    """Give commands as one line of JSON.
+
+    Raises:
+      GraphError: a value is no data.
+
+    Example:
+      >>> encode([Connect("camera.out", "show.value", active=True)])
+      '[{"do":"Connect","source":"camera.out","target":"show.value","active":true}]'
+    """
+    listed = list(commands)
+    try:
+        return msgspec.json.encode(listed).decode()
+    except (TypeError, ValueError) as error:
+        raise GraphError(f"commands are plain data, and these hold something else: {error}") from error
+
+
+def decode(data: str | bytes) -> Sequence[AnyCommand]:
+    """Read commands that `encode` wrote, or somebody else.
+
+    Raises:
+      GraphError: it is no JSON, or no command; the message says where.
+    """
+    try:
+        return _DECODER.decode(data)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise GraphError(f"this is no list of commands: {error}") from error

@@ -1,0 +1,198 @@
+"""Transactions of commands, and the history of a graph: what was edited can be undone and redone exactly (rule R4).
+
+There is one history for each graph, whether it runs or not: a run goes the same steps in between. Stands on
+`performing` and `checks`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from types import ModuleType
+
+import msgspec
+
+from hfg.errors import GraphError, UsageError
+from hfg.graph.checks.checking import check_flat
+from hfg.graph.editing.changes import Change, undo_all
+from hfg.graph.editing.commands import Add, Command, Connect, Copy, Dissolve, Enclose, Move, Replace
+from hfg.graph.editing.performing import perform
+from hfg.graph.editing.reloading import reloaded
+from hfg.graph.flat.flattening import flatten
+from hfg.graph.graph import Graph
+from hfg.problem import Problem
+
+__all__ = [
+    "History",
+    "Transaction",
+    "edit",
+    "history_of",
+    "may_break",
+    "prepare",
+    "redo",
+    "refuse_new_errors",
+    "reload",
+    "undo",
+]
+
+_MAY_BREAK = (Add, Connect, Copy, Dissolve, Enclose, Move, Replace)
+"""Commands after which something may be wrong that only the whole shows."""
+
+
+class Transaction(msgspec.Struct, frozen=True, eq=False):
+    """Commands that were carried out together, and what they did."""
+
+    commands: tuple[Command, ...]
+    changes: tuple[Change, ...]
+
+
+class History:
+    """What was edited.
+
+    Attributes:
+      done: the last edit last.
+      undone: the one to be redone first last.
+      revision: of the graph behind the last edit; another one says that it was changed by hand.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self.done: list[Transaction] = []
+        self.undone: list[Transaction] = []
+        self.revision = graph._revision
+
+    def note(self, transaction: Transaction) -> None:
+        """A transaction was carried out."""
+        self.forget_what_is_old()
+        self.done.append(transaction)
+        self.undone.clear()
+
+    def forget_what_is_old(self) -> bool:
+        """What was changed by hand makes what was edited before it final; whether that is so."""
+        if self.revision == self._graph._revision:
+            return False
+        self.revision = self._graph._revision
+        self.done.clear()
+        self.undone.clear()
+        return True
+
+    def next_undo(self) -> Transaction:
+        """Give what would be undone.
+
+        Raises:
+          UsageError: there is nothing.
+        """
+        return self._next(self.done, "undo", "nothing was edited by commands yet")
+
+    def next_redo(self) -> Transaction:
+        """Give what would be redone.
+
+        Raises:
+          UsageError: there is nothing.
+        """
+        return self._next(self.undone, "redo", "nothing was undone since the last edit")
+
+    def _next(self, listed: list[Transaction], what: str, why: str) -> Transaction:
+        by_hand = self.forget_what_is_old()
+        if not listed:
+            if by_hand:
+                why = "the graph was changed by hand since, which is final"
+            raise UsageError(f"{self._graph._title} has nothing to {what}: {why}")
+        return listed[-1]
+
+    def undo_done(self) -> None:
+        """The last transaction was undone."""
+        self.undone.append(self.done.pop())
+
+    def redo_done(self) -> None:
+        """The last one that was undone was carried out again."""
+        self.done.append(self.undone.pop())
+
+
+def history_of(graph: Graph) -> History:
+    """Give the history of a whole graph."""
+    if graph._history is None:
+        graph._history = History(graph)
+    history: History = graph._history
+    return history
+
+
+def edit(graph: Graph, commands: Sequence[Command]) -> None:
+    """See `Graph.edit`."""
+    _need_rest(graph, "edit")
+    history = history_of(graph)
+    history.note(prepare(graph, commands))
+
+
+def undo(graph: Graph) -> None:
+    """See `Graph.undo`."""
+    _need_rest(graph, "undo")
+    history = history_of(graph)
+    undo_all(history.next_undo().changes)
+    history.undo_done()
+
+
+def redo(graph: Graph) -> None:
+    """See `Graph.redo`."""
+    _need_rest(graph, "redo")
+    history = history_of(graph)
+    for change in history.next_redo().changes:
+        change.do()
+    history.redo_done()
+
+
+def reload(graph: Graph, module: str | ModuleType) -> None:
+    """See `Graph.reload`."""
+    _need_rest(graph, "reload")
+    with reloaded(graph, module) as commands:
+        edit(graph, commands)
+
+
+def prepare(graph: Graph, commands: Sequence[Command], *, check: bool = True) -> Transaction:
+    """Carry commands out on the drawn graph and check the whole.
+
+    Raises:
+      GraphError: a command is refused, or the graph would have an error that it has not now; nothing was changed.
+    """
+    before = _errors(graph) if check and may_break(commands) else None
+    changes = perform(graph, commands)
+    if before is not None:
+        try:
+            refuse_new_errors(before, _errors(graph))
+        except GraphError:
+            undo_all(changes)
+            raise
+    return Transaction(tuple(commands), tuple(changes))
+
+
+def may_break(commands: Sequence[Command]) -> bool:
+    """Whether the whole is to be checked after these."""
+    return any(isinstance(command, _MAY_BREAK) for command in commands)
+
+
+def _errors(graph: Graph) -> list[Problem]:
+    return [problem for problem in check_flat(flatten(graph)) if problem.severity == "error"]
+
+
+def refuse_new_errors(before: Sequence[Problem], after: Sequence[Problem]) -> None:
+    """Raise if there is an error that was not there before.
+
+    Raises:
+      GraphError: it says what the check says.
+    """
+    known = Counter(problem.check for problem in before)
+    for problem in after:
+        known[problem.check] -= 1
+        if known[problem.check] < 0:
+            new = next((one for one in after if one.check == problem.check and one not in before), problem)
+            raise GraphError(f"the edit is refused, for it would break the graph: {new}")
+
+
+def _need_rest(graph: Graph, what: str) -> None:
+    if graph._owner is not None:
+        raise UsageError(
+            f'{graph._title} is edited with the whole graph: write graph.{what} of "{graph._root.name}", '
+            f'with paths such as "{graph.path}/node"'
+        )
+    if graph._run is not None:
+        raise UsageError(f"{graph._title} runs: write `await run.{what}(...)`, which the run follows")

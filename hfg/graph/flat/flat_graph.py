@@ -1,0 +1,145 @@
+"""What a graph is once its subgraphs are dissolved: plain data for runners and checks; `flat` makes it.
+
+Stands on `structure`, for the nodes and edges it refers to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final, Literal, TypeAlias
+
+import msgspec
+
+from hfg.graph.graph import Graph
+from hfg.graph.structure.edges import Edge
+from hfg.graph.structure.options import GroupSpec, NodeOptions, Overflow
+from hfg.nodetype import Node
+from hfg.problem import Problem
+
+__all__ = ["ROOT", "End", "EndKind", "FlatEdge", "FlatGate", "FlatGraph", "FlatNode", "Scope", "scope_end"]
+
+EndKind: TypeAlias = Literal["input", "output", "event", "slot", "parameter", "observable"]
+
+ROOT: Final = -1
+"""`End.node` of the graph's own ports."""
+
+
+def scope_end(scope: int) -> int:
+    """Give the `End.node` of a dissolved subgraph, whose automatic ports remain; its own inverse."""
+    return -2 - scope
+
+
+class FlatNode(msgspec.Struct, eq=False):
+    """A node that fires or has slots.
+
+    Attributes:
+      options: with the group it really runs in.
+      scopes: the subgraphs around it, the outermost first.
+      iteration: the inside of a subgraph that iterates; its boundary are the subgraph's inner sides.
+    """
+
+    index: int
+    path: str
+    node: Node
+    options: NodeOptions
+    scopes: tuple[int, ...]
+    iteration: FlatGraph | None = None
+
+
+class Scope(msgspec.Struct, eq=False):
+    """A dissolved subgraph.
+
+    Attributes:
+      parent: the subgraph around it, if any.
+      members: the nodes inside, those of inner subgraphs too.
+    """
+
+    index: int
+    path: str
+    subgraph: Any
+    parent: int | None
+    options: NodeOptions
+    members: list[int]
+
+
+class End(msgspec.Struct, frozen=True, eq=False, gc=False):
+    """One end of an edge.
+
+    Attributes:
+      node: index of the node; `ROOT` for the graph's own ports, among which an input of the graph is an "output" and an
+        output an "input";
+        `scope_end(k)` for the automatic ports of scope k.
+      port: the bound port; for an observable itself.
+    """
+
+    node: int
+    kind: EndKind
+    name: str
+    port: Any
+
+
+class FlatEdge(msgspec.Struct, eq=False):
+    """An edge from end to end.
+
+    Attributes:
+      label: "a/b.out -> c.in", one of a kind in its graph.
+      active: all edges it consists of are.
+      capacity: this and the next three say something on event edges only; with overflow and capacity_limit they are
+        those of the outermost edge it
+        consists of, among several the one nearest to the source.
+      through: operators, in the order signals meet them.
+      initial: values, the one taken first in front.
+      via: the scopes it enters or leaves through their ports.
+      segments: the edges it consists of, from source to target.
+    """
+
+    index: int
+    label: str
+    source: End
+    target: End
+    active: bool
+    capacity: int
+    overflow: Overflow
+    capacity_limit: int | None
+    through: tuple[Any, ...]
+    initial: tuple[Any, ...]
+    via: tuple[int, ...]
+    segments: tuple[Edge, ...]
+
+    @property
+    def is_event_edge(self) -> bool:
+        """Whether it has a queue."""
+        return self.source.kind in ("event", "observable")
+
+
+class FlatGate(msgspec.Struct, frozen=True):
+    """A gate; both ends as in `End.node`."""
+
+    target: int
+    by: int
+    idle_rate_hz: float | None
+
+
+class FlatGraph(msgspec.Struct, eq=False):
+    """A graph without subgraphs.
+
+    Attributes:
+      groups: of the whole graph.
+      findings: what went wrong on the way; errors.
+    """
+
+    nodes: list[FlatNode]
+    scopes: list[Scope]
+    edges: list[FlatEdge]
+    groups: dict[str, GroupSpec]
+    gates: list[FlatGate]
+    graph: Graph
+    findings: list[Problem]
+
+    def walk(self) -> Iterator[FlatGraph]:
+        """Give this graph and all that iterate inside it."""
+        waiting = [self]
+        while waiting:
+            flat = waiting.pop()
+            yield flat
+            waiting += [node.iteration for node in reversed(flat.nodes) if node.iteration is not None]

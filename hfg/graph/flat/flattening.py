@@ -1,0 +1,301 @@
+"""One graph without subgraphs, as plain data: what a runner makes its plan from and what the checks look at (rule G1).
+
+Subgraphs are dissolved: edges are followed through their ports from end to end, parameters to those they stand for.
+What iterates (rule G4) stays one node with a flat graph of its own. Everything is in depth-first order of adding, edges
+in that of connecting. Nothing recurses: graphs may be as deep as they like. Stands on `structure`; changes nothing
+there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+from hfg.graph.flat.flat_graph import ROOT, End, EndKind, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
+from hfg.graph.graph import Graph
+from hfg.graph.structure.boxes import is_box, iterated
+from hfg.graph.structure.edges import Edge, is_feed
+from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.options import NodeOptions, in_group
+from hfg.nodetype import Node
+from hfg.ports import InnerSource, InnerTarget, ParameterPort
+from hfg.problem import Problem
+
+__all__ = [
+    "ROOT",
+    "EdgeFollower",
+    "End",
+    "EndKind",
+    "FlatEdge",
+    "FlatGate",
+    "FlatGraph",
+    "FlatNode",
+    "Scope",
+    "flatten",
+    "scope_end",
+]
+
+
+def flatten(graph: Graph) -> FlatGraph:
+    """Dissolve all subgraphs of a whole graph; the graph stays as it is."""
+    whole = FlatGraph([], [], [], graph.groups, [], graph, [])
+    waiting = [(whole, "", "loop")]
+    while waiting:
+        flat, prefix, group = waiting.pop()
+        levels = _collect_nodes(flat, prefix, group)
+        for node in reversed(flat.nodes):
+            if is_box(node.node) and iterated(node.node):
+                inside = node.node._graph
+                node.iteration = FlatGraph([], [], [], graph.groups, [], inside, flat.findings)
+                waiting.append((node.iteration, f"{node.path}/", node.options.group or "loop"))
+        EdgeFollower(flat, levels).collect()
+    return whole
+
+
+class _Level(msgspec.Struct, eq=False):
+    """One graph on the way through all: `depth` dissolved subgraphs lie around it."""
+
+    graph: Graph
+    depth: int
+
+
+def _collect_nodes(flat: FlatGraph, prefix: str, group: str) -> list[_Level]:
+    """Fill nodes and scopes; give the graphs they were found in, in depth-first order."""
+    nodes, scopes = flat.nodes, flat.scopes
+    levels = [_Level(flat.graph, 0)]
+    # One entry for each graph that is under way: what is left of it, and what holds for its nodes.
+    stack: list[tuple[Iterator[tuple[str, Node]], str, tuple[int, ...], str]] = [
+        (iter(flat.graph.nodes.items()), prefix, (), group)
+    ]
+    while stack:
+        rest, prefix, around, group = stack[-1]
+        for name, node in rest:
+            own: NodeOptions = node._options
+            box: object = node  # told apart from the node, for which type checkers would forget its class
+            options = own if own.group is not None else in_group(own, group)
+            path = prefix + name
+            if not is_box(box) or own.iterate_over:
+                index = len(nodes)
+                nodes.append(FlatNode(index, path, node, options, around))
+                for scope in around:
+                    scopes[scope].members.append(index)
+                continue
+            scope = len(scopes)
+            scopes.append(Scope(scope, path, node, around[-1] if around else None, options, []))
+            inside = box._graph
+            levels.append(_Level(inside, len(around) + 1))
+            stack.append((iter(inside.nodes.items()), f"{path}/", (*around, scope), options.group or group))
+            break
+        else:
+            stack.pop()
+    return levels
+
+
+class EdgeFollower:
+    """Follows drawn edges from end to end."""
+
+    def __init__(self, flat: FlatGraph, levels: list[_Level]) -> None:
+        self.flat = flat
+        self.levels = levels
+        self.ends: dict[Any, End] = {}  # by port: both ends of a port are the same, but for parameters as well
+        self.labels: dict[str, int] = {}
+        self.index_of = {node.node: node.index for node in flat.nodes}
+        self.scope_of = {scope.subgraph: scope.index for scope in flat.scopes}
+        self.depth_of: dict[Edge, int] = {}
+        # What goes on behind a port of a dissolved subgraph: inside behind inputs and slots, outside behind outputs and
+        # events.
+        self.behind: dict[Any, list[Edge]] = {}
+
+    def collect(self) -> None:
+        """Fill edges and gates."""
+        if self.scope_of:
+            self._find_relays()
+        for level in self.levels:
+            for edge in level.graph.edges:
+                self.begin(edge)
+        for level in self.levels:
+            for gate in level.graph.gates:
+                self._gate(gate)
+
+    def _find_relays(self) -> None:
+        for level in self.levels:
+            for edge in level.graph.edges:
+                self.depth_of[edge] = level.depth
+                relay = self.relay(edge.source)
+                if relay is not None:
+                    self.behind.setdefault(relay, []).append(edge)
+
+    def relay(self, end: Any) -> Any:
+        """Give the port of a dissolved subgraph that an end is a side of; None if edges really begin or end there."""
+        if isinstance(end, InnerSource | InnerTarget):
+            return end.outer if end.node in self.scope_of else None
+        node = getattr(end, "node", None)
+        if not is_box(node) or end.kind == "parameter" or node not in self.scope_of:
+            return None
+        return end if end.name in getattr(node._type, f"{end.kind}s") else None
+
+    def begin(self, edge: Edge) -> None:
+        """Follow an edge unless it begins at a relay; those are met on the way."""
+        if not self.scope_of:
+            self._finish(edge.source, edge.target, (edge,), ())
+            return
+        if self.relay(edge.source) is not None:
+            return
+        source: Any = edge.source
+        via: tuple[int, ...] = ()
+        if isinstance(source, ParameterPort):
+            inner = next(self._inner_parameters(source), None)
+            if inner is None:
+                return
+            source, via = inner
+        # Behind a relay each way goes on; the relays that it came through tell a ring.
+        stack: list[tuple[tuple[Edge, ...], tuple[Any, ...]]] = [((edge,), ())]
+        while stack:
+            segments, relays = stack.pop()
+            target = segments[-1].target
+            relay = self.relay(target)
+            if relay is None:
+                passed = (*via, *(self.scope_of[one.node] for one in relays))
+                if isinstance(target, ParameterPort):
+                    for parameter, inside in self._inner_parameters(target):
+                        self._finish(source, parameter, segments, (*passed, *inside))
+                else:
+                    self._finish(source, target, segments, passed)
+            elif any(relay is one for one in relays):
+                self._report_ring(relay, edge)
+            else:
+                stack += [((*segments, onward), (*relays, relay)) for onward in reversed(self.behind.get(relay, ()))]
+
+    def _inner_parameters(self, port: ParameterPort[Any]) -> Iterator[tuple[ParameterPort[Any], tuple[int, ...]]]:
+        """Give the parameters of nodes that one stands for, mostly itself, and the scopes on the way."""
+        stack: list[tuple[ParameterPort[Any], tuple[int, ...]]] = [(port, ())]
+        while stack:
+            found, via = stack.pop()
+            scope = self.scope_of.get(found.node)
+            if scope is None:
+                yield found, via
+            else:
+                inside = self.flat.scopes[scope].subgraph._graph._promoted.get(found.name, ())
+                stack += [(inner, (*via, scope)) for inner in reversed(inside)]
+
+    def _finish(self, source: Any, target: Any, segments: tuple[Edge, ...], via: tuple[int, ...]) -> None:
+        begin, end = self._end(source), self._end(target)
+        if begin is None or end is None:
+            return
+        edge = segments[0]
+        if len(segments) > 1:
+            edge = min(segments, key=self.depth_of.__getitem__)  # min gives the first of equals: nearest to the source
+        options = edge.options
+        through, initial, active = options.through, options.initial, options.active
+        if len(segments) > 1:
+            through = tuple(operator for one in segments for operator in one.options.through)
+            initial = tuple(value for one in reversed(segments) for value in one.options.initial)
+            active = all(one.options.active for one in segments)
+        edges = self.flat.edges
+        edges.append(
+            FlatEdge(
+                len(edges),
+                self._label(begin, end),
+                begin,
+                end,
+                active,
+                options.capacity,
+                options.overflow,
+                options.capacity_limit,
+                through,
+                initial,
+                via,
+                segments,
+            )
+        )
+
+    def _end(self, port: Any) -> End | None:
+        found = self.ends.get(port)
+        if found is None:
+            found = self._make_end(port)
+            if found is not None:
+                self.ends[port] = found
+        return found
+
+    def _make_end(self, port: Any) -> End | None:
+        if is_feed(port):
+            return End(ROOT, "observable", "observable", port)
+        if isinstance(port, InnerSource | InnerTarget):  # only those of what iterates come here: its boundary
+            if port.kind in ("slot", "event"):
+                return None  # no edge leads there from outside (rule G4)
+            return End(ROOT, "output" if isinstance(port, InnerSource) else "input", port.name, port)
+        node = port.node
+        index = self.index_of.get(node)
+        if index is None:
+            scope = self.scope_of.get(node)
+            if scope is not None:
+                index = scope_end(scope)
+            elif node is self.flat.graph:
+                index = ROOT
+            else:
+                self._report_border(port)
+                return None
+        return End(index, port.kind, port.name, port)
+
+    def _label(self, source: End, target: End) -> str:
+        label = f"{self._path(source)} -> {self._path(target)}"
+        count = self.labels[label] = self.labels.get(label, 0) + 1
+        return label if count == 1 else f"{label} #{count}"
+
+    def _path(self, end: End) -> str:
+        if end.node >= 0:
+            return f"{self.flat.nodes[end.node].path}.{end.name}"
+        if end.node == ROOT:
+            inside = self.flat.graph.path
+            return f"{inside}.{end.name}" if inside else end.name
+        return f"{self.flat.scopes[scope_end(end.node)].path}.{end.name}"
+
+    def _gate(self, gate: Gate) -> None:
+        target, by = self._gate_end(gate.target), self._gate_end(gate.by)
+        if target is not None and by is not None:
+            self.flat.gates.append(FlatGate(target, by, gate.idle_rate_hz))
+            return
+        lost = gate.target if target is None else gate.by
+        place = lost._place
+        self.flat.findings.append(
+            Problem(
+                path=lost._type.name if place is None else place.path,
+                severity="error",
+                what="a gate names a node that is not beside it",
+                why="a gate does not reach into or out of a subgraph that iterates (rules A11, G4)",
+                remedy="gate nodes on the same side",
+                check="gate-border",
+            )
+        )
+
+    def _gate_end(self, node: Node) -> int | None:
+        index = self.index_of.get(node)
+        if index is None and node in self.scope_of:
+            return scope_end(self.scope_of[node])
+        return index
+
+    def _report_ring(self, relay: Any, edge: Edge) -> None:
+        self.flat.findings.append(
+            Problem(
+                path=relay.path,
+                severity="error",
+                what=f"what comes over {edge.label} goes round through ports of subgraphs for ever",
+                why="no node lies on the way that would take it (rule G1)",
+                remedy="remove one of the edges between the subgraphs' ports, or put a node on the way",
+                check="relay-ring",
+            )
+        )
+
+    def _report_border(self, port: Any) -> None:
+        self.flat.findings.append(
+            Problem(
+                path=self.flat.graph.path or port.path,
+                severity="error",
+                what=f'an edge to or from "{port.path}" crosses the border of a subgraph that iterates',
+                why="only inputs, outputs and parameters do (rule G4)",
+                remedy="take the edge out, or iterate_over",
+                check="iteration-border",
+            )
+        )

@@ -1,0 +1,98 @@
+"""Refusals that are kept instead of raised, so that the check of a graph that cannot be built tells all at once.
+
+Normally what a graph refuses is raised where it is said. Inside `keep_refusals` it is written down, and building goes
+on as well as it can. Stands on naming.
+"""
+
+from __future__ import annotations
+
+import linecache
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from hfg.errors import GraphError
+from hfg.graph.structure.naming import path_of
+from hfg.nodetype import Node
+from hfg.problem import Problem
+
+__all__ = ["Refusable", "keep_refusals", "problem_of"]
+
+_kept: ContextVar[list[Problem] | None] = ContextVar("hfg.refusals", default=None)
+_OURS = str(Path(__file__).resolve().parents[2])
+
+
+@contextmanager
+def keep_refusals() -> Iterator[list[Problem]]:
+    """Write down what graphs refuse to the code inside; gives the list."""
+    problems: list[Problem] = []
+    token = _kept.set(problems)
+    try:
+        yield problems
+    finally:
+        _kept.reset(token)
+
+
+class Refusable:
+    """Around what a graph may refuse; `ends` are what the path of the finding is made of.
+
+    Example:
+      >>> with keep_refusals() as problems:
+      ...     with Refusable("a.out", "b.in"):
+      ...         raise GraphError("types do not fit; put a node between them")
+      >>> problems[0].path, problems[0].remedy
+      ('a.out -> b.in', 'put a node between them')
+    """
+
+    __slots__ = ("_ends",)
+
+    def __init__(self, *ends: Any) -> None:
+        self._ends = ends
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, _type: object, error: BaseException | None, _traceback: object) -> bool:
+        problems = _kept.get() if isinstance(error, GraphError) else None
+        if problems is None:
+            return False
+        path = " -> ".join(map(_name_of, self._ends))
+        problems.append(problem_of(error, path, f"the graph refused it at {_where()}"))
+        return True
+
+
+def problem_of(error: BaseException | None, path: str, why: str) -> Problem:
+    """Turn a refusal into a finding: its sentence ends in the remedy."""
+    what, _, remedy = str(error).rpartition("; ")
+    return Problem(
+        path=path,
+        severity="error",
+        what=what or remedy,
+        why=why,
+        remedy=remedy if what else "say what is allowed there",
+        check="refused",
+    )
+
+
+def _where() -> str:
+    """The user's line that is being executed."""
+    frame: FrameType | None = sys._getframe()
+    while frame is not None and frame.f_code.co_filename.startswith(_OURS):
+        frame = frame.f_back
+    if frame is None:
+        return "an unknown line"
+    file, line = frame.f_code.co_filename, frame.f_lineno
+    code = linecache.getline(file, line).strip()
+    return f"{Path(file).name}, line {line}" + (f", {code}" if code else "")
+
+
+def _name_of(end: Any) -> str:
+    """What a refused port, node or name is called, whatever it is."""
+    if isinstance(end, str):
+        return end
+    path = path_of(end) if isinstance(end, Node) else getattr(end, "path", None)
+    return path if isinstance(path, str) else f"{end!r:.40}"
