@@ -30,6 +30,7 @@ class Edge:
       mandatory: whether it feeds a mandatory input (F4's m).
       sent, dropped, drained: counts for the report; `sent` is also the number of the newest token.
       live: whether both ends are enabled (SEMANTICS, "live edge").
+      follows: what it enables goes before all else of the group (R2): sequential, within one group, first in first out.
       ended: the consumer has taken END from it and waits for it no more (F4).
       handler: of the slot an event edge leads into, taking the value, where that is all there is to a call; None:
         the general way.
@@ -42,6 +43,7 @@ class Edge:
         "drained",
         "dropped",
         "ended",
+        "follows",
         "handler",
         "index",
         "label",
@@ -71,6 +73,7 @@ class Edge:
         self.dropped = 0
         self.drained = 0
         self.live = True
+        self.follows = False
         self.ended = False
         self.via: tuple[Any, ...] = ()
         self.handler: Callable[[Any], Any] | None = None

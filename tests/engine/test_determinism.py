@@ -14,7 +14,7 @@ from reactivex import operators as ops
 import hfg
 from hfg.trace import TraceEvent
 
-EXPECTED = "8d8bf9748fed81e4"
+EXPECTED = "eb7d44bcd653cf6b"
 
 
 @hfg.node

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from hfg.engine.fusion import steps
+from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
 from hfg.engine.rules import quiet
 from hfg.engine.runtime.places import behind, is_gone, labels_at
@@ -261,7 +261,7 @@ class Pausing:
         if found is None:
             found = self._at_nodes[worker] = Breakpoint(worker.node, worker.path, self.remove)
             worker.halt = partial(self._behind, found)
-            steps.choose(worker)
+            specialise(worker)
         return found
 
     def at_edges(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
@@ -334,7 +334,7 @@ class Pausing:
             del self._at_nodes[worker]
             self._waived.discard(worker)
             worker.halt = None
-            steps.choose(worker)
+            specialise(worker)
 
     def _behind(self, point: Breakpoint, step: Callable[[Worker], None]) -> Callable[[Worker], None]:
         """The step of a worker, behind its breakpoint."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hfg.engine.editing.replanning import Replan
-from hfg.engine.fusion import steps
+from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
@@ -162,7 +162,7 @@ class _Reforming:
         if worker.queued:
             worker.group.policy.remove(worker)
             worker.queued = False
-        worker.group, worker.push = group, group.push
+        worker.group, worker.push, worker.push_next = group, group.push, group.push_next
         self.touched[worker] = None
         for edge in (*worker.edges_in(), *worker.all_out_edges()):
             self.touched |= {edge.source: None, edge.target: None}
@@ -250,6 +250,7 @@ class _Reforming:
             self.touched[edge.source] = None
         if type(edge) is SyncEdge:
             before, edge.sequential = edge.sequential, plan.is_sequential(edge.source, edge.target)
+            edge.follows = plan.follows(edge.source, edge.target, edge.sequential)
             target: Worker = edge.target
             if before is edge.sequential or not target.held or edge not in target.taken:
                 return
@@ -336,7 +337,7 @@ class _Reforming:
                 ports.bind_event(worker, name)
         if worker.node is not None and worker.scope is None:
             self.core.upstairs.bind_ports(worker)
-        steps.choose(worker)
+        specialise(worker)
 
 
 def _lay(edge: Any) -> None:

@@ -208,7 +208,7 @@ class Run(Steering, Editable):
         await self._barrier(node, "outputs")
 
     async def _barrier(self, node: Node, which: str) -> None:
-        from hfg.engine.fusion import steps
+        from hfg.engine.fusion.specialise import specialise
 
         worker = self._worker(node)
         if worker.scope is not None:
@@ -216,7 +216,7 @@ class Run(Steering, Editable):
         neighbours = [edge.source for edge in worker.in_edges] + [edge.target for edge in worker.all_out_edges()]
         for one in (worker, *neighbours):
             one.observed = True
-            steps.choose(one)
+            specialise(one)
         await outside.until(self._engine, getattr(worker, which).when_complete)
 
     async def wait_finished(self) -> Report:

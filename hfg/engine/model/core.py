@@ -170,6 +170,8 @@ class Core:
         self.over = False
         self.errors: list[HfgError] = []
         self.lost_activity = 0
+        self.followers: list[Worker] = []  # enabled by the sending under way, and to go next (R2)
+        self.followed = 0  # how many have gone so; the pump counts waves, not hops, where time is virtual
         self.dirty_scopes: list[Scope] = []
         self.late: list[Worker] | None = None  # those whose automatic events are told behind the change under way
         self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)

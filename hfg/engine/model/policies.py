@@ -51,9 +51,14 @@ class Policy(Protocol):
 
 
 class Fifo(deque[Worker]):
-    """First in, first out: the default."""
+    """First in, first out among waves, and within a wave depth first: the default.
+
+    What a firing enables over sequential edges goes in front of all that waits, so a wave comes to its end before the
+    next one begins (R2).
+    """
 
     push = deque.append
+    push_next = deque.appendleft
     pop = deque.popleft
 
 

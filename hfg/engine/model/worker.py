@@ -90,7 +90,7 @@ class Worker:
         "over": what was under way is over, but for what it releases.
       special: something about the next firing is not ordinary (a marker lies on an input ...): the fast step steps
         aside.
-      step: runs its next piece of work; chosen for its shape by `steps.choose`.
+      step: runs its next piece of work; chosen for its shape by `specialise`.
       right: A3's right to carry activity that A5 took earlier in this firing or call.
       stamp: of what it sends now (T5); None outside a firing or call: the present.
       written: per output what was written in this firing; None until the first.
@@ -161,6 +161,7 @@ class Worker:
         "priority",
         "process",
         "push",
+        "push_next",
         "queued",
         "rate_timer",
         "ready_hook",
@@ -198,6 +199,7 @@ class Worker:
         self.options = options
         self.group = group
         self.push: Callable[[Worker], None] = group.push
+        self.push_next: Callable[[Worker], None] = group.push_next
         self.priority: int = options.priority if options is not None else 0
 
         self.inputs = Barrier()

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from hfg.engine.fusion import steps
+from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import (
     BACKOFF,
     DISABLED,
@@ -107,7 +107,7 @@ class Measuring:
             meter = Meter(worker)
             meter.measure()
             if worker.core.started:
-                steps.choose(worker)
+                specialise(worker)
         return meter
 
     def refit(self, workers: Iterable[Worker]) -> None:
@@ -115,7 +115,7 @@ class Measuring:
         for worker in workers:
             if worker.meter is not None:
                 worker.meter.refit()
-                steps.choose(worker)
+                specialise(worker)
 
     def end(self) -> None:
         """The run is over."""

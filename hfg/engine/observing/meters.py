@@ -91,7 +91,6 @@ class Meter:
     Attributes:
       code: the process function itself, for a step that measures by itself.
       left: how much is still to be measured before the next look.
-      steps: one that does not measure, and one that does until enough is measured; None: the code itself is wrapped.
       busy_s: for how long its code kept its group busy.
       spent: how long firings and calls took, what async code waits for included.
       delays: from the stamp of what a firing or call took to its end.
@@ -115,7 +114,6 @@ class Meter:
         "left",
         "mark",
         "spent",
-        "steps",
         "waiting",
         "worker",
     )
@@ -124,7 +122,6 @@ class Meter:
         self.worker = worker
         self.code: Any = worker.process
         self.left = BATCH
-        self.steps: tuple[Callable[[Worker], None], Callable[[Worker], None]] | None = None
         self.busy_s = 0.0
         self.spent = Distribution()
         self.delays = Distribution()
@@ -155,7 +152,6 @@ class Meter:
     def refit(self) -> None:
         """The worker has another node: what was measured stays, its code is measured from now on."""
         self.code = self.worker.process
-        self.steps = None
         self._wrapped.clear()
         self.measure()
 
@@ -196,8 +192,6 @@ class Meter:
         if delays:
             self.delays.add(delays, each)
         self.left = BATCH
-        if self.steps is not None and self.worker.step is self.steps[0]:
-            self.worker.step = self.steps[1]
 
     def _done(self) -> int:
         worker = self.worker

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from hfg.engine.fusion import steps
+from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.runtime import ports, relays
 from hfg.engine.runtime.places import Ends, behind, labels_at, place_of
@@ -205,7 +205,7 @@ class Taps:
             place.tap = looks[0] if len(looks) == 1 else partial(_all_of, looks) if looks else None
             source: Worker = place.source
             if source.core.started and not self._engine.core.over:
-                steps.choose(source)
+                specialise(source)
             for event in source.events.values():
                 if place in event.edges:
                     self._tell_event(event)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 
+from hfg.engine.model.core import Core
 from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, FULL, RATE, UNREADY, Worker
 from hfg.ports.edges import Edge, EventEdge
 
@@ -20,8 +21,10 @@ __all__ = [
     "consider",
     "freed",
     "idle_again",
+    "let_follow",
     "must_wait",
     "note_full",
+    "place",
     "queue",
     "remove_call",
     "unblock",
@@ -36,15 +39,40 @@ def queue(worker: Worker) -> None:
         worker.push(worker)
 
 
-def consider(worker: Worker) -> None:
-    """Something that F1 asks for has changed: give the next firing its place if all of it holds now (F9, D1)."""
+def place(worker: Worker) -> bool:
+    """Give the next firing its place if all that F1 asks for holds now (F9, D1); it is still to be queued."""
     if worker.inputs.missing or worker.outputs.missing or worker.blocked or worker.placed:
-        return
+        return False
     if worker.paced and must_wait(worker):
-        return
+        return False
     worker.placed = True
     worker.ahead = len(worker.calls) if worker.calls else 0
-    queue(worker)
+    return True
+
+
+def consider(worker: Worker) -> None:
+    """Something that F1 asks for has changed: if all of it holds now, the next firing waits for its turn."""
+    if place(worker):
+        queue(worker)
+
+
+def let_follow(core: Core, since: int) -> None:
+    """R2: what one sending has enabled over sequential edges of its group goes before all else of the group.
+
+    Depth first, in the order of the outputs and edges: so the last of them goes in first. Who stands in the queue
+    already, for a slot call that came before, keeps that place (F9).
+
+    Args:
+      core: the run.
+      since: how many followers there were before the sending.
+    """
+    followers = core.followers
+    while len(followers) > since:
+        worker = followers.pop()
+        if not worker.queued and not worker.busy:
+            worker.queued = True
+            worker.push_next(worker)
+            core.followed += 1
 
 
 def must_wait(worker: Worker) -> bool:
@@ -105,7 +133,10 @@ def arrived(edge: Edge) -> None:
     if not barrier.missing:
         if barrier.waiters is not None:
             barrier.notify()
-        consider(target)
+        if not edge.follows:
+            consider(target)
+        elif place(target):
+            target.core.followers.append(target)
 
 
 def add_call(target: Worker, edge: Edge) -> None:
@@ -113,7 +144,11 @@ def add_call(target: Worker, edge: Edge) -> None:
     if target.calls is None:
         target.calls = deque()
     target.calls.append(edge)
-    if not target.blocked & CALLS_BLOCKED:
+    if target.blocked & CALLS_BLOCKED:
+        return
+    if edge.follows:
+        target.core.followers.append(target)
+    else:
         queue(target)
 
 

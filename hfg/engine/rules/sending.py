@@ -12,7 +12,7 @@ from typing import Any
 from hfg.activity.rules import leaving
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import AMID_NOTHING, ENDED, RunningEvent, Worker
-from hfg.engine.rules.agenda import add_call, arrived, note_full, remove_call, unplace
+from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full, remove_call, unplace
 from hfg.engine.rules.modifiers import derive_scopes, drop, receive, set_active, touch
 from hfg.errors import EngineInternalError, QueueOverflow
 from hfg.ports.edges import Edge, EventEdge, SyncEdge
@@ -32,8 +32,11 @@ def put_outputs(worker: Worker, written: Written) -> None:
       worker: whose firing is over.
       written: per output (value, explicit modifier, explicit stamp); None, or None in it, is NO_MESSAGE.
     """
+    core = worker.core
+    since = len(core.followers)
     _put_outputs(worker, written)
-    _sent(worker.core)
+    let_follow(core, since)
+    _sent(core)
 
 
 def _put_outputs(worker: Worker, written: Written) -> None:
@@ -163,7 +166,9 @@ def send_end(worker: Worker) -> None:
     end = (END, None, None)
     with telling_behind(core):
         worker.stamp = worker.end_stamp
+        since = len(core.followers)
         _put_outputs(worker, [end] * len(worker.out_edges))
+        let_follow(core, since)
         worker.stamp = None
         _sent(core)
         if core.trace is not None:

@@ -18,7 +18,7 @@ from typing import Any
 from hfg.clock import current_clock
 from hfg.engine.editing.edits import Edits
 from hfg.engine.editing.pausing import Halt, Pausing
-from hfg.engine.fusion import steps
+from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.core import Core
 from hfg.engine.model.policies import make_policy
 from hfg.engine.model.worker import TORN_DOWN, Worker
@@ -493,4 +493,4 @@ class Engine:
         core.speaker = None
         if core.started:
             for worker in core.workers:
-                steps.choose(worker)
+                specialise(worker)

@@ -39,6 +39,8 @@ class Group:
         self.name = name
         self.policy = policy
         self.push: Callable[[Worker], None] = policy.push
+        self.depth_first = isinstance(policy, Fifo)  # what a firing enables goes next (R2)
+        self.push_next: Callable[[Worker], None] = policy.push_next if isinstance(policy, Fifo) else policy.push
         self.take: Callable[[], Any] = policy.popleft if isinstance(policy, Fifo) else policy.pop
         self.fair = policy if isinstance(policy, FairShare) else None
         self.clock = clock  # read only where time is shared
@@ -85,12 +87,17 @@ class SideGroup(LoopGroup):
 
     def __init__(self, name: str, policy: Policy, clock: Callable[[], float], ready_groups: deque[Dispatching]) -> None:
         super().__init__(name, policy, clock)
-        self.push = self._push
+        self._into = self.push, self.push_next
+        self.push, self.push_next = self._push, self._push_next
         self._ready_groups = ready_groups
         self._stands = False  # in ready_groups
 
     def _push(self, worker: Worker) -> None:
-        self.policy.push(worker)
+        self._into[0](worker)
+        self._stand()
+
+    def _push_next(self, worker: Worker) -> None:
+        self._into[1](worker)
         self._stand()
 
     def _stand(self) -> None:
@@ -157,7 +164,8 @@ class ThreadGroup(Group):
         context: contextvars.Context,
     ) -> None:
         super().__init__(name, policy, clock)
-        self.push = self._push
+        self._into = self.push, self.push_next
+        self.push, self.push_next = self._push, self._push_next
         self.running = 0
         self._ready_groups = ready_groups
         self._deliver = deliver
@@ -165,8 +173,13 @@ class ThreadGroup(Group):
         self._lane: _Lane | None = None
         self.abandoned: list[tuple[str, threading.Thread]] = []
 
+    def _push_next(self, worker: Worker) -> None:
+        self._into[1](worker)
+        if not self.running:
+            self._ready_groups.append(self)
+
     def _push(self, worker: Worker) -> None:
-        self.policy.push(worker)
+        self._into[0](worker)
         if not self.running:
             self._ready_groups.append(self)
 

@@ -93,6 +93,7 @@ class Iteration:
         for inner in self.core.workers:
             if not inner.is_boundary_output:
                 inner.push = self._counted(inner.push)
+                inner.push_next = self._counted(inner.push_next)
 
     def _counted(self, push: Callable[[Worker], None]) -> Callable[[Worker], None]:
         def counted(inner: Worker) -> None:

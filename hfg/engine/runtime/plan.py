@@ -25,6 +25,7 @@ __all__ = [
     "add_scope",
     "build",
     "fit",
+    "follows",
     "is_sequential",
     "lead_in",
     "make_edge",
@@ -218,6 +219,7 @@ def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
     else:
         edge = SyncEdge(flat.index, flat.label, flat.active)
         edge.sequential = is_sequential(source, target)
+        edge.follows = follows(source, target, edge.sequential)
     edge.source, edge.target = source, target
     edge.via = tuple(core.scopes[scope] for scope in flat.via)
     edge.port_name = flat.target.name
@@ -276,6 +278,11 @@ def is_sequential(source: Worker, target: Worker) -> bool:
     if release == "auto":
         return source.group is target.group
     return bool(release == "sequential")
+
+
+def follows(source: Worker, target: Worker, sequential: bool) -> bool:
+    """R2: what a firing enables by an edge goes next; what comes from outside is a wave of its own."""
+    return sequential and source.options is not None and source.group is target.group and source.group.depth_first
 
 
 def _into(edge: Edge, target: Worker, flat: FlatEdge) -> None:

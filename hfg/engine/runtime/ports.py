@@ -9,7 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from hfg.engine.fusion import steps
+from hfg.engine.fusion import slots
+from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.rules import firing
 from hfg.engine.rules.sending import trigger
@@ -55,10 +56,10 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     if worker.group.threaded:
         port._emit = partial(_from_thread, worker, event)
     elif worker.core.debug:
-        emit = steps.emitter(event, plainly=True)
+        emit = slots.emitter(event, plainly=True)
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     else:
-        emit = steps.emitter(event)
+        emit = slots.emitter(event)
         port.trigger = emit  # in place of the method, which would only call it
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     port._emit_wait = partial(host.trigger_wait, event)
@@ -69,7 +70,7 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         plan.watch_scope(worker.scope)
     if name in AUTOMATIC_EVENTS and worker.core.started:
         plan.watch(worker)
-        steps.choose(worker)
+        specialise(worker)
         bind(worker)  # what it triggers may have consequences now
     return event
 

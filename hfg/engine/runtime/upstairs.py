@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hfg.engine.fusion import steps
+from hfg.engine.fusion.specialise import specialise
 from hfg.engine.rules import activity, agenda, errors, quiet, sending, wiring
 from hfg.engine.runtime import ports
 from hfg.engine.runtime.iteration import Iteration
@@ -23,6 +23,6 @@ class Deciders:
     scopes_changed = staticmethod(activity.scopes_changed)
     deactivate_inside = staticmethod(activity.deactivate_inside)
     rewire = staticmethod(wiring.rewire)
-    choose_step = staticmethod(steps.choose)
+    choose_step = staticmethod(specialise)
     bind_ports = staticmethod(ports.bind)
     iteration = staticmethod(Iteration)

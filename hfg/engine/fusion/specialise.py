@@ -1,0 +1,52 @@
+"""Chooses how a running node does its next piece of work, for its present shape.
+
+Asked whenever its wiring or somebody's interest in it has changed. Stands on `slots` and `firing`.
+"""
+
+from __future__ import annotations
+
+from hfg.engine.fusion.slots import calls_step
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules import firing
+
+__all__ = ["specialise"]
+
+
+def specialise(worker: Worker) -> None:
+    """Give the worker the shortest step that is right for its present shape, behind its breakpoint if it has one."""
+    worker.step = _step_of(worker)
+    if worker.halt is not None:
+        worker.step = worker.halt(worker.step)
+
+
+def _step_of(worker: Worker):  # type: ignore[no-untyped-def]
+    core = worker.core
+    if worker.is_boundary_output:
+        return worker.process or _leave_lying
+    if core.inside is not None and worker.iteration is None:
+        return core.inside.step
+    if _lives_by_its_slots(worker):
+        return calls_step(worker)
+    return firing.step
+
+
+def _lives_by_its_slots(worker: Worker) -> bool:
+    """Its calls may go the fast path: nobody looks, and nothing depends on its activity but itself."""
+    core = worker.core
+    return (
+        core.fast
+        and not core.debug
+        and core.trace is None
+        and worker.options is not None
+        and not worker.group.threaded
+        and bool(worker.slot_edges)
+        and not worker.in_edges
+        and not worker.is_source
+        and not (worker.gates_over or worker.ready_hook is not None or worker.observed or worker.on_idle is not None)
+        and not (worker.scopes or worker.watched or worker.options.max_rate_hz or worker.options.max_duration_s)
+    )
+
+
+def _leave_lying(worker: Worker) -> None:
+    """A graph output: its token lies there until somebody reads it (P10)."""
+    worker.queued = False
