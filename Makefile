@@ -11,13 +11,14 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench bench-peers bench-docs soak setup clean
+.PHONY: help demo test lint bench peers bench-peers bench-goals bench-docs soak setup clean
 
 help:
 	@echo "make demo    search, measure and report on real photographs, watched and steered"
 	@echo "make test    run all tests (without the long ones)"
 	@echo "make lint    ruff and mypy"
-	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md)"
+	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md;"
+	@echo "             bench-goals: what is to be reached, and whether it is)"
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything tools have left"
 
@@ -36,13 +37,19 @@ bench: $(READY)
 	$(BIN)/python -m benchmarks --json $(RESULTS)
 
 # The others have an environment of their own: nothing of hfg needs them. One that cannot be installed is named, and skipped.
-bench-peers: $(READY)
+peers: $(READY)
 	@test -x $(PEERS)/bin/python || "$(PYTHON)" -m venv $(PEERS)
-	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable .
+	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[examples]'
 	@grep -v '^#' benchmarks/peers/requirements.txt | while read -r peer; do \
 	  $(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$peer" || echo "skipped: $$peer" >&2; done
+
+bench-peers: peers
 	$(PEERS)/bin/python -m benchmarks bench_peers --json $(RESULTS)
 	$(PEERS)/bin/python -m benchmarks.profile_hop --json $(RESULTS)
+
+# AGAINST=DIR, another checkout of hfg, adds what is compared with it.
+bench-goals: peers
+	$(PEERS)/bin/python -m benchmarks bench_goals --json $(RESULTS) $(if $(AGAINST),--against "$(AGAINST)")
 
 bench-docs: $(READY)
 	$(BIN)/python -m benchmarks.page $(RESULTS)

@@ -1,8 +1,9 @@
-"""Run the benchmarks: `python -m benchmarks [SUITE ...] [--runs N] [--json FOLDER]`.
+"""Run the benchmarks: `python -m benchmarks [SUITE ...] [--rounds N] [--only TEXT] [--quick] [--json FOLDER]`.
 
 Every case runs in a fresh process, several times, the cases in turn. The table shows the median and the spread,
 (max - min) / median; `--json` writes one line per case with every single figure, the machine and the versions.
-`python -m benchmarks.page` makes the tables of docs/speed.md from those lines.
+`python -m benchmarks.page` makes the tables of docs/speed.md from those lines. A suite with goals shows instead how far
+each is reached; `--against DIR` gives it another checkout of hfg to measure in turn.
 """
 
 from __future__ import annotations
@@ -12,8 +13,11 @@ import importlib
 import json
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TypeVar
 
+from benchmarks.goals import Goal, cases_of, verdicts
 from benchmarks.measure import Record, here, machine, measure, write
 
 SUITES = (
@@ -25,21 +29,29 @@ SUITES = (
     "bench_threads",
     "bench_virtual_day",
 )
-OTHERS = ("bench_peers",)
+OTHERS = ("bench_peers", "bench_goals")
+T = TypeVar("T", str, Goal)
 
 
 def main() -> int:
     """Run what was asked for and print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
-        "suites", nargs="*", default=SUITES, help=f"of {', '.join(SUITES + OTHERS)}; all but the last by default"
+        "suites", nargs="*", default=SUITES, help=f"of {', '.join(SUITES + OTHERS)}; all but the last two by default"
     )
-    parser.add_argument("--runs", type=int, help="fresh processes per case; each suite has its own default, mostly 5")
+    parser.add_argument(
+        "--runs", "--rounds", type=int, help="fresh processes per case; each suite has its own default, mostly 5"
+    )
+    parser.add_argument("--only", metavar="TEXT", help="the cases, or goals, with this in their name")
+    parser.add_argument("--quick", action="store_true", help="at a tenth of the size: to see that it works")
+    parser.add_argument("--against", type=Path, metavar="DIR", help="another checkout of hfg: only bench_goals uses it")
     parser.add_argument("--json", type=Path, metavar="FOLDER", help="write one line per case, a file per suite")
     parser.add_argument("--case", help=argparse.SUPPRESS)
+    parser.add_argument("--size", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--engine", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.case:
-        print(json.dumps(here(*arguments.case.split(":", 1))))
+        print(json.dumps(here(*arguments.case.split(":", 1), arguments.size, arguments.engine)))
         return 0
     unknown = [name for name in arguments.suites if name not in SUITES + OTHERS]
     if unknown:
@@ -50,13 +62,31 @@ def main() -> int:
         print(f"\n{name}: {(suite.__doc__ or '').splitlines()[0]}  (load {os.getloadavg()[0]:.2f})", flush=True)
         for line in getattr(suite, "MISSING", ()):
             print(f"  skipped: {line}")
-        records = measure(name, arguments.runs or getattr(suite, "RUNS", 5), progress)
+        goals = chosen(getattr(suite, "GOALS", ()), arguments.only)
+        failed: dict[str, str] = {}
+        records = measure(
+            name,
+            arguments.runs or getattr(suite, "RUNS", 5),
+            progress,
+            only=cases_of(goals) if goals else chosen(suite.CASES, arguments.only),
+            quick=arguments.quick,
+            against=arguments.against and arguments.against.resolve(),
+            failed=failed if goals else None,
+        )
         progress("")
-        for record in records:
-            print(row(record))
+        if goals:
+            print(verdicts(goals, records, {**suite.SKIPPED, **failed}))
+        else:
+            for record in records:
+                print(row(record))
         if arguments.json:
             write(arguments.json, records)
     return 0
+
+
+def chosen(named: Iterable[T], text: str | None) -> list[T]:
+    """Those with the text in their name."""
+    return [one for one in named if text is None or text in (one.name if isinstance(one, Goal) else str(one))]
 
 
 def progress(text: str) -> None:

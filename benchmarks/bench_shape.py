@@ -31,11 +31,11 @@ def chain(length: int) -> hfg.Graph:
     return FUNCTION.chain_graph(length, 1, Arrivals(1))
 
 
-def build(length: int) -> float:
-    """Seconds to build and check."""
-    began = time.perf_counter()
+def build(length: int) -> dict[str, float]:
+    """Seconds to build and check, by the clock and of the processor."""
+    began, began_cpu = time.perf_counter(), time.process_time()
     chain(length).check()
-    return time.perf_counter() - began
+    return {"wall": time.perf_counter() - began, "cpu": time.process_time() - began_cpu}
 
 
 def resident() -> int:

@@ -1,7 +1,7 @@
 """Fresh processes in turn, and what is written down of them.
 
 A suite is a module with `CASES`; each case is measured by a process of its own, `runs` times, the cases in turn
-(A B C A B C ...), so that a drift of the machine meets all of them. Knows nothing of what is measured.
+there and back (A B C C B A ...), so that a drift of the machine meets all of them. Knows nothing of what is measured.
 """
 
 from __future__ import annotations
@@ -15,15 +15,19 @@ import re
 import statistics
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-__all__ = ["ROOT", "Case", "Record", "here", "machine", "measure", "one", "read", "versions", "write"]
+__all__ = ["BEFORE", "ROOT", "Case", "Record", "here", "machine", "measure", "one", "read", "versions", "write"]
 
 Figures = float | dict[str, float]
 ROOT = Path(__file__).resolve().parent.parent
+BEFORE = "before: "
+"""Stands in front of the name of a case that was measured with another checkout's hfg."""
+QUICK = 10
+LONGEST_S = 300
 
 
 class Case(NamedTuple):
@@ -64,49 +68,100 @@ class Record(NamedTuple):
         return (max(self.values) - min(self.values)) / self.median if self.median else 0.0
 
 
-def measure(name: str, runs: int, say: Callable[[str], None]) -> list[Record]:
-    """Measure all cases of the suite."""
+def measure(
+    name: str,
+    runs: int,
+    say: Callable[[str], None],
+    *,
+    only: Collection[str] | None = None,
+    quick: bool = False,
+    against: Path | None = None,
+    failed: dict[str, str] | None = None,
+) -> list[Record]:
+    """Measure the cases of the suite.
+
+    Args:
+      name: of the suite's module.
+      runs: how many fresh processes for each case.
+      say: hears what is going on.
+      only: these cases, by default all.
+      quick: each at a tenth of its size.
+      against: a checkout of hfg, with which the suite's `AGAINST` are measured too, as `before: ...`.
+      failed: gets the cases that fail, and why; they are measured no further. Without it a failure is raised.
+    """
     suite = importlib.import_module(f"benchmarks.{name}")
     load = os.getloadavg()[0]
-    found: dict[str, list[dict[str, float]]] = {case: [] for case in suite.CASES}
+    cases = {case: found for case, found in suite.CASES.items() if only is None or case in only}
+    if quick:
+        cases = {case: found._replace(size=max(2, found.size // QUICK)) for case, found in cases.items()}
+    jobs: dict[str, tuple[str, Path | None]] = {}
+    for case in cases:
+        jobs[case] = (case, None)
+        if against is not None and case in getattr(suite, "AGAINST", ()):
+            jobs[BEFORE + case] = (case, against)
+    found: dict[str, list[dict[str, float]]] = {job: [] for job in jobs}
     for number in range(runs):
-        for position, case in enumerate(suite.CASES):
-            say(f"{name}: run {number + 1} of {runs}, case {position + 1} of {len(suite.CASES)}")
-            found[case].append(one(name, case))
+        for position, job in enumerate(list(found)[:: -1 if number % 2 else 1]):
+            say(f"{name}: run {number + 1} of {runs}, case {position + 1} of {len(found)}: {job}")
+            case, engine = jobs[job]
+            try:
+                found[job].append(one(name, case, cases[case].size, engine))
+            except RuntimeError as error:
+                if failed is None:
+                    raise
+                failed[job] = str(error)
+                del found[job]
     loads = (round(load, 2), round(os.getloadavg()[0], 2))
     return [
         Record(
             suite=name,
-            case=case,
-            unit=suite.CASES[case].unit,
-            size=suite.CASES[case].size,
+            case=job,
+            unit=cases[jobs[job][0]].unit,
+            size=cases[jobs[job][0]].size,
             figures={key: [round(figures[key], 5) for figures in several] for key in several[0]},
             machine=machine(),
             versions=versions(*getattr(suite, "DISTRIBUTIONS", ())),
             load=loads,
         )
-        for case, several in found.items()
+        for job, several in found.items()
     ]
 
 
-def one(suite: str, case: str) -> dict[str, float]:
+def one(suite: str, case: str, size: int | None = None, engine: Path | None = None) -> dict[str, float]:
     """Measure one case in a fresh process.
 
     Raises:
       RuntimeError: the case failed; with what it said.
     """
     command = [sys.executable, "-m", "benchmarks", "--case", f"{suite}:{case}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, cwd=ROOT)
+    if size is not None:
+        command += ["--size", str(size)]
+    if engine is not None:
+        command += ["--engine", str(engine)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LONGEST_S, cwd=ROOT)
+    except subprocess.TimeoutExpired:
+        raise RuntimeError(f"{suite}: {case} was not over after {LONGEST_S} s") from None
     if done.returncode:
         raise RuntimeError(f"{suite}: {case} failed:\n{done.stdout}{done.stderr}")
     return dict(json.loads(done.stdout.strip().splitlines()[-1]))
 
 
-def here(suite: str, case: str) -> dict[str, float]:
-    """Measure one case in this process."""
+def here(suite: str, case: str, size: int | None = None, engine: Path | None = None) -> dict[str, float]:
+    """Measure one case in this process, with the hfg of another checkout if one is given."""
+    if engine is not None:
+        use(engine)
     found = importlib.import_module(f"benchmarks.{suite}").CASES[case]
-    figures = found.run(found.size)
+    figures = found.run(found.size if size is None else size)
     return figures if isinstance(figures, dict) else {"value": figures}
+
+
+def use(checkout: Path) -> None:
+    """Take hfg from this checkout, and the benchmarks from here: before anything has imported hfg."""
+    sys.path[:0] = [str(checkout), str(checkout / "transports")]
+    taken = Path(importlib.import_module("hfg").__file__ or "")
+    if checkout.resolve() not in taken.resolve().parents:
+        raise RuntimeError(f'there is no hfg in "{checkout}": {taken} would be measured in its place')
 
 
 def machine() -> str:

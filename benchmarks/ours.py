@@ -202,10 +202,13 @@ class Machine(Participant):
 
     name = "hfg, a StateMachine of ten states"
 
+    def __init__(self, states: int = STATES) -> None:
+        self.states = states
+
     def step(self, tokens: int) -> dict[str, float]:
-        """E: microseconds a letter: ten slots are called, one of them hands the activity on."""
+        """E: microseconds a letter: each state hears it, one of them hands the activity on."""
         meter = Arrivals(tokens)
-        names = [f"s{number}" for number in range(STATES)]
+        names = [f"s{number}" for number in range(self.states)]
         ring = zip(names, [*names[1:], names[0]], strict=True)
         machine = hfg.StateMachine(names, [("step", state, after) for state, after in ring], initial=names[0])
 
@@ -218,7 +221,7 @@ class Machine(Participant):
         machine.build(graph, letters=graph.add(hfg.node(letters)()).out)
         report = run(graph)
         active = [path for path, node in report.nodes.items() if node.active]
-        if active != [names[tokens % STATES]]:
+        if active != [names[tokens % self.states]]:
             raise RuntimeError(f"after {tokens} letters {active} are active")
         return meter.figures()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from typing import Any
 
 from benchmarks.meters import Arrivals, Laps
 from benchmarks.works import Participant
@@ -63,6 +64,26 @@ class Calls(Participant):
         return meter.figures()
 
 
+class Bare(Participant):
+    """The same functions one after the other, written out: what somebody writes who needs no graph."""
+
+    name = "bare calls"
+
+    def chain(self, length: int, tokens: int) -> dict[str, float]:
+        """A."""
+        meter = Arrivals(tokens)
+
+        def through(value: int) -> int:
+            return value
+
+        lines = ["for value in range(tokens):", *["    value = through(value)"] * length, "    take(value)"]
+        code = "\n".join(["def work(through, take, tokens):", *(f"    {line}" for line in lines)])
+        names: dict[str, Any] = {}
+        exec(code, names)
+        names["work"](through, meter.take, tokens)
+        return meter.figures(length + 1)
+
+
 class Awaits(Participant):
     """Coroutines that await the next one in place: no pass of the loop."""
 
@@ -87,4 +108,4 @@ class Awaits(Participant):
         return asyncio.run(main())
 
 
-PEERS = [Calls(), Awaits()]
+PEERS = [Calls(), Bare(), Awaits()]

@@ -22,6 +22,15 @@ async def through(before: Queue, *after: Queue) -> None:
             await queue.put(value)
 
 
+async def through_waiting(before: Queue, after: Queue) -> None:
+    """Pass on after one more pass of the loop, until the last one."""
+    value = 0
+    while value != LAST:
+        value = await before.get()
+        await asyncio.sleep(0)
+        await after.put(value)
+
+
 async def consume(before: Queue, take: Callable[[int], None]) -> None:
     """Take until the last one."""
     while (value := await before.get()) != LAST:
@@ -45,13 +54,16 @@ class Queues(Participant):
 
     name = "asyncio.Queue(1)"
 
+    def __init__(self, node: Callable[[Queue, Queue], Awaitable[None]] = through) -> None:
+        self.node = node
+
     def chain(self, length: int, tokens: int) -> dict[str, float]:
         """A."""
         meter = Arrivals(tokens)
 
         async def main() -> None:
             queues = [Queue(1) for _ in range(length + 1)]
-            nodes = [through(before, after) for before, after in pairwise(queues)]
+            nodes = [self.node(before, after) for before, after in pairwise(queues)]
             await all_of(produce(tokens, queues[0]), *nodes, consume(queues[-1], meter.take))
 
         asyncio.run(main())
@@ -72,7 +84,7 @@ class Queues(Participant):
                 meter.lap()
                 await queues[0].put(LAST)
 
-            await all_of(source(), *(through(before, after) for before, after in pairwise(queues)))
+            await all_of(source(), *(self.node(before, after) for before, after in pairwise(queues)))
 
         asyncio.run(main())
         return meter.figures(length + 1)

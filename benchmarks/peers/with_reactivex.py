@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import reactivex
@@ -20,6 +21,27 @@ def mapped(length: int) -> tuple[reactivex.Subject[int], Any]:
     """A subject and its end behind `length` maps."""
     subject: reactivex.Subject[int] = reactivex.Subject()
     return subject, subject.pipe(*(ops.map(through) for _ in range(length)))
+
+
+def relays(length: int, tokens: int, meter: Arrivals) -> None:
+    """Send each value to a subject whose subscriber sends it to the next one, and so on."""
+    last: reactivex.Subject[int] = reactivex.Subject()
+    last.subscribe(meter.take)
+    for _ in range(length):
+        before: reactivex.Subject[int] = reactivex.Subject()
+        before.subscribe(relay(last))
+        last = before
+    for value in range(tokens):
+        last.on_next(value)
+
+
+def relay(after: reactivex.Subject[int]) -> Callable[[int], None]:
+    """Make a handler that sends on."""
+
+    def take(value: int) -> None:
+        after.on_next(value)
+
+    return take
 
 
 class Reactivex(Participant):
@@ -56,6 +78,12 @@ class Reactivex(Participant):
         for value in range(tokens):
             subject.on_next(value)
         return meter.figures()
+
+    def signals(self, length: int, tokens: int) -> dict[str, float]:
+        """Subjects in a row, each with a subscriber that sends on; microseconds a hop."""
+        meter = Arrivals(tokens)
+        relays(length, tokens, meter)
+        return meter.figures(length + 1)
 
 
 PEERS = [Reactivex()]

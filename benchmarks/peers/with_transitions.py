@@ -1,4 +1,4 @@
-"""transitions: a state machine of ten states in a ring."""
+"""transitions: a state machine whose states stand in a ring."""
 
 from __future__ import annotations
 
@@ -14,14 +14,20 @@ class Transitions(Participant):
 
     name = "transitions"
 
+    def __init__(self, states: int = STATES) -> None:
+        self.states = states
+
     def step(self, tokens: int) -> dict[str, float]:
         """E."""
         meter = Arrivals(tokens)
-        machine = Machine(states=[f"s{number}" for number in range(STATES)], initial="s0", auto_transitions=False)
+        names = [f"s{number}" for number in range(self.states)]
+        machine = Machine(states=names, initial="s0", auto_transitions=False)
         machine.add_ordered_transitions()
         for number in range(tokens):
             machine.next_state()
             meter.take(number)
+        if machine.state != names[tokens % self.states]:
+            raise RuntimeError(f"after {tokens} transitions the state is {machine.state}")
         return meter.figures()
 
 

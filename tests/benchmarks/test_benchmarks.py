@@ -7,16 +7,18 @@ import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from benchmarks import bench_peers, page, profile_hop
+from benchmarks import bench_goals, bench_peers, page, profile_hop, threaded
 from benchmarks.__main__ import SUITES
-from benchmarks.measure import Record, one, read, write
+from benchmarks.goals import Goal, Side, judge, verdicts
+from benchmarks.measure import BEFORE, ROOT, Record, measure, one, read, write
 from benchmarks.meters import Arrivals, Laps
 from benchmarks.works import WORKS
 
-MODULES = {name: importlib.import_module(f"benchmarks.{name}") for name in (*SUITES, "bench_peers")}
+MODULES = {name: importlib.import_module(f"benchmarks.{name}") for name in (*SUITES, "bench_peers", "bench_goals")}
 LONGEST = 1_000  # ten thousand nodes take a second to build and run
 TOKENS = 12
 
@@ -49,9 +51,70 @@ def test_every_peer_takes_part_or_is_named_as_missing() -> None:
         assert (peer in rows) != (f"{peer} is not installed" in bench_peers.MISSING), peer
 
 
+def test_every_goal_has_its_cases_or_the_reason_why_not() -> None:
+    assert bench_goals.GOALS
+    for goal in bench_goals.GOALS:
+        for side in goal.sides:
+            assert (side.case in bench_goals.CASES) != (side.case in bench_goals.SKIPPED), side.case
+
+
+def test_the_camera_finds_the_same_in_groups_as_by_hand() -> None:
+    grouped: list[Any] = []
+    alone: list[Any] = []
+    threaded.by_groups(1, grouped.append)
+    threaded.by_hand(1, alone.append)
+    assert [(sight.name, sight.circles, sight.lines) for sight in grouped] == [
+        (sight.name, sight.circles, sight.lines) for sight in alone
+    ]
+    assert sum(len(sight.circles) + len(sight.lines) for sight in alone) > 0
+
+
+def test_a_goal_compares_the_figures_of_the_same_round() -> None:
+    ours = RECORD._replace(case="ours", figures={"wall": [1.0, 1.0, 1.0], "cpu": [1.0, 4.0, 30.0]})
+    theirs = RECORD._replace(case="theirs", figures={"cpu": [2.0, 4.0, 10.0]})
+    records = {record.case: record for record in (ours, theirs)}
+    verdict = judge(Goal("a goal", Side("ours"), Side("theirs"), 1.0), records)
+    assert verdict.judged == [0.5, 1.0, 3.0]
+    assert verdict.reached
+    assert not judge(Goal("a goal", Side("ours"), Side("theirs"), 0.99), records).reached
+    assert not judge(Goal("a goal", Side("ours"), 2.0, 1.9), records).reached
+    assert judge(Goal("a goal", Side("ours"), Side("theirs"), 4.0, alone=True), records).judged == [1.0, 4.0, 30.0]
+
+
+def test_the_table_of_goals_names_what_was_not_measured() -> None:
+    ours = RECORD._replace(case="ours", figures={"cpu": [1.0, 4.0, 30.0]})
+    goals = [
+        Goal("far away", Side("ours"), 2.0, 1.0),
+        Goal("near", Side("ours"), 8.0, 1.0),
+        Goal("unknown", Side("ours"), Side("theirs"), 1.0),
+    ]
+    text = verdicts(goals, [ours], {"theirs": "Traceback ...\nNotImplementedError: it cannot"}).splitlines()
+    assert text[1].split() == ["far", "away", "4.00", "2.00", "us", "2.00", "0.50", "to", "15.0", "1", "no"]
+    assert text[2].split() == ["near", "4.00", "8.00", "us", "0.50", "0.12", "to", "3.75", "1", "yes"]
+    assert text[3].strip() == "unknown  not measured: theirs: NotImplementedError: it cannot"
+    assert text[4].strip() == "1 of 2 goals reached; 1 not measured"
+
+
+def test_another_checkout_is_measured_in_turn() -> None:
+    case = bench_goals.AGAINST[1]
+    said: list[str] = []
+    records = measure("bench_goals", 1, said.append, only=[case], quick=True, against=ROOT)
+    assert [record.case for record in records] == [case, BEFORE + case]
+    assert [record.size for record in records] == [1_000, 1_000]
+    assert all(record.median > 0 for record in records)
+
+
+def test_a_folder_without_hfg_is_not_measured(tmp_path: Path) -> None:
+    failed: dict[str, str] = {}
+    case = bench_goals.AGAINST[1]
+    records = measure("bench_goals", 1, str, only=[case], quick=True, against=tmp_path, failed=failed)
+    assert [record.case for record in records] == [case]
+    assert "there is no hfg in" in failed[BEFORE + case]
+
+
 def test_a_case_is_measured_by_a_process_of_its_own() -> None:
     figures = one("bench_shape", "build and check | 100")
-    assert figures["value"] > 0
+    assert figures["wall"] > 0
 
 
 def test_a_case_that_fails_says_which_and_why() -> None:
