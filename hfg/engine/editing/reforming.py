@@ -295,7 +295,7 @@ class _Reforming:
             if isinstance(edge, DelayEdge | EventEdge) and edge.initial:
                 _lay(edge)
                 if edge.target.blocked & ENDED:
-                    drain_left(edge)
+                    drain_left((edge,))
         touched = [worker for worker in self.touched if not worker.blocked & REMOVED]
         for worker in touched:
             self._bind(worker)

@@ -40,8 +40,7 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
         core.upstairs.choose_step(edge.source)
     worker.deferred = []
     cancel_limit(worker)
-    for edge in worker.in_edges:
-        drain_left(edge)
+    drain_left(worker.in_edges)
     hook = worker.node._hook("end") if worker.node is not None else None
     if hook is None:
         _ended(worker, None, None)
@@ -50,22 +49,26 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
     core.host.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
 
 
-def drain_left(edge: Any) -> None:
-    """F12: what still lies on an input of an ended node is processed without a firing."""
-    if type(edge) is EventEdge and edge.target_kind == "parameter":
-        return
-    worker: Worker = edge.target
-    core = worker.core
-    for token in edge.clear():
-        edge.drained += 1
-        if core.trace is not None:
-            core.trace(TokenDrained(core.now(), edge.label, token))
-        if token.activity and worker.deferred is not None:
-            worker.deferred.append(token.activity)
-    if type(edge) is EventEdge:
-        freed(edge)
-    elif edge.held:
-        release((edge,))
+def drain_left(edges: Sequence[Any]) -> None:
+    """F12: what still lies on inputs of an ended node is processed without a firing.
+
+    All of it before any producer hears of that: one whose outputs are free by it may say END at once, and END is behind
+    what lies here already (T4, P5).
+    """
+    drained = [edge for edge in edges if not (type(edge) is EventEdge and edge.target_kind == "parameter")]
+    for edge in drained:
+        worker: Worker = edge.target
+        core = worker.core
+        for token in edge.clear():
+            edge.drained += 1
+            if core.trace is not None:
+                core.trace(TokenDrained(core.now(), edge.label, token))
+            if token.activity and worker.deferred is not None:
+                worker.deferred.append(token.activity)
+    for edge in drained:
+        if type(edge) is EventEdge:
+            freed(edge)
+    release([edge for edge in drained if type(edge) is not EventEdge and edge.held])
 
 
 def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
