@@ -129,7 +129,7 @@ class TokenProcessed(TraceEvent, frozen=True):
 
 
 class TokenDropped(TraceEvent, frozen=True, gc=False):
-    """A token was discarded and counted: "overflow" (P5), "disabled" (F10), "ended" (F4), "removed" (R4).
+    """A token was discarded and counted: "overflow" (P5), "disabled" (F10), "ended" (F4, F13), "removed" (R4).
 
     "stopped" (left when the run ended).
     """

@@ -177,7 +177,7 @@ class EventEdge(_QueueEdge):
       grown: how often F8 made it longer.
       pipeline: feeds a token to the operators on the edge (P9), or None.
       complete: tells the operators that no more comes, or None.
-      end_sent: END has been put on it (F13, once an edge).
+      end_sent: END has been put on it (F13, once an edge); what comes later is dropped.
     """
 
     __slots__ = (
@@ -213,4 +213,4 @@ class EventEdge(_QueueEdge):
 
     def overflows(self) -> bool:
         """Whether one more token is one too many for a policy that drops or refuses (P5)."""
-        return self.overflow != "wait" and len(self.queue) >= self.capacity
+        return self.overflow != "wait" and len(self.queue) >= self.capacity and not self.end_sent

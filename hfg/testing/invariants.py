@@ -60,7 +60,7 @@ def no_token_lost(events: list[TraceEvent]) -> list[str]:
             case TokenTaken(edge=edge, token=token) | TokenDrained(edge=edge, token=token):
                 gone[edge].append(token.sequence)
             case TokenDropped(edge=edge, token=token, reason=reason):
-                if reason != "ended":  # taken before
+                if reason != "ended" or token.sequence not in gone[edge]:  # else taken, by the firing that ended (F4)
                     gone[edge].append(token.sequence)
     done = any(isinstance(event, RunEnded) and event.outcome == "done" for event in events)
     found = []

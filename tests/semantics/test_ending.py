@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
+from typing import Any
 
 import pytest
 
 import hfg
 from hfg import END
-from hfg.testing import recorder
-from hfg.trace import ActivityChanged, NodeEnded, TokenDrained, TokenDropped, TokenSent, TraceEvent
+from hfg.testing import recorder, replay
+from hfg.trace import ActivityChanged, ActivityLost, NodeEnded, TokenDrained, TokenDropped, TokenSent, TraceEvent
 from tests.semantics.nodes import (
     Both,
     Clock,
@@ -19,6 +20,7 @@ from tests.semantics.nodes import (
     Keep,
     Ringing,
     Total,
+    activity,
     add,
     drive,
     firings,
@@ -149,6 +151,55 @@ class LateEnd(hfg.Node):
         await asyncio.sleep(3)
 
 
+class LeavesWithNinetyNine(hfg.Node):
+    """A source that takes its activity away with its last token."""
+
+    out = hfg.Output(int)
+    count = hfg.State(0)
+
+    def process(self) -> None:
+        self.count += 1
+        if self.count > 1:
+            raise hfg.EndOfStream
+        self.out.send(self.count, activity=0)
+
+    def end(self) -> None:
+        if self.active:
+            self.out.send(99, activity=-1)
+
+
+class Three(hfg.Node):
+    """Joins three."""
+
+    a = hfg.Input(int)
+    b = hfg.Input(int)
+    c = hfg.Input(int)
+
+    def process(self, a: int, b: int, c: int) -> None:
+        pass
+
+
+@pytest.mark.rule("F12", "P5", "A8")
+@pytest.mark.parametrize("release", ["sequential", "pipelined"])
+@pytest.mark.parametrize("first", ["delay", "end"])
+def test_what_lies_before_a_node_that_ends_is_drained_before_the_end_that_is_sent_by_that(
+    first: str, release: Any, fast: bool
+) -> None:
+    graph, trace = hfg.Graph(), recorder()
+    leaves, other = graph.add(LeavesWithNinetyNine()), graph.add(LeavesWithNinetyNine(), name="other")
+    node = graph.add(Three(), release=release)
+    graph.connect(graph.start, leaves.activate, active=True)
+    delayed, ends = (node.b, node.a) if first == "end" else (node.a, node.b)
+    graph.connect(leaves.out, ends)
+    graph.connect(leaves.out, delayed, active=True, initial=(0,))
+    graph.connect(other.out, node.c)
+    run(graph, fast, trace=trace)
+    assert trace.drained(f"leaves_with_ninety_nine.out -> three.{delayed.name}") == [99, END]
+    assert activity(trace, "leaves_with_ninety_nine") == [True, False]
+    assert activity(trace, "three") == [True]  # by the END, behind the -1
+    replay(graph, trace)
+
+
 @pytest.mark.rule("F12")
 def test_a_node_says_that_it_has_ended_once() -> None:
     graph = hfg.Graph()
@@ -186,8 +237,71 @@ def test_all_open_event_edges_get_end_at_the_same_moment_and_once() -> None:
         ("ringing.rang -> echo.value", 0),
         ("echo.rang -> keep.value", 0),
     ]
-    assert third.values == [1, 2]  # a signal after END is drained: "at the same moment"
+    assert third.values == [1, 2]  # a signal behind END is dropped: "at the same moment"
     assert firings(trace, "keep") == ["process", "process", "end"]
+
+
+@pytest.mark.rule("F13", "F4")
+@pytest.mark.parametrize(
+    ("overflow", "capacity"), [("wait", 16), ("wait", 1), ("latest", 1), ("drop_oldest", 2), ("error", 1)]
+)
+def test_a_signal_behind_the_end_of_its_edge_is_dropped_and_nobody_waits_for_it(
+    overflow: Any, capacity: int, fast: bool
+) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(SpeaksNowAndThen()), graph.add(TwoOfThem())
+    graph.connect(source.out, node.a)
+    graph.connect(source.said, node.b, overflow=overflow, capacity=capacity)
+    report = run(graph, fast)
+    assert node.values == [(1, 1), (2, None), (3, None), (4, None)]  # END came on b as 2 could not move
+    assert report.edges["speaks_now_and_then.said -> two_of_them.b"].dropped == 2
+
+
+class SpeaksNowAndThen(hfg.Node):
+    """A source whose signal is missing in its second firing, so that a join with it stands still."""
+
+    out = hfg.Output(int)
+    said = hfg.Event(int)
+    silent_until = hfg.Parameter(0)
+    count = hfg.State(0)
+
+    def process(self) -> int:
+        self.count += 1
+        if self.count > 4:
+            raise hfg.EndOfStream
+        if self.count != 2 and self.count > self.silent_until:
+            self.said.trigger(self.count)
+        return self.count
+
+
+class TwoOfThem(hfg.Node):
+    """Keeps pairs."""
+
+    a = hfg.Input(int)
+    b = hfg.Input(int, optional=True)
+    values = hfg.State(factory=list)
+
+    def process(self, a: int, b: int | None) -> None:
+        self.values.append((a, b))
+
+
+@pytest.mark.rule("F13", "A8")
+@pytest.mark.parametrize("forked", [False, True], ids=["alone", "with another edge"])
+def test_activity_of_a_signal_behind_the_end_of_its_edge_goes_back_to_its_sender(forked: bool, fast: bool) -> None:
+    graph, trace = hfg.Graph(), recorder()
+    source, node, other = graph.add(SpeaksNowAndThen(silent_until=2)), graph.add(TwoOfThem()), graph.add(Ear())
+    graph.connect(graph.start, source.activate, active=True)
+    graph.connect(source.out, node.a)
+    graph.connect(source.said, node.b, active=True)
+    if forked:
+        graph.connect(source.said, other.hear, active=True)
+    run(graph, fast, trace=trace)
+    behind = [event.token.activity for event in of_kind(trace, TokenDropped) if event.reason == "ended"]
+    assert behind == [1, 1]  # of 3 and 4
+    assert not of_kind(trace, ActivityLost)
+    returned = [event for event in of_kind(trace, ActivityChanged) if event.cause == "returned"]
+    assert [(event.node, event.active) for event in returned] == [("speaks_now_and_then", True)] * 2
+    replay(graph, trace)
 
 
 class Echo(hfg.Node):

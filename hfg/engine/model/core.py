@@ -174,6 +174,7 @@ class Core:
         self.followed = 0  # how many have gone so; the pump counts waves, not hops, where time is virtual
         self.dirty_scopes: list[Scope] = []
         self.late: list[Worker] | None = None  # those whose automatic events are told behind the change under way
+        self.returned: list[EventEdge] = []  # whose +1 of the sending under way goes back to the sender (F13, A8)
         self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
         self.sources: list[Worker] = []
         self.feeds: list[Worker] = []  # the graph's own inputs (P10)

@@ -19,6 +19,7 @@ from hfg.trace import ActivityChanged, ActivityLost, ErrorRaised, TokenDropped
 
 __all__ = [
     "automatic",
+    "count_dropped",
     "derive_scopes",
     "discard",
     "drop",
@@ -99,13 +100,18 @@ def discard(edge: Any, reason: Any) -> None:
 
 def drop(edge: Edge, token: Token[Any], reason: Any) -> None:
     """Count a token that goes nowhere; its activity goes back (A8)."""
+    count_dropped(edge, token, reason)
+    if token.activity > 0:
+        give_back(edge)
+        touch(edge.target.core, edge.target.scopes)
+
+
+def count_dropped(edge: Edge, token: Token[Any], reason: Any) -> None:
+    """Count a token that goes nowhere; what becomes of its activity is the caller's affair."""
     edge.dropped += 1
     core: Core = edge.target.core
     if core.trace is not None:
         core.trace(TokenDropped(core.now(), edge.label, token, reason))
-    if token.activity > 0:
-        give_back(edge)
-        touch(core, edge.target.scopes)
 
 
 def give_back(edge: Edge) -> None:

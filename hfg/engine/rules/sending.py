@@ -13,7 +13,7 @@ from hfg.activity.rules import leaving
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import AMID_NOTHING, ENDED, RunningEvent, Worker
 from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full, remove_call, unplace
-from hfg.engine.rules.modifiers import derive_scopes, drop, receive, set_active, touch
+from hfg.engine.rules.modifiers import count_dropped, derive_scopes, drop, give_back, receive, set_active, touch
 from hfg.errors import EngineInternalError, QueueOverflow
 from hfg.ports.edges import Edge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
@@ -146,7 +146,11 @@ def _drain(edge: Edge, token: Token[Any]) -> None:
 
 
 def _sent(core: Core) -> None:
-    """The sending is on its edges: the modifiers of what was drained act; then what arose by that leaves."""
+    """The sending is on its edges: activity that got nowhere goes back, what was drained acts, the rest follows."""
+    if core.returned:
+        returned, core.returned = core.returned, []
+        for edge in returned:  # behind A5, which has taken it from the sender
+            give_back(edge)
     drained = core.drained
     if drained:
         core.drained = []
@@ -269,6 +273,11 @@ def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
         core.trace(TokenSent(core.now(), edge.label, token))
     if edge.tap is not None:
         edge.tap(token)
+    if edge.end_sent and value is not END:  # END came first: nobody waits for what comes behind it (F13)
+        count_dropped(edge, token, "ended")
+        if modifier > 0:
+            core.returned.append(edge)
+        return
     into_input = edge.target_kind == "input"
     if into_input and target.blocked & ENDED:
         _drain(edge, token)

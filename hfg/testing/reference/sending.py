@@ -108,6 +108,12 @@ class Sending(State):
         line.sequence += 1
         token = _with(token, sequence=line.sequence)
         policy = line.edge.overflow
+        if line.given_end and token.value is not END:  # nobody waits for what comes behind END (F13)
+            self.observe(TokenSent(self.now, line.edge.label, token))
+            self.observe(TokenDropped(self.now, line.edge.label, token, "ended"))
+            if token.activity == 1:
+                self.returning.append((line, sender))
+            return
         full = line.edge.is_event and len(line.queue) >= line.capacity
         if full and policy in ("drop_oldest", "latest"):
             self.observe(TokenDropped(self.now, line.edge.label, line.queue.pop(0).token, "overflow"))
@@ -147,6 +153,7 @@ class Sending(State):
                 line.edge.overflow == "error"
                 and self.is_live(line)
                 and line.operators is None
+                and not line.given_end
                 and len(line.queue) >= line.capacity
             ):
                 raise QueueOverflow(f'"{line.edge.label}" holds {line.capacity} signals and takes no more')
@@ -211,10 +218,14 @@ class Sending(State):
         line.queue.remove(lying)
         self.observe(TokenDropped(self.now, line.edge.label, lying.token, reason))
         if lying.token.activity == 1 and reason == "disabled":
-            if lying.sender >= 0:
-                self.set_active(lying.sender, True, "returned")
-            else:
-                self.lose_activity(line.edge.label)
+            self.give_back(line, lying.sender)
+
+    def give_back(self, line: Line, sender: int) -> None:
+        """Activity that got nowhere goes back to its sender, or its loss is counted (A8)."""
+        if sender >= 0:
+            self.set_active(sender, True, "returned")
+        else:
+            self.lose_activity(line.edge.label)
 
     def lose_activity(self, where: str) -> None:
         """Nobody can have it: that is counted (A8)."""
@@ -227,6 +238,8 @@ class Sending(State):
         """Do what rules want "at once", until nothing changes; then see who is enabled now."""
         going = self.outcome is None  # what is over speaks no more
         while going:
+            while self.returning:
+                self.give_back(*self.returning.pop(0))
             while self.drain_once():
                 pass
             self.note_places()

@@ -143,6 +143,7 @@ class State:
         self.error: BaseException | None = None
         self.observed: list[TraceEvent] = []
         self.lost_activity = 0
+        self.returning: list[tuple[Line, int]] = []  # activity that got nowhere, and its sender (F13, A8)
         self.held: set[int] = set()  # stations that an edit waits for (R4), by identity
         for station in self.stations:
             station.enabled = bool(station.leaf.options.enabled)
