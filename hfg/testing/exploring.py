@@ -15,7 +15,7 @@ from hfg.testing.conformance import Divergence, describe, replay
 from hfg.testing.invariants import Invariant, broken, of_graph
 from hfg.testing.recording import Recorder
 from hfg.testing.reference.structure import dissolve
-from hfg.trace import CallStarted, FiringStarted
+from hfg.trace import CallStarted, FiringStarted, TokenDrained
 
 __all__ = ["Exploration", "ScheduleFailure", "explore"]
 
@@ -88,7 +88,7 @@ def explore(
         `hfg.testing.invariants`.
       result: what must be the same for every schedule; by default how the run ended and, if the graph has synchronous
         edges alone, every sequence of
-        tokens (rule F7).
+        tokens that somebody had a use for (rule F7).
       seed: of the seeds.
       until_s: ends every run at that time.
       conform: also compares each run with the reference oracle.
@@ -186,8 +186,12 @@ def _default_result(graph: Graph) -> Callable[[Recorder], Any]:
     edges = dissolve(graph).edges
     if any(edge.is_event for edge in edges):
         return lambda trace: trace.outcome
-    labels = [edge.label for edge in edges]
-    return lambda trace: (
-        trace.outcome,
-        {label: [(repr(t.value), t.activity) for t in trace.tokens(label)] for label in labels},
-    )
+    sources = {leaf.index for leaf in dissolve(graph).leaves if leaf.node._type.is_source}
+    labels = [edge.label for edge in edges if edge.target.owner not in sources]
+    return lambda trace: (trace.outcome, {label: _needed(trace, label) for label in labels})
+
+
+def _needed(trace: Recorder, label: str) -> list[tuple[str, int]]:
+    """What somebody had a use for: where a source is given up that sends to ended nodes alone, F7 leaves open (R5)."""
+    drained = {event.token.sequence for event in trace.of(TokenDrained) if event.edge == label}
+    return [(repr(t.value), t.activity) for t in trace.tokens(label) if t.sequence not in drained]

@@ -448,6 +448,112 @@ async def forever() -> AsyncIterator[int]:
         yield number
 
 
+class Echoes(hfg.Node):
+    """A source without end that says again and again what its parameter is."""
+
+    text = hfg.Parameter(0)
+    out = hfg.Output(int)
+
+    def process(self) -> int:
+        return self.text
+
+
+@pytest.mark.rule("R5", "F12")
+@pytest.mark.parametrize("count", [5, 10**9], ids=["behind one that ends", "behind one without end"])
+@pytest.mark.parametrize("release", ["sequential", "pipelined"])
+def test_what_lies_before_a_source_that_is_given_up_is_drained(count: int, release: Any, fast: bool) -> None:
+    graph, trace = hfg.Graph(), recorder()
+    short, sets, echoes = (
+        graph.add(numbers(count=1)),
+        graph.add(numbers(count=count), name="sets"),
+        graph.add(Echoes(), release=release),
+    )
+    node = graph.add(add())
+    graph.connect(short.out, node.a)
+    graph.connect(echoes.out, node.b)
+    graph.connect(sets.out, echoes.ports.parameters["text"])
+    assert run(graph, fast, trace=trace).outcome == "done"
+    taken = len(trace.taken("sets.out -> echoes.text"))
+    drained = trace.drained("sets.out -> echoes.text")
+    assert len(drained) == len(trace.tokens("sets.out -> echoes.text")) - taken
+    assert len(drained) <= 2  # what it would have taken next, and perhaps END: those who send to it alone go with it
+
+
+@pytest.mark.rule("R5", "A6", "F12")
+def test_activity_that_lies_before_a_source_that_is_given_up_arrives() -> None:
+    graph, trace = hfg.Graph(), recorder()
+    sets, echoes, node = graph.add(Countdown(count=1)), graph.add(Echoes()), graph.add(add())
+    graph.connect(graph.start, sets.activate)
+    graph.connect(graph.add(slow_numbers(count=1)).out, node.a)
+    graph.connect(echoes.out, node.b)
+    graph.connect(sets.out, echoes.ports.parameters["text"], active=True, initial=(7, 7, 7))
+    assert run(graph, trace=trace).outcome == "done"
+    assert trace.active_at_end() == ["echoes"]
+
+
+@pytest.mark.rule("R5", "A11")
+def test_a_source_that_rests_keeps_no_run_open_beside_one_that_works_for_nobody(fast: bool) -> None:
+    graph = hfg.Graph()
+    short, endless, resting = graph.add(numbers(count=1)), graph.add(Echoes()), graph.add(numbers(), name="resting")
+    node, state = graph.add(add()), graph.add(Ear())
+    graph.connect(short.out, node.a)
+    graph.connect(endless.out, node.b)
+    graph.gate(resting, by=state)
+    report = run(graph, fast)
+    assert (report.outcome, report.nodes["resting"].firings) == ("done", 0)
+
+
+@pytest.mark.rule("R5", "A11")
+def test_a_source_that_has_rested_goes_on_although_the_others_worked_for_nobody_by_then(fast: bool) -> None:
+    graph = hfg.Graph()
+    short, endless, resting = graph.add(numbers(count=1)), graph.add(Clock(), max_rate_hz=1), graph.add(numbers())
+    node, state, sink, opens = graph.add(add()), graph.add(Ear()), graph.add(Keep()), graph.add(Later())
+    graph.connect(short.out, node.a)
+    graph.connect(endless.out, node.b)
+    graph.connect(resting.out, sink.value)
+    graph.gate(resting, by=state)
+    graph.connect(graph.start, opens.begin)
+    graph.connect(opens.done, state.activate)
+    report = run(graph, fast)
+    assert (report.outcome, sink.values) == ("done", [1, 2, 3])
+
+
+class Later(hfg.Node):
+    """Takes five seconds for a call."""
+
+    done = hfg.Event()
+
+    @hfg.slot
+    async def begin(self) -> None:
+        await asyncio.sleep(5)
+        self.done.trigger()
+
+
+@pytest.mark.rule("R5", "F10")
+@pytest.mark.parametrize("boxed", [False, True])
+def test_the_run_ends_when_the_last_source_that_works_for_somebody_is_disabled(boxed: bool, fast: bool) -> None:
+    graph = hfg.Graph()
+    short, endless = graph.add(numbers(count=1)), graph.add(Clock(), max_rate_hz=1)
+    node, opens = graph.add(add()), graph.add(Later())
+    useful: Any = graph.add(Ticking(), name="useful") if boxed else graph.add(Clock(), name="useful", max_rate_hz=1)
+    graph.connect(useful.out, graph.add(Keep()).value)
+    graph.connect(short.out, node.a)
+    graph.connect(endless.out, node.b)
+    graph.connect(graph.start, opens.begin)
+    graph.connect(opens.done, useful.disable)
+    report = run(graph, fast, until_s=100)
+    assert (report.outcome, report.duration_s) == ("done", 5)
+
+
+class Ticking(hfg.Subgraph):
+    """A box around a clock."""
+
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.connect(graph.add(Clock(), max_rate_hz=1).out, self.out.inner)
+
+
 @pytest.mark.rule("R5")
 def test_a_source_with_an_edge_into_a_living_node_keeps_the_run_open(fast: bool) -> None:
     graph = hfg.Graph()

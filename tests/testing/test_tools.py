@@ -133,6 +133,28 @@ def test_a_synchronous_graph_has_one_result() -> None:
     assert (found.outcomes, found.results) == ({"done": 20}, 1)
 
 
+@pytest.mark.rule("F7", "R5")
+def test_when_a_source_for_ended_nodes_is_given_up_is_no_result() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        node = graph.add(add())
+        graph.add(script(values=(1, 2)), name="short").out >> node.a
+        graph.add(script(values=tuple(range(50))), name="long").out >> node.b
+        graph.add(script(values=tuple(range(6))), name="other").out >> graph.add(double()).value
+        return graph
+
+    sent = {len(graph_run(build(), seed).tokens("long.out -> add.b")) for seed in range(6)}
+    assert len(sent) > 1  # R5 cuts it off, sooner or later
+    found = explore(build, runs=20)
+    assert (found.outcomes, found.results) == ({"done": 20}, 1)
+
+
+def graph_run(graph: hfg.Graph, seed: int) -> Recorder:
+    trace = recorder()
+    hfg.run(graph, clock="virtual", policy="random", seed=seed, trace=trace)
+    return trace
+
+
 def racing() -> hfg.Graph:
     graph = hfg.Graph()
     tally = graph.add(Tally())

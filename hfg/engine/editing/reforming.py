@@ -14,13 +14,14 @@ from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
-from hfg.engine.rules import lifecycle, quiet, wiring
+from hfg.engine.rules import lifecycle, wiring
 from hfg.engine.rules.activity import rest
 from hfg.engine.rules.agenda import block, note_full
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.modifiers import discard, touch
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import flush_automatic, telling_behind
+from hfg.engine.rules.sources import judge_sources
 from hfg.engine.runtime import plan, ports
 from hfg.engine.runtime.groups import Group
 from hfg.graph.flat import FlatEdge, FlatGraph
@@ -325,7 +326,7 @@ class _Reforming:
             if not worker.busy:
                 flush_automatic(worker)
         lifecycle.disable_around(worker for worker in touched if any(not scope.enabled for scope in worker.around))
-        quiet.judge_sources(core)
+        judge_sources(core)
 
     def _bind(self, worker: Worker) -> None:
         """Let the events of a worker know where they lead now; one that leads nowhere and is automatic is none."""

@@ -47,7 +47,7 @@ RESTING: Final = 32  # a source whose gate is closed (A11)
 BACKOFF: Final = 64  # between teardown and setup after an error (X1)
 UNREADY: Final = 128  # its ready() said no; asked again after each firing, call or wake (F1)
 STARTING: Final = 256  # sources, until `start` has been triggered (A10)
-FUTILE: Final = 512  # a source all of whose edges lead to ended nodes, when all other sources are over (R5)
+FUTILE: Final = 512  # a source that works for ended nodes alone, as all do that are left (R5)
 TORN_DOWN: Final = 1024  # the run is ending (R5, X3)
 REMOVED: Final = 2048  # an edit took it out of the graph (R4)
 
@@ -124,6 +124,7 @@ class Worker:
         "gates",
         "gates_over",
         "generator",
+        "given_up",
         "group",
         "halt",
         "handlers",
@@ -258,6 +259,7 @@ class Worker:
         self.written: list[Any] | None = None
         self.events_due: list[tuple[str, Any]] | None = None
         self.end_stamp: float | None = None  # of the firing that ended it, and so of END (T5)
+        self.given_up = False  # a source that counts as ended, though it has not said END (R5)
         self.pending_end = False  # END leaves as soon as the outputs are free (F4)
         self.deferred: list[int] | None = None  # modifiers drained before END was sent (F12)
         self.is_up = False  # its setup has begun, its teardown has not

@@ -14,9 +14,10 @@ import msgspec
 from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import AMID_NOTHING, RATE, RESTING, Worker
-from hfg.engine.rules.agenda import block, consider, must_wait, unblock
+from hfg.engine.rules.agenda import block, consider, must_wait
 from hfg.engine.rules.modifiers import automatic, set_active, touch
 from hfg.engine.rules.sending import flush_automatic, tell, trigger
+from hfg.engine.rules.sources import judge_sources
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
 
@@ -89,9 +90,13 @@ def rest(worker: Worker) -> None:
         worker.rate_timer = None
         worker.blocked &= ~RATE
     if any(gate.idle_rate_hz is None and not gate.state.active for gate in worker.gates_over):
-        block(worker, RESTING)
+        if not worker.blocked & RESTING:
+            block(worker, RESTING)
+            judge_sources(worker.core)
         return
-    unblock(worker, RESTING)
+    if worker.blocked & RESTING:
+        worker.blocked &= ~RESTING
+        judge_sources(worker.core)  # those that were futile beside it work on, like this one
     if worker.placed and must_wait(worker):  # throttled from now on (D7)
         worker.placed = False
     else:

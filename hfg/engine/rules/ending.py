@@ -93,7 +93,9 @@ def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     release(taken)
     worker.end_stamp = worker.stamp
     worker.right = False  # the firing is over; END is not part of it (A3)
-    if worker.outputs.missing and not worker.blocked & DISABLED:
+    if worker.given_up:  # amid a firing, and that is over now: nobody is left who would hear END (R5)
+        worker.deferred = None
+    elif worker.outputs.missing and not worker.blocked & DISABLED:
         worker.pending_end = True
     else:
         send_end(worker)

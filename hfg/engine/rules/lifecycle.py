@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from hfg.engine.model.core import Core
-from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, ENDED, FUTILE, REMOVED, TORN_DOWN, Worker
+from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, ENDED, REMOVED, TORN_DOWN, Worker
 from hfg.engine.rules import wiring
 from hfg.engine.rules.agenda import block, consider, unblock
 from hfg.engine.rules.modifiers import derive_scopes, discard
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import send_end, telling_behind
+from hfg.engine.rules.sources import judge_sources
 from hfg.errors import NodeError
 from hfg.ports.edges import EventEdge
 from hfg.trace import NodeEnabled
@@ -168,6 +168,7 @@ def _settle_disabled(workers: Sequence[Worker]) -> None:
         for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
             if worker.pending_end and worker.busy in AMID_NOTHING:
                 send_end(worker)
+    judge_sources(workers[0].core)
 
 
 def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> None:
@@ -191,7 +192,7 @@ def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> 
             core.trace(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
         consider(worker)
-        _sources_matter_again(core)
+        judge_sources(core)
         then()
 
     if fresh:
@@ -224,18 +225,10 @@ def _afresh(worker: Worker, then: Callable[[], None]) -> None:
 
 def not_ended(worker: Worker) -> None:
     """The node starts afresh: it has not ended, nor have the inputs that it must have."""
-    worker.pending_end = False
+    worker.pending_end = worker.given_up = False
     worker.deferred = None
     for edge in worker.in_edges:
         edge.ended = edge.ended and not edge.mandatory  # who has said END to an optional input has said it (F4)
-
-
-def _sources_matter_again(core: Core) -> None:
-    """A node that had ended is back: sources that fed only ended nodes are not futile any more (R5)."""
-    if core.futile:
-        core.futile = False
-        for source in core.sources:
-            unblock(source, FUTILE)
 
 
 def reset(worker: Worker, then: Callable[[], None]) -> None:
@@ -245,7 +238,7 @@ def reset(worker: Worker, then: Callable[[], None]) -> None:
         not_ended(worker)
         unblock(worker, ENDED)
         wiring.refresh(worker)
-        _sources_matter_again(worker.core)
+        judge_sources(worker.core)
         then()
 
     _afresh(worker, up)

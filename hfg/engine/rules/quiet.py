@@ -1,7 +1,7 @@
 """What happens when nothing moves: queues grow, events end, the run ends or has stalled (rules F8, F13, P9, R5).
 
 Decides only; `run` asks when it sees that no code runs, no worker is queued and no timer is pending. Stands on
-`sending`.
+`ending` and `sources`.
 """
 
 from __future__ import annotations
@@ -22,8 +22,11 @@ from hfg.engine.model.worker import (
     UNWIRED,
     Worker,
 )
-from hfg.engine.rules.agenda import block, freed, must_wait, unblock
+from hfg.engine.rules.agenda import block, freed, must_wait
+from hfg.engine.rules.ending import drain_left
+from hfg.engine.rules.modifiers import derive_scopes, receive
 from hfg.engine.rules.sending import enqueue, put_outputs
+from hfg.engine.rules.sources import joins, judge_sources
 from hfg.errors import QueueLimit, Stalled
 from hfg.ports.edges import EventEdge
 from hfg.token import END
@@ -33,8 +36,8 @@ __all__ = [
     "complete_edge",
     "complete_operators",
     "end_events",
+    "give_up",
     "grow",
-    "judge_sources",
     "node_ended",
     "only_futile_in_flight",
     "only_waiting_for_room",
@@ -140,38 +143,36 @@ def node_ended(worker: Worker) -> None:
     if not worker.slot_edges:
         for edge in worker.event_edges():
             complete_edge(edge)
-    _note_futile(core)
+    judge_sources(core)
 
 
-def judge_sources(core: Core) -> None:
-    """The structure has changed: sources that fed only the dead may matter again, or others do not any more (R5)."""
-    if core.futile:
-        core.futile = False
-        for source in core.sources:
-            unblock(source, FUTILE)
-    _note_futile(core)
+def give_up(core: Core) -> bool:
+    """R5: futile sources before which something lies count as ended from now on: it is drained (F12).
+
+    So whoever has sent it may go on; whether there are any.
+    """
+    given_up = [
+        source
+        for source in core.sources
+        if source.blocked & FUTILE and not source.blocked & ENDED and any(edge.untaken for edge in _joined(source))
+    ]
+    for source in given_up:
+        block(source, ENDED)
+        source.given_up = True
+        source.deferred = []
+        for edge in source.in_edges:
+            core.upstairs.choose_step(edge.source)
+    for source in given_up:
+        drain_left(source.in_edges)
+        modifiers, source.deferred = source.deferred, None
+        for modifier in modifiers or ():  # there is no END of its own for which they would wait
+            receive(source, (modifier,))
+    derive_scopes(core)
+    return bool(given_up)
 
 
-def _note_futile(core: Core) -> None:
-    """Sources that only feed the dead are futile when no other is left."""
-    sources = [one for one in core.sources if not one.blocked & (ENDED | DISABLED)]
-    if sources and all(_feeds_only_ended(source) for source in sources):
-        core.futile = True
-        for source in sources:
-            block(source, FUTILE)
-            if source.rate_timer is not None:
-                source.rate_timer.cancel()
-                source.rate_timer = None
-
-
-def _feeds_only_ended(source: Worker) -> bool:
-    edges = list(source.all_out_edges())
-    return bool(edges) and all(edge.target.blocked & ENDED and not _is_called(edge) for edge in edges)
-
-
-def _is_called(edge: Any) -> bool:
-    """Whether it leads to slot calls, which go on when the node has ended (F12)."""
-    return edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge)
+def _joined(worker: Worker) -> list[Any]:
+    return [edge for edge in worker.in_edges if joins(edge)]
 
 
 def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:

@@ -381,7 +381,7 @@ class Engine:
         self._answer_quiet()
         if self.holds or any(reader.inputs_ready() for reader in self.readers):
             return
-        if quiet.complete_operators(core):
+        if quiet.give_up(core) or quiet.complete_operators(core):
             self.kick()
             return
         if core.timers > 0:

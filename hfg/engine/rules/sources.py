@@ -1,0 +1,49 @@
+"""Which sources still work for somebody: when none of those that are left does, they keep no run alive (rule R5).
+
+Judged anew whenever a node ends, is enabled, disabled or reset, a gate lets a source rest or go on, and the structure
+changes; never per token. Stands on `agenda`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+from hfg.engine.model.core import Core
+from hfg.engine.model.worker import DISABLED, ENDED, FUTILE, RESTING, Worker
+from hfg.engine.rules.agenda import block, unblock
+from hfg.ports.edges import EventEdge
+
+__all__ = ["joins", "judge_sources"]
+
+
+def judge_sources(core: Core) -> None:
+    """Sources are futile as long as all that are left work for nobody; one that rests keeps no run alive (A11)."""
+    left = [one for one in core.sources if not one.blocked & (ENDED | DISABLED | RESTING)]
+    core.futile = bool(left) and len(_for_nobody(left)) == len(left)
+    for source in core.sources:
+        if core.futile and source in left:
+            if not source.blocked & FUTILE:
+                block(source, FUTILE)
+        else:
+            unblock(source, FUTILE)
+
+
+def _for_nobody(sources: Collection[Worker]) -> set[Worker]:
+    """Those with edges only into nodes that have ended, or into others of them: a source given up counts as ended."""
+    found: set[Worker] = set()
+    while more := {source for source in sources if source not in found and _feeds_only(source, found)}:
+        found |= more
+    return found
+
+
+def _feeds_only(source: Worker, given_up: Collection[Worker]) -> bool:
+    edges = list(source.all_out_edges())
+    return bool(edges) and all(
+        joins(edge) and (edge.target.blocked & ENDED or edge.target in given_up) for edge in edges
+    )
+
+
+def joins(edge: Any) -> bool:
+    """Whether a firing takes from it; slot calls go on when the node has ended (F12)."""
+    return edge.target_kind == "input" or (edge.target_kind == "parameter" and type(edge) is not EventEdge)
