@@ -366,7 +366,9 @@ class Replay:
             steps = [
                 move
                 for move in self.machine.moves()
-                if move.kind in ("go on", "timer") or (move.kind == "feed" and not self._reaches(move.edge))
+                if move.kind in ("go on", "timer")
+                or (move.kind == "feed" and not self._reaches(move.edge))
+                or (not self.sees_inside and self._moves_inside(move))
             ]
             if not steps:
                 return

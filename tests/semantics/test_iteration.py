@@ -16,7 +16,9 @@ from tests.semantics.nodes import (
     add,
     drive,
     fail_on,
+    forward,
     forward_async,
+    forward_later,
     numbers,
     only_odd,
     run,
@@ -71,6 +73,70 @@ def iterated(
     graph.connect(box.odd, odd.value)
     report = run(graph, fast)
     return sums.values, odd.values, report
+
+
+def nested(depth: int, make: Any, **options: Any) -> Any:
+    """A box that iterates around one that does, and so on; the innermost holds a node."""
+    kind: Any = int
+    box: Any = None
+    for _ in range(depth):
+
+        class Box(hfg.Subgraph):
+            xs = hfg.Input(kind)
+            ys = hfg.Output(kind)
+            iterate_over = ("xs",)
+            inside = box
+
+            def build(self, graph: hfg.Graph) -> None:
+                node = graph.add(make(), **options) if self.inside is None else graph.add(self.inside())
+                graph.connect(self.xs.inner, next(iter(node.ports.inputs.values())))
+                graph.connect(next(iter(node.ports.outputs.values())), self.ys.inner)
+
+        box, kind = Box, list[kind]
+    return box()
+
+
+class Gives(hfg.Node):
+    """Gives what it holds, once."""
+
+    held = hfg.Parameter(None, type=object)
+    out = hfg.Output(Any)
+    given = hfg.State(False)
+
+    def process(self) -> Any:
+        if self.given:
+            raise hfg.EndOfStream
+        self.given = True
+        return self.held
+
+
+@pytest.mark.rule("G3", "G4")
+@pytest.mark.parametrize("make", [forward, forward_async, forward_later, only_odd])
+@pytest.mark.parametrize(
+    "options", [{}, {"max_rate_hz": 10.0}, {"group": "side"}], ids=["", "at a rate", "in a thread"]
+)
+@pytest.mark.parametrize(
+    ("depth", "held"),
+    [(1, [1, 2, 3]), (2, [[1, 2], []]), (2, []), (2, [[], [3, 1]]), (3, [[[1], [], [3, 2]], [], [[]], [[5, 7]]])],
+)
+def test_what_iterates_may_be_inside_of_what_iterates(
+    depth: int, held: Any, options: dict[str, Any], make: Any, fast: bool
+) -> None:
+    if "group" in options and make in (forward_async, forward_later):
+        options = {}  # async code runs on the loop
+    graph = hfg.Graph()
+    graph.group("side", threads=1)
+    source, box, sink = graph.add(Gives(held=held)), graph.add(nested(depth, make, **options)), graph.add(Keep())
+    graph.connect(source.out, box.xs)
+    graph.connect(box.ys, sink.value)
+
+    def wanted(value: Any) -> Any:
+        if not isinstance(value, list):
+            return value if make is not only_odd or value % 2 else None
+        return [found for found in map(wanted, value) if found is not None]
+
+    assert run(graph, fast).outcome == "done"
+    assert sink.values == [wanted(held)]
 
 
 @pytest.mark.rule("G4")

@@ -23,8 +23,8 @@ def _step_of(worker: Worker):  # type: ignore[no-untyped-def]
     core = worker.core
     if worker.is_boundary_output:
         return worker.process or _leave_lying
-    if core.inside is not None and worker.iteration is None:
-        return core.inside.step
+    if core.inside is not None:
+        return core.inside.step  # one that iterates itself, too: whoever is around it counts what is queued (G3, G4)
     if _lives_by_its_slots(worker):
         return calls_step(worker)
     return firing.step
