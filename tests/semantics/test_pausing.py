@@ -6,16 +6,17 @@ import asyncio
 import contextlib
 import logging
 import random
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from typing import Any
 
 import pytest
 
 import hfg
+from hfg import commands
 from hfg.testing import recorder, replay
 from hfg.testing.making import Allowed, random_plan
 from hfg.trace import FiringStarted, RunPaused, RunResumed
-from tests.semantics.nodes import Ear, Keep, forward, forward_async, numbers
+from tests.semantics.nodes import Both, Ear, Keep, Ringing, forward, forward_async, numbers
 
 
 def live(graph: hfg.Graph, act: Callable[[Any], Awaitable[None]], **options: Any) -> hfg.Report:
@@ -125,6 +126,134 @@ def test_a_wave_in_which_nothing_can_move_says_so() -> None:
         assert (step.moved, step.why_not) == ((), "no node can move")
 
     live(graph, act)
+
+
+@pytest.mark.rule("R3", "F10")
+def test_a_wave_takes_those_along_whose_tokens_were_dropped_before_it() -> None:
+    graph, _, _, sink = chain()
+
+    async def act(run: Any) -> None:
+        await run.step("numbers")
+        await run.step("forward")  # a token lies before the sink
+        await run.edit(commands.Disable("forward"))  # and is dropped
+        await run.edit(commands.Enable("forward"))
+        assert (await run.step()).moved == ("numbers", "forward", "keep")
+
+    live(graph, act)
+    assert sink.values == [2, 3]
+
+
+@pytest.mark.rule("R3", "F9")
+def test_a_wave_calls_a_node_too_that_has_fired_and_could_fire_again() -> None:
+    graph = hfg.Graph()
+    source, node, calls = graph.add(numbers(count=9)), graph.add(Both(), release="pipelined"), graph.add(Ringing())
+    graph.connect(source.out, node.value)
+    graph.connect(calls.rang, node.call)
+
+    async def act(run: Any) -> None:
+        moved = (await run.step()).moved
+        assert sorted(moved) == ["both", "both", "numbers", "ringing"]
+
+    live(graph, act)
+
+
+class Doubles(hfg.Subgraph):
+    """Doubles each."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    iterate_over = ("value",)
+
+    def build(self, graph: hfg.Graph) -> None:
+        node = graph.add(forward())
+        graph.connect(self.value.inner, node.value)
+        graph.connect(node.out, self.out.inner)
+
+
+class DoublesAll(hfg.Subgraph):
+    """Doubles each of each."""
+
+    value = hfg.Input(list[int])
+    out = hfg.Output(list[int])
+    iterate_over = ("value",)
+
+    def build(self, graph: hfg.Graph) -> None:
+        node = graph.add(Doubles())
+        graph.connect(self.value.inner, node.value)
+        graph.connect(node.out, self.out.inner)
+
+
+@hfg.node
+def threes() -> Iterator[list[int]]:
+    """Lists of three."""
+    while True:
+        yield [1, 2, 3]
+
+
+@hfg.node
+def twos_in_ones() -> Iterator[list[list[int]]]:
+    """Lists of lists."""
+    while True:
+        yield [[1, 2], [], [3]]
+
+
+@pytest.mark.rule("R3", "G4")
+def test_waves_go_through_what_iterates_element_by_element() -> None:
+    graph = hfg.Graph()
+    graph.connect(graph.add(threes()).out, graph.add(Doubles()).value)
+
+    async def act(run: Any) -> None:
+        waves = [(await run.step()).moved for _ in range(4)]
+        each = "doubles/forward"
+        assert waves == [
+            ("threes", "doubles", each),
+            (each,),
+            (each, "threes", "doubles"),
+            (each,),
+        ]
+        run.stop()
+
+    live(graph, act)
+
+
+@pytest.mark.rule("R3", "G3", "G4")
+def test_waves_and_steps_go_through_what_iterates_inside_of_what_iterates() -> None:
+    graph = hfg.Graph()
+    graph.connect(graph.add(twos_in_ones()).out, graph.add(DoublesAll()).value)
+
+    async def act(run: Any) -> None:
+        inner, each = "doubles_all/doubles", "doubles_all/doubles/forward"
+        waves = [(await run.step()).moved for _ in range(4)]
+        assert waves == [
+            ("twos_in_ones", "doubles_all", inner, each),
+            (each, inner),  # the second list is empty
+            (inner, each, "twos_in_ones", "doubles_all"),
+            (inner, each),
+        ]
+        assert (await run.step(each)).moved == (each,)
+        assert (await run.step(inner)).moved == (inner,)
+        run.stop()
+
+    live(graph, act)
+
+
+@pytest.mark.rule("R3")
+@pytest.mark.parametrize("seed", range(30))
+def test_a_wave_leaves_nobody_out_who_could_move(seed: int) -> None:
+    plan = random_plan(700_000 + seed, Allowed(rates=False))
+    graph = plan.build()
+
+    async def act(run: Any) -> None:
+        for _ in range(12):
+            moved = (await run.step()).moved
+            for name, node in graph.nodes.items():
+                if run.report().outcome != "running":
+                    return
+                if name not in moved and not isinstance(node, hfg.Subgraph):
+                    assert not (await run.step(node)).moved, f"{name} was left out\n{plan}"
+
+    with contextlib.suppress(hfg.errors.RunError):
+        live(graph, act)
 
 
 @pytest.mark.rule("R3", "R1")

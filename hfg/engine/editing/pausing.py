@@ -171,13 +171,13 @@ class Pausing:
         """Let one node make one firing or one slot call, and wait until that is over."""
         self._begin(worker.path)
         try:
+            await self._settled()
             why_not = self._why_not(worker)
             if why_not:
                 return Step((), why_not)
             self._let(worker)
             await self._over([worker])
-            if worker.core.inside is not None:
-                await worker.core.inside.looked()  # the next element goes in by itself (G4)
+            await self._settled()
         finally:
             self._stepping = False
         return Step((worker.path,))
@@ -187,30 +187,52 @@ class Pausing:
         self._begin("a wave")
         moved: list[str] = []
         done: set[tuple[Worker, str]] = set()
-        aside: list[Worker] = []
         workers: list[Worker] = []
         try:
-            while True:
-                for worker in self._queued():
-                    kind = _next_kind(worker)
-                    if (worker, kind) in done or not kind:
-                        aside.append(worker)
-                        worker.group.policy.remove(worker)
-                    else:
-                        done.add((worker, kind))
-                        moved.append(worker.path)
-                        workers.append(worker)
-                        self._let(worker)
-                        break
-                else:
-                    if not _any_works(workers) or self._engine.core.over:
-                        break
+            await self._settled()
+            while not self._engine.core.over:
+                worker = self._next_in_wave(done)
+                if worker is not None:
+                    done.add((worker, _next_kind(worker)))
+                    moved.append(worker.path)
+                    workers.append(worker)
+                    self._let(worker)
+                elif _any_works(workers):
                     await self._change()
+                elif not await self._settled():
+                    break
         finally:
-            for worker in aside:
-                worker.group.policy.push(worker)
             self._stepping = False
         return Step(tuple(moved), "" if moved else "no node can move")
+
+    def _next_in_wave(self, done: set[tuple[Worker, str]]) -> Worker | None:
+        """Who moves next in a wave in which these have moved already.
+
+        They stay in their queues, for what they do next may change: who fired may be called.
+        """
+        for worker in list(self._queued()):
+            kind = _next_kind(worker)
+            if not kind:
+                self._let(worker)  # what it was queued for is gone: it leaves the queue, so that it can be queued again
+            elif (worker, kind) not in done:
+                return worker
+        return None
+
+    async def _settled(self) -> bool:
+        """Wait until what iterates has seen whether its inside is quiet: the next element goes in by itself (G4).
+
+        Whether there was anything to wait for.
+        """
+        waited = False
+        while True:
+            looking = [
+                core.inside for core in self._engine.all_cores() if core.inside is not None and core.inside.looks
+            ]
+            if not looking:
+                return waited
+            waited = True
+            for iteration in looking:
+                await iteration.looked()
 
     def _begin(self, what: str) -> None:
         if self._engine.core.over:

@@ -71,7 +71,11 @@ class _InnerTimer:
 
 
 class Iteration:
-    """The inside of one iterating subgraph."""
+    """The inside of one iterating subgraph.
+
+    Attributes:
+      looks: at the loop's next pass it will see whether the inside is quiet.
+    """
 
     def __init__(self, worker: Worker, flat: FlatGraph, groups: Any, loop: Any) -> None:
         self.worker = worker
@@ -88,7 +92,7 @@ class Iteration:
         self._results: list[list[Any]] = []
         self._queued = 0
         self._waiters: list[asyncio.Future[None]] = []
-        self._looking = False
+        self.looks = False
         plan.build(self.core, flat, groups, loop=loop)
         for inner in self.core.workers:
             if not inner.is_boundary_output:
@@ -155,13 +159,13 @@ class Iteration:
 
     def look_later(self) -> None:
         """See at the loop's next pass whether the inside is quiet."""
-        if not self._looking and self.worker.in_flight:
-            self._looking = True
+        if not self.looks and self.worker.in_flight:
+            self.looks = True
             engine: Any = self.worker.core.host
             engine.loop.call_soon(self._look, context=engine.context)
 
     def _look(self) -> None:
-        self._looking = False
+        self.looks = False
         self.settle()
         waiters, self._waiters = self._waiters, []
         for waiter in waiters:
@@ -170,7 +174,7 @@ class Iteration:
     async def looked(self) -> None:
         """Wait until it was seen whether the inside is quiet, and what follows has been done."""
         engine: Any = self.worker.core.host
-        while self._looking:
+        while self.looks:
             waiter: asyncio.Future[None] = engine.loop.create_future()
             self._waiters.append(waiter)
             await waiter
