@@ -1,4 +1,4 @@
-"""Run the benchmarks: `python -m benchmarks [SUITE ...] [--rounds N] [--only TEXT] [--quick] [--json FOLDER]`.
+"""Run the benchmarks: `python -m benchmarks [SUITE ...] [--rounds N] [--only REGEX] [--quick] [--json FOLDER]`.
 
 Every case runs in a fresh process, several times, the cases in turn. The table shows the median and the spread,
 (max - min) / median; `--json` writes one line per case with every single figure, the machine and the versions.
@@ -12,6 +12,7 @@ import argparse
 import importlib
 import json
 import os
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -42,7 +43,7 @@ def main() -> int:
     parser.add_argument(
         "--runs", "--rounds", type=int, help="fresh processes per case; each suite has its own default, mostly 5"
     )
-    parser.add_argument("--only", metavar="TEXT", help="the cases, or goals, with this in their name")
+    parser.add_argument("--only", metavar="REGEX", help="the cases, or goals, in whose name this is found")
     parser.add_argument("--quick", action="store_true", help="at a tenth of the size: to see that it works")
     parser.add_argument("--against", type=Path, metavar="DIR", help="another checkout of hfg: only bench_goals uses it")
     parser.add_argument("--json", type=Path, metavar="FOLDER", help="write one line per case, a file per suite")
@@ -84,9 +85,9 @@ def main() -> int:
     return 0
 
 
-def chosen(named: Iterable[T], text: str | None) -> list[T]:
-    """Those with the text in their name."""
-    return [one for one in named if text is None or text in (one.name if isinstance(one, Goal) else str(one))]
+def chosen(named: Iterable[T], pattern: str | None) -> list[T]:
+    """Those in whose name the pattern is found."""
+    return [one for one in named if re.search(pattern or "", one.name if isinstance(one, Goal) else one)]
 
 
 def progress(text: str) -> None:

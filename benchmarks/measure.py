@@ -88,6 +88,8 @@ def measure(
       quick: each at a tenth of its size.
       against: a checkout of hfg, with which the suite's `AGAINST` are measured too, as `before: ...`.
       failed: gets the cases that fail, and why; they are measured no further. Without it a failure is raised.
+
+    Ctrl-C ends it early: the rounds that are complete count.
     """
     suite = importlib.import_module(f"benchmarks.{name}")
     load = os.getloadavg()[0]
@@ -100,17 +102,24 @@ def measure(
         if against is not None and case in getattr(suite, "AGAINST", ()):
             jobs[BEFORE + case] = (case, against)
     found: dict[str, list[dict[str, float]]] = {job: [] for job in jobs}
-    for number in range(runs):
-        for position, job in enumerate(list(found)[:: -1 if number % 2 else 1]):
-            say(f"{name}: run {number + 1} of {runs}, case {position + 1} of {len(found)}: {job}")
-            case, engine = jobs[job]
-            try:
-                found[job].append(one(name, case, cases[case].size, engine))
-            except RuntimeError as error:
-                if failed is None:
-                    raise
-                failed[job] = str(error)
-                del found[job]
+    complete = 0
+    try:
+        for number in range(runs):
+            for position, job in enumerate(list(found)[:: -1 if number % 2 else 1]):
+                say(f"{name}: run {number + 1} of {runs}, case {position + 1} of {len(found)}: {job}")
+                case, engine = jobs[job]
+                try:
+                    found[job].append(one(name, case, cases[case].size, engine))
+                except RuntimeError as error:
+                    if failed is None:
+                        raise
+                    failed[job] = str(error)
+                    del found[job]
+            complete = number + 1
+    except KeyboardInterrupt:
+        if not complete:
+            raise
+    found = {job: several[:complete] for job, several in found.items()}
     loads = (round(load, 2), round(os.getloadavg()[0], 2))
     return [
         Record(

@@ -104,6 +104,20 @@ def test_another_checkout_is_measured_in_turn() -> None:
     assert all(record.median > 0 for record in records)
 
 
+def test_what_is_complete_counts_when_somebody_interrupts(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+
+    def one(suite: str, case: str, size: int, engine: Path | None) -> dict[str, float]:
+        if len(said) == 4:
+            raise KeyboardInterrupt
+        return {"cpu": float(len(said))}
+
+    monkeypatch.setattr("benchmarks.measure.one", one)
+    cases = list(bench_goals.CASES)[:2]
+    records = measure("bench_goals", 3, said.append, only=cases)
+    assert {record.case: record.values for record in records} == {cases[0]: [1.0], cases[1]: [2.0]}
+
+
 def test_a_folder_without_hfg_is_not_measured(tmp_path: Path) -> None:
     failed: dict[str, str] = {}
     case = bench_goals.AGAINST[1]
