@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import importlib
 import itertools
 import random
+import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -271,3 +274,37 @@ def test_a_thread_holds_a_source_back_in_real_time_alone() -> None:
     assert not [problem for problem in graph.check() if problem.check == "endless-source"]
     with pytest.raises(hfg.errors.GraphError, match="has no rate"):
         hfg.run(graph, clock="virtual", until_s=3)
+
+
+COUNTS = """
+import hfg
+from collections.abc import Iterator
+
+@hfg.node
+def counts() -> Iterator[int]:
+    number = 0
+    while True:
+        number += 1
+        yield number
+"""
+
+
+@pytest.mark.parametrize(
+    "now", ["import hfg\nX = [\n 1,\n (2,\n '''\n", COUNTS.replace("counts", "other"), "\n\n", None]
+)
+def test_of_a_source_whose_file_has_changed_since_nobody_can_say(
+    now: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "counting", raising=False)
+    file = tmp_path / "counting.py"
+    file.write_text(COUNTS)
+    kind = importlib.import_module("counting").counts
+    if now is None:
+        assert runs_for_ever(kind._type)
+        return
+    file.write_text(now)
+    assert not runs_for_ever(kind._type)
+    graph = hfg.Graph()
+    graph.add(kind())
+    assert [problem for problem in graph.check() if problem.severity == "error"] == []

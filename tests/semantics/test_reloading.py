@@ -15,7 +15,7 @@ import pytest
 import hfg
 from hfg import commands as c
 from hfg.errors import GraphError
-from hfg.testing import Recorder, recorder
+from hfg.testing import Recorder, fire, recorder
 from hfg.testing.nodes import script, sink
 
 SOURCE = """
@@ -115,6 +115,38 @@ def test_what_is_undone_works_with_its_old_code(source: Path) -> None:
         await run.undo()
 
     assert given(drive(line(), body)) == [10, 20, 30]
+
+
+TWO = """
+import hfg
+
+def scale(x: int) -> int:
+    return x * {by}
+
+f = hfg.node(scale)
+
+class Box:
+    class Inner(hfg.Node):
+        def process(self, x: int) -> int:
+            return x * {by}
+"""
+
+
+@pytest.mark.rule("R4")
+def test_what_is_undone_is_reloaded_like_everything_else(source: Path) -> None:
+    write(source, TWO.format(by=1))
+    graph = hfg.Graph()
+    graph.edit(c.Add("growing:f", "f"), c.Add("growing:Box.Inner", "inner"), c.Add("growing:f", "late"))
+    graph.edit(c.Remove("late"))
+    for by in (2, 3):
+        write(source, TWO.format(by=by))
+        graph.reload("growing")
+    for _ in range(3):
+        graph.undo()
+    assert [fire(graph[name], x=10).outputs for name in ("f", "inner", "late")] == [{"out": 10}] * 3
+    write(source, TWO.format(by=4))
+    graph.reload("growing")
+    assert [fire(graph[name], x=10).outputs for name in ("f", "inner", "late")] == [{"out": 40}] * 3
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import builtins
 import functools
 import inspect
 import textwrap
+import tokenize
 import types
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -104,9 +105,11 @@ def runs_for_ever(kind: NodeType) -> bool:
         return False
     try:
         code = ast.parse(textwrap.dedent(inspect.getsource(declares))).body[0]
-    except (OSError, TypeError, SyntaxError, IndexError):
-        return False  # no text to look at
-    if not isinstance(code, ast.FunctionDef) or not _Judge(kind, declares, code).is_harmless():
+    except (OSError, TypeError, SyntaxError, IndexError, tokenize.TokenError):
+        return False  # no text to look at, or a file that has changed since
+    if not isinstance(code, ast.FunctionDef) or code.name != declares.__name__:
+        return False  # it has changed: another function is at its place
+    if not _Judge(kind, declares, code).is_harmless():
         return False
     if kind.process_kind == "function":
         return True

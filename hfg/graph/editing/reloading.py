@@ -14,13 +14,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import CodeType, ModuleType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from hfg.errors import GraphError
+from hfg.functions import NodeFunction
 from hfg.graph.editing.commands import Replace
 from hfg.graph.graph import Graph
 from hfg.graph.structure.boxes import is_box
+from hfg.nodetype import Node
 
 __all__ = ["reloaded"]
+
+_once_known_as: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
+"""The references of types that were reloaded: nothing has them any more, but undo brings their nodes back."""
 
 
 @contextmanager
@@ -38,6 +44,7 @@ def reloaded(graph: Graph, module: str | ModuleType) -> Iterator[list[Replace]]:
         )
     commands = [Replace(node.place.path, reference) for node, reference in _nodes_of(graph, name)]
     code = _compiled(old)
+    known_as = dict(_types_in(old, name))
     new = importlib.util.module_from_spec(old.__spec__)  # type: ignore[arg-type]  # or there would be no code
     for inner in [inner for inner in sys.modules if inner.rpartition(".")[0] == name]:
         setattr(new, inner.rpartition(".")[2], sys.modules[inner])
@@ -48,6 +55,7 @@ def reloaded(graph: Graph, module: str | ModuleType) -> Iterator[list[Replace]]:
     except BaseException:
         sys.modules[name] = old
         raise
+    _once_known_as.update(known_as)
     package, _, last = name.rpartition(".")
     if package in sys.modules:
         setattr(sys.modules[package], last, new)
@@ -90,11 +98,22 @@ def _nodes_of(graph: Graph, module: str) -> Iterator[tuple[Any, str]]:
     waiting: list[Any] = list(graph.nodes.values())
     while waiting:
         node = waiting.pop(0)
-        reference = node._type.reference
+        reference = node._type.reference or _once_known_as.get(node._type.origin)
         if reference is not None and reference.startswith(f"{module}:"):
             yield node, reference
         elif is_box(node):
             waiting += node._graph.nodes.values()
+
+
+def _types_in(owner: Any, module: str) -> Iterator[tuple[Any, str]]:
+    """Give the node types of a module, those inside its classes too, and their references."""
+    for value in list(vars(owner).values()):
+        if isinstance(value, NodeFunction) or (isinstance(value, type) and issubclass(value, Node)):
+            reference = value._type.reference
+            if reference is not None and reference.startswith(f"{module}:"):
+                yield value, reference
+        if isinstance(value, type) and value.__module__ == module and value is not owner:
+            yield from _types_in(value, module)
 
 
 def _compiled(module: ModuleType) -> CodeType:
