@@ -141,6 +141,8 @@ class NodeError(RunError):
 
 def in_words(error: BaseException) -> str:
     """Name an exception of a user's, whose text may be empty or may itself raise."""
+    if isinstance(error, SystemExit):
+        return "it left the program (sys.exit): end the run by an event that is connected to graph.stop"
     try:
         text = str(error)
     except Exception as fault:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from typing import Any
 
@@ -228,3 +229,79 @@ class FailsAtEnd(hfg.Node):
     def end(self) -> None:
         self.out.send(1)
         raise ValueError("end")
+
+
+class Stranger(BaseException):
+    """No error, and nothing that Python knows."""
+
+
+class Leaves(hfg.Node):
+    """Raises what is no error, in one of its hooks."""
+
+    where = hfg.Parameter("")
+    problem = hfg.Parameter[type[BaseException]](SystemExit)
+
+    def fail(self, where: str) -> None:
+        if where == self.where:
+            raise self.problem
+
+    def process(self, value: int) -> None:
+        self.fail("process")
+
+    def ready(self) -> bool:
+        self.fail("ready")
+        return True
+
+    def end(self) -> None:
+        self.fail("end")
+
+    def on_activated(self) -> None:
+        self.fail("on_activated")
+
+    @hfg.slot
+    def hear(self, value: object) -> None:
+        self.fail("hear")
+
+
+class LeavesLater(Leaves):
+    """The same after a pause."""
+
+    async def process(self, value: int) -> None:  # type: ignore[override]
+        await asyncio.sleep(0)
+        self.fail("process")
+
+    async def ready(self) -> bool:  # type: ignore[override]
+        await asyncio.sleep(0)
+        self.fail("ready")
+        return True
+
+    async def end(self) -> None:  # type: ignore[override]
+        await asyncio.sleep(0)
+        self.fail("end")
+
+    async def on_activated(self) -> None:  # type: ignore[override]
+        await asyncio.sleep(0)
+        self.fail("on_activated")
+
+    @hfg.slot
+    async def hear(self, value: object) -> None:
+        await asyncio.sleep(0)
+        self.fail("hear")
+
+
+@pytest.mark.rule("X1")
+@pytest.mark.parametrize("on_error", ["skip", "disable", "restart"])
+@pytest.mark.parametrize("problem", [SystemExit, asyncio.CancelledError, GeneratorExit, Stranger])
+@pytest.mark.parametrize("where", ["process", "ready", "end", "on_activated", "hear"])
+@pytest.mark.parametrize(("kind", "group"), [(Leaves, "loop"), (Leaves, "work"), (LeavesLater, "loop")])
+def test_no_policy_gets_over_what_is_no_error(
+    kind: type[Leaves], group: str, where: str, problem: type[BaseException], on_error: Any
+) -> None:
+    graph = hfg.Graph()
+    graph.group("work", threads=1)
+    node = graph.add(kind(where=where, problem=problem), name="node", group=group, on_error=on_error)
+    graph.connect(graph.add(numbers()).out, node.value)
+    graph.start.activates(node.hear)
+    with pytest.raises(hfg.errors.NodeError, match='^node "node" failed in ') as raised:
+        run(graph)
+    assert isinstance(raised.value.__cause__, problem)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
@@ -151,10 +152,58 @@ class Asks(hfg.Node):
         self.times.append(hfg.now())
 
 
+@pytest.mark.rule("R6")
+def test_the_time_behind_a_thread_is_that_of_the_run() -> None:
+    graph = hfg.Graph()
+    graph.group("work", threads=1)
+    source, thread, node = graph.add(slow_numbers(count=2, pause_s=5)), graph.add(forward(), group="work"), Asks()
+    graph.connect(source.out, thread.value)
+    graph.connect(thread.out, graph.add(node).value)
+    run(graph)
+    assert node.times == [5, 10]
+
+
 @hfg.node
 def endless() -> int:
     """A source without rate or end."""
     return 1
+
+
+class JoinsAndEnds(hfg.Node):
+    """Has something to do at its end, in a thread."""
+
+    a = hfg.Input(int)
+    b = hfg.Input(int)
+
+    def process(self, a: int, b: int) -> None:
+        pass
+
+    def end(self) -> None:
+        pass
+
+
+@hfg.node
+async def restless() -> AsyncIterator[int]:
+    """A source that never ends, one pass of the loop after the other."""
+    while True:
+        yield 1
+        await asyncio.sleep(0)
+
+
+@pytest.mark.rule("R6", "R5", "R1", "F12")
+@pytest.mark.parametrize("never_ends", [endless, restless])
+def test_in_virtual_time_a_thread_comes_back_while_the_loop_never_rests(never_ends: Any) -> None:
+    def once() -> int:
+        graph = hfg.Graph()
+        graph.group("work", threads=1)
+        source, node = graph.add(never_ends(), name="source"), graph.add(JoinsAndEnds(), group="work")
+        graph.connect(source.out, node.a)
+        graph.connect(graph.add(numbers()).out, node.b)
+        report = run(graph)
+        assert report.outcome == "done"
+        return report.nodes["source"].firings
+
+    assert once() == once()  # how much it drained meanwhile is no matter of luck
 
 
 @pytest.mark.rule("R6", "F2")

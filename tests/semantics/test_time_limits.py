@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -215,6 +216,104 @@ def test_a_teardown_that_does_not_return_is_given_up(fast: bool) -> None:
     with pytest.raises(hfg.errors.TeardownError, match=r'node "b" failed in teardown\(\): it took longer than 5 s'):
         run(graph, fast)
     assert Life.story == ["+a", "+b", "+c", "-c", "-b", "-a"]
+
+
+class Lingers(hfg.Node):
+    """Its teardown waits for ever, and when it is cancelled says so, or goes on waiting."""
+
+    resists = hfg.Parameter(False)
+    story: list[tuple[str, float]] = []  # noqa: RUF012 - of all
+
+    async def teardown(self) -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            self.story.append((self.place.path, hfg.now()))
+            if self.resists:
+                await asyncio.Event().wait()
+
+    @hfg.slot
+    def hear(self) -> None:
+        pass
+
+
+@pytest.mark.rule("X3")
+@pytest.mark.parametrize(("resists", "over"), [(False, 10.0), (True, 10.2)])
+def test_a_teardown_is_cancelled_at_its_limit_and_not_waited_for_again(resists: bool, over: float) -> None:
+    Lingers.story.clear()
+    graph = hfg.Graph()
+    for name in "ab":
+        graph.add(Lingers(resists=resists), name=name)
+
+    async def main() -> float:
+        with pytest.raises(hfg.errors.TeardownError) as raised:
+            await hfg.run_async(graph)
+        assert [error.path for error in raised.value.errors] == ["b", "a"]
+        return asyncio.get_running_loop().time()
+
+    assert drive(main) == pytest.approx(over)  # who resists has 0.1 s more, and is cancelled once more at the end
+    assert [path for path, _ in Lingers.story] == ["b", "a"]
+    assert [when for _, when in Lingers.story] == pytest.approx([5.0, 10.1 if resists else 10.0])
+
+
+class Driver(hfg.Node):
+    """In a thread that does not come back, in its process function or its teardown."""
+
+    hangs = hfg.Parameter("")
+    gate = threading.Event()
+
+    def process(self, value: int) -> None:
+        if self.hangs == "process":
+            self.gate.wait(30)
+
+    def teardown(self) -> None:
+        assert self.hangs != "process", "it is not torn down while its code runs"
+        self.gate.wait(30)
+
+
+class Motor(hfg.Node):
+    value = hfg.Input(int)
+    off: list[str] = []  # noqa: RUF012 - of all
+
+    def process(self, value: int) -> None:
+        pass
+
+    def teardown(self) -> None:
+        self.off.append(threading.current_thread().name)
+
+
+@pytest.mark.rule("X3")
+@pytest.mark.parametrize("clock", ["real", "virtual"])
+@pytest.mark.parametrize("hangs", ["process", "teardown"])
+def test_a_driver_that_hangs_in_a_thread_keeps_no_motor_of_its_group_running(hangs: str, clock: Any) -> None:
+    Motor.off.clear()
+    Driver.gate.clear()
+    graph = hfg.Graph()
+    graph.group("arm", threads=1)
+    values = graph.input("values", int)
+    for kind in (Motor(), Driver(hangs=hangs)):
+        graph.connect(values, graph.add(kind, group="arm").ports.inputs["value"])
+
+    async def main() -> None:
+        async with hfg.running(graph) as run, run.feed(values) as feed:
+            run._engine.settings.teardown_limit_s = 0.05
+            sending = asyncio.ensure_future(feed.send(1))
+            while not run._engine.core.in_flight:
+                await asyncio.sleep(0)
+            run.stop()
+            await asyncio.gather(sending, return_exceptions=True)
+
+    loop = hfg.VirtualTimeLoop if clock == "virtual" else None
+    try:
+        with (
+            pytest.raises(hfg.errors.TeardownError, match='^node "driver" failed in') as raised,
+            asyncio.Runner(loop_factory=loop) as runner,
+        ):
+            runner.run(main())
+    finally:
+        Driver.gate.set()
+    assert len(raised.value.errors) == 1
+    assert Motor.off == ["hfg group arm"]
 
 
 class Unending(hfg.Node):

@@ -51,7 +51,7 @@ def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
     """A slot call has failed: it owes no outputs, so with every policy but `stop` it is only counted."""
     worker.calls_failed += 1
     problem = as_node_error(worker, f"slot {slot}, call {worker.call_number}", error)
-    policy = worker.options.on_error
+    policy = _policy(worker, problem)
     report_error(worker, problem.what, in_words(error), policy)
     if policy == "stop":
         worker.core.host.finish("failed", problem)
@@ -60,10 +60,17 @@ def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
     calls.finish_call(worker, "failed")
 
 
+def _policy(worker: Worker, problem: NodeError) -> str:
+    """Who ends a task or the program on purpose has raised no error that a policy could get over."""
+    if worker.options is None or not isinstance(problem.__cause__, Exception | None):
+        return "stop"
+    return worker.options.on_error  # type: ignore[no-any-return]
+
+
 def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any = None) -> None:
     """X1: the node's policy decides."""
     core = worker.core
-    policy = worker.options.on_error if worker.options is not None else "stop"
+    policy = _policy(worker, problem)
     restarts = policy == "restart" and not worker.blocked & BACKOFF  # else that is under way
     if restarts and worker.restarts >= worker.options.restart_limit:
         policy = "stop"

@@ -201,5 +201,5 @@ class Carrier:
         while self.task.cancelling():
             self.task.uncancel()  # the cancellation ends with the firing it was meant for
         done(result, over)
-        if isinstance(over, KeyboardInterrupt | SystemExit):
+        if isinstance(over, KeyboardInterrupt):
             raise over

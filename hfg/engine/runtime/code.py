@@ -52,6 +52,7 @@ class CodeRunner:
       given_up: carriers of firings that took too long, until their code has ended.
       aside: hooks of activity that wait.
       came_back: set when code that was under way at the end of the run is over.
+      holds: work in threads for which virtual time stands still.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -62,6 +63,7 @@ class CodeRunner:
         self.given_up: set[Any] = set()
         self.aside: set[asyncio.Task[None]] = set()
         self.came_back = asyncio.Event()
+        self.holds = 0
         self._early_signals: dict[int, list[Callable[[], None]]] = {}
 
     def execute(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
@@ -168,8 +170,13 @@ class CodeRunner:
         worker_job = Job(worker, back, call, arguments, done)
         worker.job = worker_job
         if isinstance(self.loop, VirtualTimeLoop):
+            if not self.holds:
+                self._engine.beside_work = 0
+            self.holds += 1
+            worker_job.held = self.loop.hold()
             limit = worker.options.max_duration_s if worker.busy == "firing" else None
-            worker_job.held = self.loop.hold(limit, lambda: self._engine.guard(partial(errors.time_out, worker)))
+            if limit is not None:
+                worker_job.held.limit(limit, partial(self.context.run, self._given_up, worker))
         else:
             self._limit(worker)
         group.submit(worker_job)
@@ -181,6 +188,29 @@ class CodeRunner:
         if worker.job is not None:
             worker.job = None
             worker.node._active = worker.active
+
+    def hold_no_longer_than(self, seconds: float) -> None:
+        """X3: after so many real seconds virtual time goes on without the work that is in threads now."""
+        loop = self.loop
+        if isinstance(loop, VirtualTimeLoop):
+            for worker in self._engine.all_workers():
+                if worker.job is not None and worker.job.held is not None:
+                    worker.job.held.limit(seconds, partial(self._hold_no_more, worker.job))
+
+    def _hold_no_more(self, job: Job) -> None:
+        if job.held is not None:
+            self.loop.drop(job.held)  # type: ignore[attr-defined]
+            self._came_in(job)
+
+    def _came_in(self, job: Job) -> None:
+        """Time does not stand still for it any more, and the pump need not wait for it."""
+        job.held = None
+        self.holds -= 1
+        self._engine.beside_work = 0
+
+    def _given_up(self, worker: Worker) -> None:
+        self._engine.guard(partial(errors.time_out, worker))
+        self._engine.go_on()
 
     def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Done) -> None:
         """See `Host`."""
@@ -200,7 +230,9 @@ class CodeRunner:
             error: BaseException | None = None
             try:
                 await result
-            except Exception as problem:
+            except KeyboardInterrupt:
+                raise
+            except BaseException as problem:
                 error = problem
             finally:
                 self.core.in_flight -= 1
@@ -221,9 +253,7 @@ class CodeRunner:
         group: Any = worker.group
         if group.threaded:
             job.owner = lambda _job: None
-            if isinstance(self.loop, VirtualTimeLoop):
-                self.loop.drop(job.held)
-                job.held = None
+            self._hold_no_more(job)
             group.abandon(f'"{worker.path}", firing {worker.firings}', job)
         else:
             carrier, worker.carrier = worker.carrier, None
@@ -258,17 +288,19 @@ class CodeRunner:
             self.loop.call_soon_threadsafe(self._collect, box, context=self.context)
 
     def _collect(self, box: deque[Any]) -> None:
+        if isinstance(self.loop, VirtualTimeLoop):
+            while box:
+                self._hold_back(box, box.popleft())
+            return  # nothing has come in: the pump must not run because of it, or its turns were a matter of luck
         while box:
             item = box.popleft()
-            if isinstance(self.loop, VirtualTimeLoop):
-                self._hold_back(self.loop, box, item)
-            elif isinstance(item, Job):
+            if isinstance(item, Job):
                 self._engine.guard(partial(item.owner, item))
             elif not self.core.over:
                 self._engine.guard(item)
         self._engine.go_on()
 
-    def _hold_back(self, loop: VirtualTimeLoop, box: deque[Any], item: Any) -> None:
+    def _hold_back(self, box: deque[Any], item: Any) -> None:
         """In virtual time what a thread brings comes in when the clock says so.
 
         A job with the signals before it (R6).
@@ -279,6 +311,8 @@ class CodeRunner:
         signals = self._early_signals.pop(id(box), [])
 
         def arrive() -> None:
+            if item.held is not None:
+                self._came_in(item)
             for signal in signals:
                 if not self.core.over:
                     self._engine.guard(signal)
@@ -288,4 +322,4 @@ class CodeRunner:
         if item.held is None:
             arrive()
         else:
-            item.held.deliver = arrive
+            item.held.deliver = partial(self.context.run, arrive)

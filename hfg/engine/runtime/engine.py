@@ -43,6 +43,7 @@ _LOGGER = logging.getLogger("hfg.engine")
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
 _SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
 _VIRTUAL_SLICE_STEPS = 2048  # in virtual time a slice must not depend on how fast the machine is
+_VIRTUAL_LOOKS_BESIDE_WORK = 256  # how long it goes on beside work in a thread before it waits for that
 _VIRTUAL_LOOK_STEPS = 8  # it ends sooner only where code has spent virtual time
 
 _MOST_AT_ONE_INSTANT = 3_000_000  # firings, before a run with `until_s` is taken to stand still
@@ -142,11 +143,11 @@ class Engine:
         self.edits = Edits(self)
         self._loop_group = self.groups["loop"]
         self.started_at = 0.0
-        self.hurried = asyncio.Event()
         self._leave_by = float("inf")
         self.ended_at: float | None = None
         self._instant = -1.0
         self._instant_steps = 0
+        self.beside_work = 0  # looks of the pump since work in a thread was begun or came in; counted in virtual time
         plan.build(self.core, flat, self.groups, loop=self._loop_group)
         if settings.trace is not None:
             self.consumers.add(settings.trace)
@@ -239,6 +240,8 @@ class Engine:
         if self._rests():
             return
         policy: Any = self._loop_group.policy
+        if self.virtual and (policy or self._ready_groups) and self._waits_for_work():
+            return
         core.pumping = True
         try:
             self._drain(policy, self._loop_group.take, self._ready_groups)
@@ -264,6 +267,15 @@ class Engine:
         else:
             self._settle()
 
+    def _waits_for_work(self) -> bool:
+        """R5, R1: a loop that is always busy must not keep out what comes back from threads.
+
+        Under the virtual clock that comes in when nothing else is ready. So after so much work beside it, a number that
+        is the same each time, the pump rests until some of it is in, which makes the pump go on.
+        """
+        self.beside_work += 1
+        return self.code.holds > 0 and self.beside_work > _VIRTUAL_LOOKS_BESIDE_WORK
+
     def _rests(self) -> bool:
         """R3: paused, so nothing new starts: it is quiet when nothing is under way, but does not end by that."""
         if self.pausing.paused:
@@ -285,10 +297,7 @@ class Engine:
 
     def misused(self, worker: Worker | None, error: BaseException, what: str = "its code") -> None:
         """A node's code raised what is no error but Python's way to end a task or the program: without us a hang."""
-        cause: BaseException | str = error
-        if isinstance(error, SystemExit):
-            cause = "it left the program (sys.exit): end the run by an event that is connected to graph.stop"
-        problem = NodeError(worker.path if worker is not None else "", what, cause)
+        problem = NodeError(worker.path if worker is not None else "", what, error)
         problem.__cause__ = error
         self.finish("failed", problem)
 
@@ -325,6 +334,7 @@ class Engine:
                     return
                 if self.virtual:
                     looks -= 1
+                    self.beside_work += 1
                     if not looks:
                         self._same_instant()
                     if not looks or self.loop.time() != instant:  # what is due by now has its turn
@@ -427,16 +437,21 @@ class Engine:
         """X3: how long one node may take; when somebody wants to leave, what is left for all of them."""
         return max(0.0, min(self.settings.teardown_limit_s, self._leave_by - time.monotonic()))
 
+    @property
+    def in_a_hurry(self) -> bool:
+        """Whether somebody wants to leave."""
+        return self._leave_by != float("inf")
+
     def hurry(self) -> None:
         """Somebody wants to leave: tear down what can be torn down in 1.5 s, for in two the process is to be over."""
-        if not self.hurried.is_set():
+        if not self.in_a_hurry:
             self._leave_by = time.monotonic() + 1.5
-            self.hurried.set()
+            self.lifetime.hurry()
 
     def leave_now(self) -> None:
         """Somebody is tired of waiting: wait for nothing any more."""
         self._leave_by = 0.0
-        self.hurried.set()
+        self.lifetime.hurry()
 
     def finish(self, outcome: str, error: HfgError | None) -> None:
         """See `Host`."""

@@ -7,9 +7,12 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
+
+import anyio
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import STARTING, Worker
@@ -33,6 +36,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Lifetime"]
 
+_LEAVING_S = 0.1  # how long a teardown that was cancelled may still take before the next one begins
+
 
 class Lifetime:
     """Begins and ends the run of one engine."""
@@ -42,6 +47,7 @@ class Lifetime:
         self._was_set_up: list[Worker] = []
         self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
         self._watch: Watch | None = None
+        self._patience: anyio.CancelScope | None = None  # around what the teardown waits for now
 
     async def start(self) -> None:
         """Set up all nodes, trigger `start`, then let the sources go (A10)."""
@@ -198,11 +204,13 @@ class Lifetime:
         try:
             for dispose in self._disposables.values():
                 dispose()
-            for task in list(engine.edits.leaving):
-                await self._within_limit(task)
-            problems += await self._cancel_code()
+            if engine.edits.leaving:
+                with self._within_limit():
+                    await asyncio.wait(engine.edits.leaving)
+            stuck = await self._cancel_code()
+            problems += stuck.values()
             for worker in reversed(self._was_set_up):
-                problem = await self._tear_down_one(worker)
+                problem = await self._tear_down_one(worker) if worker not in stuck else None
                 if problem is not None:
                     problems.append(problem)
             for edge in core.edges:
@@ -243,28 +251,44 @@ class Lifetime:
         )
 
     async def _end_carriers(self) -> None:
+        """What still resists is cancelled once more and has one limit for all of it together; then it is dropped."""
         carriers = self._carriers()
+        if not carriers:
+            return
         for carrier in carriers:
             carrier.cancel()
+        await self._until_back(lambda: any(carrier.waiting for carrier in carriers))
         for carrier in carriers:
-            await self._within_limit(carrier.task)
+            carrier.drop()
+        await asyncio.wait({carrier.task for carrier in carriers})
 
-    async def _within_limit(self, waiter: asyncio.Future[Any]) -> bool:
-        """Wait as long as a node may take for its teardown, which changes when somebody wants to leave (X3)."""
-        engine = self._engine
-        if not waiter.done():
-            hurried = asyncio.ensure_future(engine.hurried.wait())
-            await asyncio.wait({waiter, hurried}, timeout=engine.teardown_limit_s, return_when=asyncio.FIRST_COMPLETED)
-            if hurried.done() and not waiter.done():
-                await asyncio.wait({waiter}, timeout=engine.teardown_limit_s)
-            hurried.cancel()
-        return waiter.done()
+    @contextmanager
+    def _within_limit(self) -> Iterator[None]:
+        """Wait in it as long as a node may take for its teardown (X3); `hurry` moves the moment it is left at."""
+        limit_s = self._engine.teardown_limit_s
+        self._engine.code.hold_no_longer_than(limit_s)
+        with anyio.move_on_after(limit_s) as self._patience:
+            yield
+        self._patience = None
 
-    async def _cancel_code(self) -> list[NodeError]:
+    def hurry(self) -> None:
+        """Somebody wants to leave: what is waited for now has less time from here on."""
+        if self._patience is not None:
+            engine = self._engine
+            engine.code.hold_no_longer_than(engine.teardown_limit_s)
+            self._patience.deadline = min(self._patience.deadline, engine.loop.time() + engine.teardown_limit_s)
+
+    async def _until_back(self, under_way: Callable[[], bool]) -> None:
+        code = self._engine.code
+        with self._within_limit():
+            while under_way():
+                code.came_back.clear()
+                await code.came_back.wait()
+
+    async def _cancel_code(self) -> dict[Worker, NodeError]:
         """Cancel what still waits; threads get their time to come back. Gives back who did not."""
-        engine = self._engine
-        code = engine.code
-        busy = [worker for worker in engine.all_workers() if worker.in_flight and worker.iteration is None]
+        code = self._engine.code
+        busy = [worker for worker in self._engine.all_workers() if worker.in_flight and worker.iteration is None]
         for worker in busy:
             worker.ticket += 1
             if worker.carrier is not None:
@@ -272,23 +296,17 @@ class Lifetime:
         for task in code.aside:
             task.cancel()
         begun = time.monotonic()
-        while any(worker.in_flight for worker in busy):
-            code.came_back.clear()
-            back = asyncio.ensure_future(code.came_back.wait())
-            if not await self._within_limit(back):
-                back.cancel()
-                break
-        left = [worker for worker in busy if worker.in_flight]
-        for worker in left:
-            if worker.carrier is not None:
-                code.given_up.add(worker.carrier)
-                worker.carrier = None
+        if busy:
+            await self._until_back(lambda: any(worker.in_flight for worker in busy))
         seconds = time.monotonic() - begun
-        return [NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds)) for worker in left]
+        left = [worker for worker in busy if worker.in_flight]
+        for worker in left:  # others of its thread group have their teardown in a new thread
+            code.interrupt(worker)
+        return {worker: NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds)) for worker in left}
 
     async def _tear_down_one(self, worker: Worker) -> NodeError | None:
         engine = self._engine
-        if worker.node is None or worker.in_flight or not worker.is_up:
+        if worker.node is None or not worker.is_up:
             return None
         if worker.generator is None and worker.node._hook("teardown") is None:
             return None
@@ -302,20 +320,27 @@ class Lifetime:
             problem = NodeError(worker.path, "teardown()", error)
             problem.__cause__ = error
             return problem
+        if waiter.done():
+            return waiter.result()
         begun = time.monotonic()
-        if await self._within_limit(waiter):
+        with self._within_limit():
+            await asyncio.wait({waiter})
+        if waiter.done():
             return waiter.result()
         limit = f"{engine.settings.teardown_limit_s:g}"
-        if engine.hurried.is_set():
+        if engine.in_a_hurry:
             limit = f"{time.monotonic() - begun:.1f}"
+        engine.code.interrupt(worker)
+        if not worker.group.threaded:  # what it still has to do when it is cancelled comes before the next teardown
+            with anyio.move_on_after(min(_LEAVING_S, engine.teardown_limit_s)):
+                await asyncio.wait({waiter})
         return NodeError(worker.path, "teardown()", f"it took longer than {limit} s and was given up")
 
     async def _end_threads(self) -> None:
-        """Let idle threads end; those that work have had their time and are left to themselves, as daemons."""
-        stuck = {worker.group for worker in self._engine.all_workers() if worker.in_flight}
+        """Let idle threads end; those that did not come back were left to themselves, as daemons."""
         for group in self._engine.groups.values():
             thread = group.stop() if isinstance(group, ThreadGroup) else None
-            while thread is not None and thread.is_alive() and group not in stuck:
+            while thread is not None and thread.is_alive():
                 await asyncio.sleep(0)
                 thread.join(0.001)
 

@@ -31,10 +31,15 @@ class Held:
 
     __slots__ = ("deliver", "give_up", "give_up_at")
 
-    def __init__(self, limit_s: float | None, give_up: Callable[[], None] | None) -> None:
+    def __init__(self) -> None:
         self.deliver: Callable[[], None] | None = None
+        self.give_up: Callable[[], None] | None = None
+        self.give_up_at: float | None = None
+
+    def limit(self, seconds: float, give_up: Callable[[], None]) -> None:
+        """Have `give_up` called if it is not back after so many real seconds."""
         self.give_up = give_up
-        self.give_up_at = None if limit_s is None else time.monotonic() + limit_s
+        self.give_up_at = time.monotonic() + seconds
 
 
 class _JumpingSelector(selectors.DefaultSelector):
@@ -129,13 +134,13 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             raise ValueError(f"time goes forward: spend() takes seconds from 0 on, got {seconds!r}")
         self._virtual_now += seconds
 
-    def hold(self, limit_s: float | None = None, give_up: Callable[[], None] | None = None) -> Held:
+    def hold(self) -> Held:
         """Let the clock stand still until this work is back (`deliver` set, on the loop) or dropped.
 
         Results come in when nothing else is ready, and in the order in which the work was begun: so a run in virtual
-        time is the same each time, however the threads race. `give_up` is called after `limit_s` real seconds.
+        time is the same each time, however the threads race.
         """
-        held = Held(limit_s, give_up)
+        held = Held()
         self._held.append(held)
         return held
 
