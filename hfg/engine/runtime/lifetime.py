@@ -47,7 +47,8 @@ class Lifetime:
         self._was_set_up: list[Worker] = []
         self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
         self._watch: Watch | None = None
-        self._patience: anyio.CancelScope | None = None  # around what the teardown waits for now
+        # Around what the teardown waits for now. Made here, for the first of a process takes a while: not in a hurry.
+        self._patience = anyio.CancelScope()
 
     async def start(self) -> None:
         """Set up all nodes, trigger `start`, then let the sources go (A10)."""
@@ -269,14 +270,12 @@ class Lifetime:
         self._engine.code.hold_no_longer_than(limit_s)
         with anyio.move_on_after(limit_s) as self._patience:
             yield
-        self._patience = None
 
     def hurry(self) -> None:
         """Somebody wants to leave: what is waited for now has less time from here on."""
-        if self._patience is not None:
-            engine = self._engine
-            engine.code.hold_no_longer_than(engine.teardown_limit_s)
-            self._patience.deadline = min(self._patience.deadline, engine.loop.time() + engine.teardown_limit_s)
+        engine = self._engine
+        engine.code.hold_no_longer_than(engine.teardown_limit_s)
+        self._patience.deadline = min(self._patience.deadline, engine.loop.time() + engine.teardown_limit_s)
 
     async def _until_back(self, under_way: Callable[[], bool]) -> None:
         code = self._engine.code
