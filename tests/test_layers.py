@@ -7,10 +7,12 @@ The table says which floor a module or package stands on; every import statement
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
+
+from hfg.graph.flat.order import rings, shortest_ring
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -46,6 +48,18 @@ FLOORS = {
 FIRST_FLOOR_THAT_WAITS = 5
 SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and what a node type is
 SAME_FLOOR_PAIRS = {("hfg.cli", "hfg.studio"), ("hfg.__main__", "hfg.cli"), ("hfg.testing", "hfg")}
+# The wings of the graph floor, in the same way: a module imports what lies in its own wing or in a lower one.
+GRAPH_WINGS = {
+    "hfg.graph.structure": 0,
+    "hfg.graph.flat": 1,
+    "hfg.graph.drawing": 1,  # draws what was said, so it needs no flat graph
+    "hfg.graph.checks": 2,
+    "hfg.graph.editing": 3,
+    "hfg.graph.graph": 4,  # the face, which composes the wings
+    "hfg.graph": 5,
+}
+NAMED_FROM_BELOW = "hfg.graph.graph"  # nodes and edges give users their graph, so its name stands in annotations
+WITHOUT_CIRCLES = ("hfg.graph", "hfg.activity")
 WAITING = {"asyncio", "anyio", "trio"}
 ORACLE_MUST_NOT_SHARE = ("hfg.ports", "hfg.activity", "hfg.engine")
 
@@ -64,20 +78,33 @@ TRANSPORTS = modules("hfg_transports", ROOT / "transports")
 ALL = HFG | TRANSPORTS
 
 
-def home(module: str) -> str | None:
+def home(module: str, table: Mapping[str, int] = FLOORS) -> str | None:
     """Return the entry of the table that the module belongs to: the longest prefix."""
     parts = module.split(".")
     for length in range(len(parts), 0, -1):
         name = ".".join(parts[:length])
-        if name in FLOORS and (length > 1 or len(parts) == 1):
+        if name in table and (length > 1 or len(parts) == 1):
             return name
     return None
 
 
-def imported(module: str, file: Path) -> Iterator[tuple[str, int]]:
-    """Yield the full names of the modules that the file imports, with the line; relative imports are resolved."""
+def for_types_only(tree: ast.AST) -> set[int]:
+    """Give the lines of a file that are under `if TYPE_CHECKING`: they name and do not import."""
+    blocks = [one for one in ast.walk(tree) if isinstance(one, ast.If) and "TYPE_CHECKING" in ast.unparse(one.test)]
+    return {line for block in blocks for one in block.body for line in range(one.lineno, (one.end_lineno or 0) + 1)}
+
+
+def imported(module: str, file: Path, *, named: bool = True) -> Iterator[tuple[str, int]]:
+    """Yield the full names of the modules that the file imports, with the line; relative imports are resolved.
+
+    Without `named` those are left out that are for type checkers alone.
+    """
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-    for statement in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
+    tree = ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+    left_out = set() if named else for_types_only(tree)
+    for statement in ast.walk(tree):
+        if getattr(statement, "lineno", 0) in left_out:
+            continue
         if isinstance(statement, ast.Import):
             for alias in statement.names:
                 yield alias.name, statement.lineno
@@ -122,6 +149,33 @@ def test_imports_go_down_only(module: str) -> None:
     assert not found, "\n".join(found)
 
 
+@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.graph")])
+def test_imports_between_the_wings_of_the_graph_go_one_way(module: str) -> None:
+    wing = home(module, GRAPH_WINGS)
+    assert wing is not None
+    imports = set(imported(module, HFG[module], named=False))
+    for name, line in imported(module, HFG[module]):
+        other = home(name, GRAPH_WINGS)
+        if other is None or other == wing:
+            continue
+        is_below = GRAPH_WINGS[other] < GRAPH_WINGS[wing]
+        only_names = name == NAMED_FROM_BELOW and (name, line) not in imports
+        assert is_below or only_names, f"{module}:{line} imports {name}: {other} stands on {wing} or beside it"
+
+
+@pytest.mark.parametrize("package", WITHOUT_CIRCLES)
+def test_no_modules_import_each_other_in_a_circle(package: str) -> None:
+    """Imports inside of functions count: they only hide a circle."""
+    names = [name for name in HFG if name == package or name.startswith(f"{package}.")]
+    number = {name: index for index, name in enumerate(names)}
+    successors = [
+        sorted({number[found] for found, _ in imported(name, HFG[name], named=False) if found in number})
+        for name in names
+    ]
+    circles = [[names[index] for index in shortest_ring(part, successors)] for part in rings(successors)]
+    assert not circles, "\n".join(" -> ".join([*ring, ring[0]]) for ring in circles)
+
+
 @pytest.mark.parametrize("module", TRANSPORTS)
 def test_transports_see_floors_0_and_1_only(module: str) -> None:
     for name, line in imported(module, TRANSPORTS[module]):
@@ -140,7 +194,7 @@ def test_the_oracle_shares_no_code_with_the_accused(module: str) -> None:
 
 def test_the_table_names_only_what_exists_or_is_planned() -> None:
     planned = {"hfg.transport", "hfg.nodes", "hfg.files", "hfg.studio"}
-    missing = {name for name in FLOORS if name not in HFG} - planned
+    missing = {name for name in (*FLOORS, *GRAPH_WINGS) if name not in HFG} - planned
     assert not missing, f"FLOORS names modules that are gone: {sorted(missing)}"
 
 

@@ -1,7 +1,7 @@
-"""Reads dicts of the kind that the package `transitions` takes into state machines.
+"""Reads dicts of the kind that the package `transitions` takes into descriptions of state machines.
 
 What such a dict can say besides states and transitions is code (conditions, callbacks) and has its place in nodes here,
-so it is refused rather than left out unseen. Stands on `fsm`.
+so it is refused rather than left out unseen. Stands on `description`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from enum import Enum
 from typing import Any, Final
 
-from hfg.activity.fsm import StateMachine, error, findings, reject, shape
+from hfg.activity.description import Described, Missing, error, findings, reject, shape
 from hfg.graph.structure.naming import suggest
 from hfg.problem import Problem
 
@@ -30,21 +30,16 @@ _TRANSITION: Final = ("trigger", "source", "dest")
 _ALL, _SAME = "*", "="
 
 
-def read(description: Mapping[str, Any]) -> StateMachine:
-    """Make a machine of a dict.
+def read(description: Mapping[str, Any]) -> Described:
+    """Read a machine from a dict.
 
     Raises:
       MachineError: with every finding.
     """
     reading = _Reading(description)
     reject("this is no state machine", reading.problems)
-    return StateMachine(
-        reading.states,
-        reading.transitions,
-        initial=reading.initial,
-        final=reading.final,
-        missing="ignore" if reading.ignores else "dead",
-    )
+    missing: Missing = "ignore" if reading.ignores else "dead"
+    return Described(reading.states, reading.transitions, reading.initial, reading.final, missing)
 
 
 class _Reading:

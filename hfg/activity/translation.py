@@ -1,7 +1,7 @@
 """From a state machine to a graph and back: the construction of the paper's §5.3.3, normalised as rule A13 says.
 
 Each state is a node, the initial one too; each transition an event of its source and an active edge into its target.
-Letters come to all states over edges that are not active. Stands on `fsm`, `states` and the graph floor.
+Letters come to all states over edges that are not active. Stands on `description`, `states` and the graph floor.
 """
 
 from __future__ import annotations
@@ -10,17 +10,18 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from hfg.activity.fsm import StateMachine, both, error, reject
+from hfg.activity.description import Described, Transition, both, error, reject
 from hfg.activity.states import StateNode, event_name, letter_name, one_by_one, state_type
 from hfg.errors import GraphError
 from hfg.graph import Graph
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, flatten
-from hfg.graph.structure.boxes import is_box
-from hfg.graph.structure.naming import candidates
+from hfg.graph.structure.finding import candidates
+from hfg.graph.structure.level import level_of
+from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
 from hfg.problem import Problem
 
-__all__ = ["build", "read_out", "whole_graph"]
+__all__ = ["build", "read_out"]
 
 _MISSING = "missing"
 _DEAD = "dead"
@@ -29,19 +30,12 @@ _DEAD = "dead"
 # --- to a graph ---
 
 
-def whole_graph(machine: StateMachine, name: str, nodes: Mapping[str, Node] | None) -> Graph:
-    """Make a graph that is the machine and nothing else; its input "letters" takes the words."""
-    graph = Graph(name)
-    build(machine, graph, graph.input("letters", str), None, nodes or {})
-    return graph
-
-
-def build(machine: StateMachine, graph: Graph, letters: Any, begin: Any, given: Mapping[str, Any]) -> dict[str, Node]:
+def build(machine: Described, graph: Graph, letters: Any, begin: Any, given: Mapping[str, Any]) -> dict[str, Node]:
     """Add the machine to a graph; see `StateMachine.build`."""
     answers: dict[str, list[str]] = {state: [] for state in machine.states}
     for one in machine.transitions:
         answers[one.source].append(one.letter)
-    reject(f"{graph._title} cannot take this machine", _unfit(machine, graph, answers, given))
+    reject(f"{level_of(graph).title} cannot take this machine", _unfit(machine, graph, answers, given))
     states = {state: _state(machine, graph, state, answers[state], given.get(state)) for state in machine.states}
     source = graph.start if begin is None else begin
     graph.connect(source, _way_in(states[machine.initial]), active=True)
@@ -54,7 +48,7 @@ def build(machine: StateMachine, graph: Graph, letters: Any, begin: Any, given: 
     return states
 
 
-def _state(machine: StateMachine, graph: Graph, state: str, letters: list[str], given: Node | None) -> Node:
+def _state(machine: Described, graph: Graph, state: str, letters: list[str], given: Node | None) -> Node:
     if given is not None and given._place is not None:
         return given
     return graph.add(state_type(letters)(final=state in machine.final) if given is None else given, name=state)
@@ -98,7 +92,7 @@ def _tell(graph: Graph, letters: Any, states: Iterable[Node]) -> None:
 
 
 def _unfit(
-    machine: StateMachine, graph: Graph, answers: Mapping[str, list[str]], given: Mapping[str, Any]
+    machine: Described, graph: Graph, answers: Mapping[str, list[str]], given: Mapping[str, Any]
 ) -> Iterator[Problem]:
     """Give every reason why the graph cannot be built."""
     for state, node in given.items():
@@ -110,9 +104,12 @@ def _unfit(
                 f"nodes[{state!r}]", f"got {node!r:.80}", "a state is a node", "make one: nodes={...: Closed()}"
             )
         elif node._place is not None and node._place.graph is not graph:
-            where = node._place.graph._title
+            where = level_of(node._place.graph).title
             yield error(
-                f"nodes[{state!r}]", f"it is in {where}", f"the machine comes into {graph._title}", "make another"
+                f"nodes[{state!r}]",
+                f"it is in {where}",
+                f"the machine comes into {level_of(graph).title}",
+                "make another",
             )
         else:
             yield from _unfit_node(node, state, answers[state])
@@ -128,7 +125,10 @@ def _unfit(
             )
         elif state in graph.nodes:
             yield error(
-                state, f"{graph._title} has a node of this name", "names tell nodes apart", "rename one of them"
+                state,
+                f"{level_of(graph).title} has a node of this name",
+                "names tell nodes apart",
+                "rename one of them",
             )
 
 
@@ -155,11 +155,11 @@ def _unfit_node(node: Node, state: str, letters: list[str]) -> Iterator[Problem]
 # --- and back ---
 
 
-def read_out(graph: Graph, nodes: Iterable[Node | str] | None, final: Iterable[str]) -> StateMachine:
+def read_out(graph: Graph, nodes: Iterable[Node | str] | None, final: Iterable[str]) -> Described:
     """Read the machine out of a graph or region; see `StateMachine.of`."""
     flat = flatten(graph)
     region = _Region(flat, _members(flat, graph, nodes), is_whole=nodes is None)
-    reject(f"{graph._title} is no state machine", region.problems())
+    reject(f"{level_of(graph).title} is no state machine", region.problems())
     return region.machine(final)
 
 
@@ -170,8 +170,12 @@ def _members(flat: FlatGraph, graph: Graph, nodes: Iterable[Node | str] | None) 
         return {node.index for node in flat.nodes if node.index in ends or isinstance(node.node, StateNode)}
     wanted = [graph[one] if isinstance(one, str) else one for one in nodes]
     for one in wanted:
-        if not isinstance(one, Node) or one._place is None or one._place.graph._root is not graph:
-            raise GraphError(f"a region is nodes of {graph._title}, got {one!r}; name nodes, or their paths")
+        if (
+            not isinstance(one, Node)
+            or one._place is None
+            or level_of(one._place.graph).whole is not level_of(graph).whole
+        ):
+            raise GraphError(f"a region is nodes of {level_of(graph).title}, got {one!r}; name nodes, or their paths")
     members = {node.index for node in flat.nodes if node.node in wanted}
     for scope in flat.scopes:
         if scope.subgraph in wanted:
@@ -199,17 +203,17 @@ class _Region:
         self.dead = {index for index, only in to_dead.items() if only}
         self.states = sorted(members - self.dead)
 
-    def machine(self, final: Iterable[str]) -> StateMachine:
+    def machine(self, final: Iterable[str]) -> Described:
         nodes = self.flat.nodes
         paths = {index: nodes[index].path for index in self.states}
         steps = [edge for edge in self.inside if not self._is_missing(edge)]
         own = [paths[i] for i in self.states if nodes[i].node._parameters.get("final") is True]
-        return StateMachine(
+        return Described(
             list(paths.values()),
-            [(self._letter(edge), paths[edge.source.node], paths[edge.target.node]) for edge in steps],
-            initial=paths[self.entering[0].target.node],
-            final=[*own, *final],
-            missing="dead" if self.dead or not self._is_fed() else "ignore",
+            [Transition(self._letter(edge), paths[edge.source.node], paths[edge.target.node]) for edge in steps],
+            paths[self.entering[0].target.node],
+            [*own, *final],
+            "dead" if self.dead or not self._is_fed() else "ignore",
         )
 
     def problems(self) -> Iterator[Problem]:

@@ -16,7 +16,7 @@ import typer
 
 from hfg.cli.target import load_graph
 from hfg.graph import Graph
-from hfg.graph.structure.boxes import is_box
+from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
 
 __all__ = ["parameters", "ports", "targets"]

@@ -1,7 +1,8 @@
-"""Graphs as users build them: nodes, edges, groups, gates, and the ports of the whole.
+"""Graph, the face: what users say about graphs, and nothing of how it is done.
 
-Everything is checked when it is said: what is refused changes nothing. What only the whole shows (`checks`) waits for
-`check()`. Stands on `edges`, `options`, `naming` and `boundary`; knows nobody who runs it.
+A graph is the face of a level (`structure`): nodes, edges, gates and the ports of the whole. What is said is checked
+when it is said, and what is refused changes nothing; what only the whole shows waits for `check()`. Stands on all
+wings, which know it by name alone; knows nobody who runs it.
 """
 
 from __future__ import annotations
@@ -14,36 +15,28 @@ from typing import Any, TypeVar, overload
 from reactivex import Observable
 from typing_extensions import TypeForm
 
-from hfg import errors
-from hfg.errors import GraphError, UsageError
+from hfg.graph.checks.checking import check
+from hfg.graph.drawing.formats import draw
+from hfg.graph.editing import transactions
 from hfg.graph.editing.commands import Command
-from hfg.graph.structure.boundary import GraphInput, GraphOutput, lifecycle_ports
-from hfg.graph.structure.boxes import is_box
-from hfg.graph.structure.edges import Edge, end_path, is_single, refuse
-from hfg.graph.structure.gates import Gate, refuse_gate
-from hfg.graph.structure.members import iterated_inputs, need_new, need_subgraph_options, refuse_move
-from hfg.graph.structure.naming import default_name, find, need_name, path_of
-from hfg.graph.structure.options import (
-    DEFAULT_CAPACITY,
-    EdgeOptions,
-    GroupSpec,
-    NodeOptions,
-    OnError,
-    Overflow,
-    Policy,
-    Release,
-    edge_options,
-    group_spec,
-    in_group,
-    node_options,
-)
-from hfg.graph.structure.promotions import refuse_promotion
-from hfg.graph.structure.refusals import Refusable
+from hfg.graph.structure.adding import add
+from hfg.graph.structure.assigning import declare_group, move
+from hfg.graph.structure.boundary import GraphInput, GraphOutput
+from hfg.graph.structure.connecting import connect
+from hfg.graph.structure.declaring import need_new_port
+from hfg.graph.structure.edge import Edge
+from hfg.graph.structure.finding import find
+from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.gating import set_gate
+from hfg.graph.structure.level import Level
+from hfg.graph.structure.naming import need_name
+from hfg.graph.structure.options import DEFAULT_CAPACITY, GroupSpec, OnError, Overflow, Policy, Release
+from hfg.graph.structure.promoting import promote
+from hfg.graph.structure.whole import Whole
 from hfg.nodetype import Node, Place
-from hfg.ports import ParameterPort, Port, Source, Target
+from hfg.ports import EventPort, ParameterPort, Port, SlotPort, Source, Target
 from hfg.problem import Problem
 from hfg.token import Token
-from hfg.types import is_hint
 
 __all__ = ["Graph"]
 
@@ -55,18 +48,6 @@ class Graph:
     """An activity flow graph; inside a subgraph, the part of it that lies there.
 
     While it runs its structure is changed by commands alone (`run.edit`): whatever else would raises `UsageError`.
-
-    Attributes:
-      name: for people; not part of any path.
-      nodes: by name, in order of adding.
-      edges: in order of connecting.
-      gates: in order of gating.
-      inputs: the ports by which the graph is fed from outside (rule P10).
-      outputs: the ports at which it is read from outside.
-      start: the event that begins every run (rule A10); inside a subgraph it is that of the whole graph, as are `stop`
-        and `abort`.
-      stop: the slot that ends the run well.
-      abort: the slot that ends the run in failure.
 
     Example:
       >>> import hfg
@@ -84,37 +65,71 @@ class Graph:
       'count.out -> show.value'
     """
 
-    def __init__(self, name: str = "graph") -> None:
-        self.name = need_name("a graph", name)
-        self.nodes: dict[str, Node] = {}
-        self.edges: list[Edge] = []
-        self.gates: list[Gate] = []
-        self.inputs: dict[str, GraphInput[Any]] = {}
-        self.outputs: dict[str, GraphOutput[Any]] = {}
-        self.start, self.stop, self.abort = lifecycle_ports(self)
-        self._owner: Any = None  # the subgraph whose inside this is
-        self._root: Graph = self
-        self._groups: dict[str, GroupSpec] = {"loop": GroupSpec("loop")}
-        self._declared_groups: set[str] = set()
-        self._counts: dict[str, int] = {}  # how many nodes have the default name of their type
-        self._into: dict[Any, Edge] = {}  # the edge into each input that has one
-        self._pairs: set[tuple[Any, Any]] = set()  # the ends of all other edges
-        self._gated: set[Node] = set()
-        self._promoted: dict[
-            str, list[ParameterPort[Any]]
-        ] = {}  # the parameters inside that one of the subgraph stands for
-        self._run: Any = None  # the run it has; written by the engine
-        self._edited = False  # commands are being carried out, which a run follows
-        self._revision = 0  # how often it was changed by hand
-        self._history: Any = None  # what was edited by commands; written by `editing`
+    def __init__(self, name: str = "graph", *, _level: Level | None = None) -> None:
+        if _level is None:
+            _level = Level(need_name("a graph", name), Whole(_face_of), face=self)
+        self._level = _level
 
-    @classmethod
-    def _inside(cls, owner: Node, around: Graph) -> Graph:
-        graph = cls(around.name)
-        root = around._root
-        graph._owner, graph._root = owner, root
-        graph.start, graph.stop, graph.abort = root.start, root.stop, root.abort
-        return graph
+    # --- what it is made of ---
+
+    @property
+    def name(self) -> str:
+        """For people; not part of any path."""
+        return self._level.name
+
+    @name.setter
+    def name(self, name: str) -> None:
+        self._level.name = need_name("a graph", name)
+
+    @property
+    def nodes(self) -> dict[str, Node]:
+        """By name, in order of adding."""
+        return self._level.nodes
+
+    @property
+    def edges(self) -> list[Edge]:
+        """In order of connecting."""
+        return self._level.edges
+
+    @property
+    def gates(self) -> list[Gate]:
+        """In order of gating."""
+        return self._level.gates.listed
+
+    @property
+    def groups(self) -> dict[str, GroupSpec]:
+        """All groups of the whole graph by name; "loop" is always there."""
+        return self._level.whole.groups.by_name
+
+    @property
+    def inputs(self) -> dict[str, GraphInput[Any]]:
+        """The ports by which the graph is fed from outside (rule P10)."""
+        return self._level.ports.inputs
+
+    @property
+    def outputs(self) -> dict[str, GraphOutput[Any]]:
+        """The ports at which it is read from outside."""
+        return self._level.ports.outputs
+
+    @property
+    def start(self) -> EventPort[None]:
+        """The event that begins every run (rule A10); inside a subgraph that of the whole, as the next two are."""
+        return self._level.ports.start
+
+    @property
+    def stop(self) -> SlotPort[object]:
+        """The slot that ends the run well."""
+        return self._level.ports.stop
+
+    @property
+    def abort(self) -> SlotPort[object]:
+        """The slot that ends the run in failure."""
+        return self._level.ports.abort
+
+    @property
+    def path(self) -> str:
+        """That of the subgraph whose inside this is; "" for a whole graph."""
+        return self._level.path
 
     # --- nodes and edges ---
 
@@ -158,20 +173,7 @@ class Graph:
           GraphError: the name is taken or not allowed, an option is out of its range, or the node is in a graph
             already; nothing was changed.
         """
-        self._need_rest("adding a node")
-        need_new(node)
-        if name is None:
-            base = node._type.name
-            name, number = default_name(base, self._counts, self.nodes)
-        else:
-            base, number = "", 0
-            if need_name("a node", name) in self.nodes:
-                raise GraphError(
-                    f'{self._title} has a node "{name}" already; '
-                    "choose another name, or leave name out for the next free one"
-                )
-        path = f"{self.path}/{name}" if self._owner is not None else name
-        given = {
+        said: dict[str, object] = {
             "group": group,
             "priority": priority,
             "max_rate_hz": max_rate_hz,
@@ -183,17 +185,9 @@ class Graph:
             "active_for_s": active_for_s,
             "deadline_s": deadline_s,
             "enabled": enabled,
-            "iterate_over": iterated_inputs(node, path, iterate_over),
+            "iterate_over": iterate_over,
         }
-        options = NodeOptions()
-        with Refusable(path):
-            options = node_options(f'node "{path}"', given)
-        node._place, node._options = Place(self, name, path), options
-        self.nodes[name] = node
-        if is_box(node):
-            self._build(node, options)
-        if number:
-            self._counts[base] = number
+        add(self._level, node, name, said)
         return node
 
     @overload
@@ -249,76 +243,17 @@ class Graph:
         Raises:
           ConnectionError: the edge cannot be; nothing was changed.
         """
-        with Refusable(source, target):
-            return self._draw(source, target, active, capacity, overflow, capacity_limit, through, initial)
-        return Edge(source, target, EdgeOptions())
-
-    def _draw(
-        self,
-        source: Any,
-        target: Any,
-        active: bool,
-        capacity: int,
-        overflow: Overflow,
-        capacity_limit: int | None,
-        through: Iterable[Any],
-        initial: Iterable[Any],
-    ) -> Edge:
-        self._need_rest("connecting")
-        if source is self.start and self._is_around(target):
-            # `graph.start.activates(...)` inside a subgraph: the edge belongs where its node is (rule A10).
-            inside: Graph = target.graph
-            return inside.connect(
-                source,
-                target,
-                active=active,
-                capacity=capacity,
-                overflow=overflow,
-                capacity_limit=capacity_limit,
-                through=through,
-                initial=initial,
-            )
-        options = edge_options(
-            lambda: f'"{end_path(source)}" -> "{end_path(target)}"',
-            active,
-            capacity,
-            overflow,
-            capacity_limit,
-            through,
-            initial,
-        )
-        refuse(self, source, target, options)
-        single = is_single(target)
-        if single and target in self._into:
-            found = self._into[target]
-            if found.source is source:
-                raise errors.ConnectionError(
-                    f'"{end_path(source)}" and "{target.path}" are connected already; an edge is drawn once'
-                )
-            raise errors.ConnectionError(
-                f'"{target.path}" takes one edge and has one from "{end_path(found.source)}", '
-                f'so "{end_path(source)}" cannot lead there too; '
-                "use a slot, or a node that joins the two (rule P2)"
-            )
-        pair = (source, target)
-        if not single and pair in self._pairs:
-            raise errors.ConnectionError(
-                f'"{end_path(source)}" and "{target.path}" are connected already; an edge is drawn once (rule P2)'
-            )
-        edge = Edge(source, target, options)
-        if single:
-            self._into[target] = edge
-        else:
-            self._pairs.add(pair)
-        self.edges.append(edge)
-        return edge
+        said = {
+            "active": active,
+            "capacity": capacity,
+            "overflow": overflow,
+            "capacity_limit": capacity_limit,
+            "through": through,
+            "initial": initial,
+        }
+        return connect(self._level, source, target, said)
 
     # --- groups and gates ---
-
-    @property
-    def groups(self) -> dict[str, GroupSpec]:
-        """All groups of the whole graph by name; "loop" is always there."""
-        return self._root._groups
 
     def group(
         self, name: str, *, threads: int | None = None, policy: Policy = "fifo", seed: int | None = None
@@ -334,19 +269,7 @@ class Graph:
         Raises:
           GraphError: a value is out of its range, or the group is declared otherwise already.
         """
-        self._need_rest("declaring a group")
-        root = self._root
-        with Refusable(name):
-            spec = group_spec(name, (0 if name == "loop" else 1) if threads is None else threads, policy, seed)
-            if name in root._declared_groups and root._groups[name] != spec:
-                raise GraphError(
-                    f'group "{name}" is declared already, as {root._groups[name]}; '
-                    "declare it once, or choose another name"
-                )
-            root._declared_groups.add(name)
-            root._groups[name] = spec
-            return spec
-        return root._groups.setdefault(str(name), GroupSpec(str(name)))
+        return declare_group(self._level, name, threads, policy, seed)
 
     def move(self, node: Node, *, group: str | None) -> None:
         """Let a node run in another group; with a subgraph go all inside that have no group of their own.
@@ -358,9 +281,7 @@ class Graph:
         Raises:
           GraphError: the node is not in this graph, or the group is not declared; nothing was changed.
         """
-        self._need_rest("moving a node")
-        refuse_move(self, node, group)
-        node._options = in_group(node._options, group)
+        move(self._level, node, group)
 
     def gate(self, target: Node, *, by: Node, idle_rate_hz: float | None = None) -> Gate:
         """Couple the work of a node or subgraph to the activity of another: it works while `by` is active (rule A11).
@@ -373,12 +294,8 @@ class Graph:
         Raises:
           GraphError: one of the two is not in this graph, or `target` has a gate already; nothing was changed.
         """
-        self._need_rest("gating")
         gate = Gate(target, by, idle_rate_hz)
-        with Refusable(target):
-            refuse_gate(self, target, by, idle_rate_hz)
-            self.gates.append(gate)
-            self._root._gated.add(target)
+        set_gate(self._level, gate)
         return gate
 
     # --- ports of the whole ---
@@ -389,8 +306,9 @@ class Graph:
         Raises:
           GraphError: the name is taken or not allowed, or this is the inside of a subgraph.
         """
-        port: GraphInput[T] = GraphInput(self, self._new_port("input", name, type), type)
-        self.inputs[name] = port
+        need_new_port(self._level, "input", name, type)
+        port: GraphInput[T] = GraphInput(self, name, type)
+        self._level.ports.add_input(port)
         return port
 
     def output(self, name: str, type: TypeForm[T]) -> GraphOutput[T]:  # noqa: A002
@@ -399,8 +317,9 @@ class Graph:
         Raises:
           GraphError: the name is taken or not allowed, or this is the inside of a subgraph.
         """
-        port: GraphOutput[T] = GraphOutput(self, self._new_port("output", name, type), type)
-        self.outputs[name] = port
+        need_new_port(self._level, "output", name, type)
+        port: GraphOutput[T] = GraphOutput(self, name, type)
+        self._level.ports.add_output(port)
         return port
 
     def promote(self, outer: ParameterPort[T], inner: ParameterPort[T]) -> None:
@@ -413,26 +332,20 @@ class Graph:
         Raises:
           GraphError: the two cannot be one; nothing was changed.
         """
-        self._need_rest("promoting a parameter")
-        with Refusable(outer):
-            refuse_promotion(self, outer, inner)
-            inner.value = outer.value
-            self._promoted.setdefault(outer.name, []).append(inner)
+        promote(self._level, outer, inner)
 
     # --- finding and checking ---
 
-    def __getitem__(self, path: str) -> Any:
+    def __getitem__(self, path: str) -> Any:  # noqa: ANN401 - of a path type checkers know nothing
         """Find a node, "fetch/go_to", or a port, "fetch/go_to.goal"; ports of the whole graph by their name.
 
         Raises:
           GraphError: there is none, or an input and an output share the name.
         """
-        return find(self, path)
+        return find(self._level, path)
 
     def check(self) -> list[Problem]:
         """Look for what keeps the graph from working, or probably does; errors first."""
-        from hfg.graph.checks.checking import check
-
         return check(self)
 
     def draw(self, path: str | os.PathLike[str] | None = None) -> str:
@@ -448,8 +361,6 @@ class Graph:
         Raises:
           UsageError: the file has another ending, or cannot be written.
         """
-        from hfg.graph.drawing.formats import draw
-
         return draw(self, path)
 
     # --- editing ---
@@ -469,9 +380,7 @@ class Graph:
           >>> graph.nodes
           {}
         """
-        from hfg.graph.editing.transactions import edit
-
-        edit(self, commands)
+        transactions.edit(self, commands)
 
     def undo(self) -> None:
         """Take the last edit back: everything is exactly as before it.
@@ -479,9 +388,7 @@ class Graph:
         Raises:
           UsageError: there is none, or the graph was changed by hand since, or runs.
         """
-        from hfg.graph.editing.transactions import undo
-
-        undo(self)
+        transactions.undo(self)
 
     def redo(self) -> None:
         """Carry the edit out again that was undone last.
@@ -489,9 +396,7 @@ class Graph:
         Raises:
           UsageError: there is none, or the graph was changed since, or runs.
         """
-        from hfg.graph.editing.transactions import redo
-
-        redo(self)
+        transactions.redo(self)
 
     def reload(self, module: str | ModuleType) -> None:
         """Run a changed module again; its node types replace those of its nodes, parameters are kept.
@@ -500,103 +405,30 @@ class Graph:
           GraphError: the module fails, or a new type does not fit the edges; nothing was changed.
           UsageError: the graph runs: `run.reload` is for that.
         """
-        from hfg.graph.editing.transactions import reload
-
-        reload(self, module)
+        transactions.reload(self, module)
 
     def _repr_markdown_(self) -> str:
         return f"```mermaid\n{self.draw()}```\n"
 
-    @property
-    def path(self) -> str:
-        """That of the subgraph whose inside this is; "" for a whole graph."""
-        return "" if self._owner is None else path_of(self._owner)
+    def __repr__(self) -> str:
+        return f"<{self._level.title}: {len(self.nodes)} nodes, {len(self.edges)} edges>"
+
+    # --- for the floors below, which know a graph by what ports and nodes ask of it ---
 
     @property
     def _place(self) -> Place:
         """Where its own ports are; asked by them."""
         return Place(self, self.name, "")
 
-    def __repr__(self) -> str:
-        return f"<{self._title}: {len(self.nodes)} nodes, {len(self.edges)} edges>"
-
-    # --- inside ---
-
-    def _need_rest(self, doing: str) -> None:
-        """Refuse to change the structure under a run, which would not hear of it; and note that it was by hand."""
-        root = self._root
-        if root._edited:
-            return
-        if root._run is not None:
-            raise UsageError(
-                f"{self._title} runs, so {doing} by hand is refused: use commands, which the run follows, as in "
-                "await run.edit(hfg.commands.Connect(...)), or stop the run first"
-            )
-        root._revision += 1
+    def _is_taken(self, port: Port) -> bool:
+        """Whether it is an input that has its edge; asked by `>>`."""
+        return port in self._level.connections.into
 
     @property
-    def _title(self) -> str:
-        return f'graph "{self.name}"' if self._owner is None else f'the graph inside "{self.path}"'
+    def _run(self) -> object | None:
+        """The run that it has as a whole, if any; asked by events."""
+        return self._level.whole.run
 
-    def _build(self, node: Any, options: NodeOptions) -> None:
-        """Let a subgraph make its inside; if that fails, nothing of it remains."""
-        root = self._root
-        groups, declared = dict(root._groups), set(root._declared_groups)
-        try:
-            need_subgraph_options(node, options)
-            node._graph = Graph._inside(node, self)
-            node.build(node._graph)
-        except BaseException:
-            root._groups, root._declared_groups = groups, declared
-            self._take_back(node)
-            raise
 
-    def _take_back(self, node: Any) -> None:
-        """Undo an addition that failed half-way, with everything that was added or connected meanwhile."""
-        del self.nodes[node._place.name]
-        gone: set[Any] = {node}
-        waiting = [node]
-        while waiting:
-            inner = getattr(waiting.pop(), "_graph", None)
-            if inner is not None:
-                gone.update(inner.nodes.values())
-                waiting += [below for below in inner.nodes.values() if is_box(below)]
-                self._root._gated.difference_update(gate.target for gate in inner.gates)
-        kept = [edge for edge in self.edges if gone.isdisjoint((getattr(edge.source, "node", None), edge.target.node))]
-        self.edges[:] = kept
-        self._into = {edge.target: edge for edge in kept if is_single(edge.target)}
-        self._pairs = {(edge.source, edge.target) for edge in kept if not is_single(edge.target)}
-        self.gates[:] = [gate for gate in self.gates if gone.isdisjoint((gate.target, gate.by))]
-        self._root._gated -= gone
-        for one in gone:
-            one._place = one._options = None
-            if hasattr(one, "_graph"):
-                del one._graph
-
-    def _is_taken(self, port: Port) -> bool:
-        """Whether it is an input that has its edge."""
-        return port in self._into
-
-    def _is_around(self, target: Any) -> bool:
-        """Whether a port lies in a graph inside this one."""
-        home = getattr(target, "graph", None)
-        return isinstance(home, Graph) and home is not self and home._root is self
-
-    def _new_port(self, kind: str, name: str, hint: Any) -> str:
-        self._need_rest("declaring a port")
-        if self._owner is not None:
-            raise GraphError(
-                f'the graph inside "{self.path}" has the ports of its subgraph; '
-                f"declare `{name} = hfg.{kind.title()}(...)` in its class"
-            )
-        need_name(f"an {kind} of the graph", name)
-        if name in self._boundary_ports():
-            raise GraphError(f'{self._title} has a port "{name}" already; choose another name')
-        if not is_hint(hint):
-            raise GraphError(
-                f'the type of {kind} "{name}" is {hint!r:.80}, which is no type; write graph.{kind}("{name}", int)'
-            )
-        return name
-
-    def _boundary_ports(self) -> dict[str, Port]:
-        return {"start": self.start, "stop": self.stop, "abort": self.abort, **self.inputs, **self.outputs}
+def _face_of(level: Level) -> Graph:
+    return Graph(level.name, _level=level)

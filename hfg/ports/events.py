@@ -85,8 +85,8 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         self, observer: abc.ObserverBase[Token[T]], scheduler: abc.SchedulerBase | None = None
     ) -> abc.DisposableBase:
         self._observe([*(self._observers or ()), observer])
-        if self._thread is None and self.graph is not None and self.graph._root._run is not None:
-            self.graph._root._run._adopt(self)  # an automatic event that nobody was interested in until now
+        if self._thread is None and self.graph is not None and self.graph._run is not None:
+            self.graph._run._adopt(self)  # an automatic event that nobody was interested in until now
         return Disposable(lambda: self._drop(observer))
 
     def _observe(self, observers: list[abc.ObserverBase[Token[T]]]) -> None:

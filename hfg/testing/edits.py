@@ -10,6 +10,7 @@ from typing import Any
 
 from hfg.graph import Graph
 from hfg.graph import commands as c
+from hfg.graph.structure.level import level_of
 from hfg.testing.making import Chooser
 
 __all__ = ["drawn", "random_command", "random_edit"]
@@ -24,6 +25,7 @@ def drawn(graph: Graph, *, identity: bool = True) -> dict[str, Any]:
       graph: the whole graph, or the inside of a subgraph.
       identity: whether the nodes and ports themselves must be the same, or only what they are called.
     """
+    level = level_of(graph)
     return {
         "nodes": {
             name: {
@@ -40,12 +42,12 @@ def drawn(graph: Graph, *, identity: bool = True) -> dict[str, Any]:
             (edge.label, edge.options, *((id(edge.source), id(edge.target)) if identity else ()))
             for edge in graph.edges
         ],
-        "into": sorted(f"{target.path} <- {edge.label}" for target, edge in graph._into.items()),
-        "pairs": sorted((_path(source), _path(target)) for source, target in graph._pairs),
+        "into": sorted(f"{target.path} <- {edge.label}" for target, edge in level.connections.into.items()),
+        "pairs": sorted((_path(source), _path(target)) for source, target in level.connections.pairs),
         "gates": [(gate.target.place.path, gate.by.place.path, gate.idle_rate_hz) for gate in graph.gates],
-        "promoted": {name: [port.path for port in ports] for name, ports in graph._promoted.items()},
-        "gated": sorted(node.place.path for node in graph._gated if node._place is not None)
-        if graph._owner is None
+        "promoted": {name: [port.path for port in ports] for name, ports in level.promotions.by_name.items()},
+        "gated": sorted(node.place.path for node in level.whole.gated if node._place is not None)
+        if level.owner is None
         else (),
     }
 
@@ -131,12 +133,12 @@ def _connect(graph: Graph, choose: Chooser) -> c.Command:
     first, second = choose.one_of(nodes), choose.one_of(nodes)
     if choose.chance(80) and nodes.index(first) > nodes.index(second):
         first, second = second, first
-    free = [port.path for port in second.ports.inputs.values() if port not in around._into]
+    free = [port.path for port in second.ports.inputs.values() if port not in level_of(around).connections.into]
     targets = free + [port.path for port in second.ports.slots.values()] + [f"{second.place.path}.activate"]
     sources = [port.path for port in [*first.ports.outputs.values(), *first.ports.events.values()]]
     sources.append("start" if choose.chance(20) else f"{first.place.path}.processed")
-    if around._owner is not None:
-        box = around._owner
+    box = level_of(around).owner
+    if box is not None:
         sources += [f"{port.path}.inner" for port in [*box.ports.inputs.values(), *box.ports.slots.values()]]
         targets += [f"{port.path}.inner" for port in [*box.ports.outputs.values(), *box.ports.events.values()]]
     source, target = choose.one_of(sources), choose.one_of(targets)

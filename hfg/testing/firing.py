@@ -100,7 +100,7 @@ def fire(
       {'out': 1}
     """
     place = node._place
-    if place is not None and place.graph._root._run is not None:
+    if place is not None and place.graph._run is not None:
         raise UsageError(f'"{place.path}" is running: fire a node that no run has')
     for name, value in (parameters or {}).items():
         node._set_parameter(name, value)

@@ -264,7 +264,7 @@ def test_every_check_has_a_name_and_is_explained() -> None:
     sources = [
         *(ROOT / "hfg" / "graph").rglob("*.py"),
         ROOT / "hfg" / "activity" / "analysis.py",
-        ROOT / "hfg" / "activity" / "fsm.py",
+        ROOT / "hfg" / "activity" / "description.py",
         ROOT / "hfg/cli/check.py",
     ]
     text = "".join(source.read_text(encoding="utf-8") for source in sources)

@@ -13,6 +13,7 @@ from reactivex import operators as ops
 import hfg
 from hfg import errors
 from hfg.graph import Graph, Subgraph
+from hfg.graph.structure.level import level_of
 
 
 class Camera(hfg.Node):
@@ -69,14 +70,15 @@ def robot(graph: Graph) -> Robot:
 
 def refused(graph: Graph, *sentence: str, call: Callable[[], Any] | None = None, **connect: Any) -> None:
     """The connect is refused with a sentence that holds all these parts, and the graph stays as it was."""
-    before = (list(graph.edges), dict(graph._into), set(graph._pairs))
+    tables = level_of(graph).connections
+    before = (list(graph.edges), dict(tables.into), set(tables.pairs))
     with pytest.raises(errors.ConnectionError) as error:
         graph.connect(**connect) if call is None else call()
     message = str(error.value)
     for part in sentence:
         assert part in message, message
     assert "\n" not in message
-    assert (graph.edges, graph._into, graph._pairs) == before
+    assert (graph.edges, tables.into, tables.pairs) == before
 
 
 # --- what is allowed ---

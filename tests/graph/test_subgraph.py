@@ -7,6 +7,7 @@ import pytest
 import hfg
 from hfg.errors import ConnectionError, DeclarationError, GraphError, UsageError  # noqa: A004 - what it is about
 from hfg.graph import Graph, Subgraph
+from hfg.graph.structure.level import level_of
 
 
 class Plan(hfg.Node):
@@ -215,7 +216,7 @@ def test_promotions_that_cannot_be_are_refused(graph: Graph) -> None:
     follow.graph.connect(limit, slow)
     with pytest.raises(GraphError, match=r'is set by the edge from "follow_person/plan\.limit"'):
         follow.graph.promote(follow.speed, slow)
-    assert follow.graph._promoted == {"speed": [limit]}
+    assert level_of(follow.graph).promotions.by_name == {"speed": [limit]}
 
 
 # --- iteration ---

@@ -16,7 +16,6 @@ from hfg.engine.editing.rerouting import reroute
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
-from hfg.graph import Graph
 from hfg.graph.editing.changes import (
     Change,
     EdgeChange,
@@ -27,7 +26,9 @@ from hfg.graph.editing.changes import (
     Renaming,
 )
 from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode, flatten
-from hfg.graph.structure.boxes import iterated
+from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.naming import path_of
+from hfg.graph.structure.subgraph import iterated
 from hfg.ports.edges import SyncEdge
 
 __all__ = ["Replan", "closes_a_ring", "replan"]
@@ -189,17 +190,16 @@ def _ends_of(flat: FlatEdge, source: Any, target: Any) -> tuple[Any, ...]:
 
 
 def _refuse_iterating(change: Change) -> None:
-    around: Any = getattr(change, "graph", None)
+    around: Level | None = getattr(change, "level", None)
     if around is None:
         place = getattr(getattr(change, "node", None) or getattr(change, "new", None), "_place", None)
-        around = None if place is None else place.graph
+        around = None if place is None else level_of(place.graph)
     if isinstance(change, ParameterChange):
         return
-    while isinstance(around, Graph) and around._owner is not None:
-        owner = around._owner
-        if iterated(owner) and not isinstance(change, Renaming):
-            raise _cannot_iterate(owner.place.path)
-        around = owner._place.graph if owner._place is not None else None
+    while around is not None and around.owner is not None:
+        if iterated(around.owner) and not isinstance(change, Renaming):
+            raise _cannot_iterate(path_of(around.owner))
+        around = around.around
     if isinstance(change, NodeChange) and change.options.iterate_over:
         raise _cannot_iterate(change.name)
 

@@ -15,7 +15,8 @@ from hfg.engine.model.core import Core
 from hfg.graph import Graph
 from hfg.graph.editing.changes import Change, EdgeChange, EdgeSwap, OptionsChange, ParameterChange
 from hfg.graph.flat import EdgeFollower, FlatEdge, FlatGraph
-from hfg.graph.structure.edges import Edge, is_feed, type_of
+from hfg.graph.structure.edge import Edge, is_feed, type_of
+from hfg.graph.structure.level import level_of
 from hfg.ports import InnerSource
 from hfg.types import why_not
 
@@ -227,9 +228,5 @@ class _Follower(EdgeFollower):
 
     def _depth(self, edge: Edge) -> int:
         """How many subgraphs lie around a drawn edge; the ports of the whole graph may be named anywhere."""
-        graph = (edge.target if edge.target.node is not self.flat.graph else edge.source).graph
-        depth = 0
-        while isinstance(graph, Graph) and graph._owner is not None:
-            depth += 1
-            graph = graph._owner.place.graph
-        return depth
+        home = (edge.target if edge.target.node is not self.flat.graph else edge.source).graph
+        return 0 if home is None else level_of(home).depth

@@ -23,6 +23,7 @@ from hfg.graph import Graph
 from hfg.graph.checks import check_flat
 from hfg.graph.checks.endless import endless
 from hfg.graph.flat import FlatGraph, flatten
+from hfg.graph.structure.level import level_of
 from hfg.trace import TraceEvent
 
 __all__ = ["run", "run_async", "running"]
@@ -40,9 +41,10 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
     if not isinstance(graph, Graph):
         raise UsageError(f"a Graph can run, not {type(graph).__name__}: write hfg.run(graph)")
     _need_clock(clock)
-    if graph._owner is not None:
-        raise UsageError(f'{graph._title} runs as a part of the whole: run graph "{graph._root.name}"')
-    if graph._run is not None:
+    level = level_of(graph)
+    if level.owner is not None:
+        raise UsageError(f'{level.title} runs as a part of the whole: run graph "{level.whole.root.name}"')
+    if level.whole.run is not None:
         raise UsageError(f'graph "{graph.name}" runs already: a graph has one run at a time; build a second graph')
     loop = asyncio.get_running_loop()
     if clock == "virtual" and not isinstance(loop, VirtualTimeLoop):
@@ -58,7 +60,7 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
         _refuse_endless(flat)
     engine = Engine(flat, settings)
     run = Run(graph, engine)
-    graph._run = run
+    level.whole.begin_run(run)
     return run
 
 
@@ -94,7 +96,7 @@ async def _run_to_end(
         try:
             await run._engine.close()
         finally:
-            graph._run = None
+            level_of(graph).whole.end_run()
     run._raise_failure()
     return run.report()
 
@@ -255,7 +257,7 @@ async def running(
         try:
             await _quietly(run._close())
         finally:
-            graph._run = None
+            level_of(graph).whole.end_run()
     run._raise_failure()
 
 

@@ -17,7 +17,8 @@ from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.runtime import ports, relays
 from hfg.engine.runtime.places import Ends, behind, labels_at, place_of
 from hfg.errors import GraphError, UsageError
-from hfg.graph.structure.edges import Edge as DrawnEdge
+from hfg.graph.structure.edge import Edge as DrawnEdge
+from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import InnerSource, InnerTarget, Port
@@ -239,7 +240,9 @@ class Taps:
             return [(what, [])]
         if not isinstance(what, Port | InnerSource | InnerTarget | DrawnEdge | Ends):
             raise UsageError(f"a tap looks at a port or an edge of this run, given itself or by path, got {what!r}")
-        if isinstance(what, Port) and (what.graph is None or what.graph._root is not self._engine.flat.graph):
+        if isinstance(what, Port) and (
+            what.graph is None or level_of(what.graph).whole is not self._engine.flat.level.whole
+        ):
             raise UsageError(
                 f'"{what.path}" is in no graph that runs here, so no token passes there: '
                 f'this is a run of graph "{self._engine.flat.graph.name}"'

@@ -14,7 +14,8 @@ import msgspec
 from hfg.engine.runtime import relays
 from hfg.errors import GraphError
 from hfg.graph.flat import FlatGraph
-from hfg.graph.structure.edges import Edge as DrawnEdge
+from hfg.graph.structure.edge import Edge as DrawnEdge
+from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import Port
@@ -79,5 +80,5 @@ def is_gone(place: Any) -> bool:
         return is_gone(place.source) or is_gone(place.target)
     node: Any = place.node if isinstance(place, Port) else place
     while isinstance(node, Node) and node._place is not None:
-        node = node._place.graph._owner
+        node = level_of(node._place.graph).owner
     return isinstance(node, Node)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from hfg.graph.flat import FlatGraph
-from hfg.graph.structure.boxes import is_box, iterated
+from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.ports import InnerSource, InnerTarget
 
 __all__ = ["events_behind", "is_relay", "labels_of", "slots_behind"]

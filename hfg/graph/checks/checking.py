@@ -7,7 +7,7 @@ above add their own with `also`. Stands on `flat`, `checks_edges`, `checks_flow`
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from hfg.graph.checks.edges import borders, joined_edges, promotions
 from hfg.graph.checks.flow import (
@@ -21,8 +21,10 @@ from hfg.graph.checks.flow import (
 )
 from hfg.graph.checks.nodes import async_in_threads, names, unknown_groups, unused_scheduling
 from hfg.graph.flat.flattening import FlatGraph, flatten
-from hfg.graph.graph import Graph
 from hfg.problem import SEVERITIES, Problem
+
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
 
 __all__ = ["Check", "also", "check", "check_flat"]
 

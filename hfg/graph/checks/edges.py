@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from hfg.graph.flat.flattening import ROOT, FlatEdge, FlatGraph
-from hfg.graph.structure.boxes import is_box
-from hfg.graph.structure.edges import Edge, is_feed, type_of
+from hfg.graph.structure.edge import Edge, is_feed, type_of
+from hfg.graph.structure.subgraph import inside
 from hfg.ports import ParameterPort
 from hfg.problem import Problem
 from hfg.types import describe, why_not
@@ -98,8 +98,8 @@ def _parts(edge: FlatEdge) -> str:
 
 def borders(flat: FlatGraph) -> Iterator[Problem]:
     """What iterates has no sources inside and takes neither signals nor activity (rule G4)."""
-    if flat.graph._owner is not None:
-        path = flat.graph.path
+    if flat.level.owner is not None:
+        path = flat.level.path
         for node in flat.nodes:
             if node.node._type.is_source:
                 yield _refused(
@@ -146,9 +146,8 @@ def promotions(whole: FlatGraph) -> list[Problem]:
     problems = []
     for edge in _all_edges(whole):
         for port in (edge.source, edge.target):
-            if not isinstance(port, ParameterPort) or not is_box(port.node):
-                continue
-            if port.name not in port.node._graph._promoted:
+            inner = inside(port.node) if isinstance(port, ParameterPort) else None
+            if inner is not None and not inner.promotions.of(port.name):
                 problems.append(
                     Problem(
                         path=port.path,
@@ -164,6 +163,7 @@ def promotions(whole: FlatGraph) -> list[Problem]:
 
 def _all_edges(whole: FlatGraph) -> Iterator[Edge]:
     for flat in whole.walk():
-        yield from flat.graph.edges
+        yield from flat.level.edges
         for scope in flat.scopes:
-            yield from scope.subgraph._graph.edges
+            inner = inside(scope.subgraph)
+            yield from () if inner is None else inner.edges

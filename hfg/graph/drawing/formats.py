@@ -10,11 +10,14 @@ import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from hfg.errors import UsageError
 from hfg.graph.drawing.picture import Arrow, Box, Look, Picture, Shape, picture
-from hfg.graph.graph import Graph
+from hfg.graph.structure.level import level_of
+
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
 
 __all__ = ["FORMATS", "dot", "draw", "mermaid"]
 
@@ -24,17 +27,17 @@ def draw(graph: Graph, path: str | os.PathLike[str] | None = None) -> str:
     if path is None:
         return mermaid(graph)
     file = Path(path)
+    title = level_of(graph).title
     write = FORMATS.get(file.suffix)
     if write is None:
         endings = " or ".join(FORMATS)
-        raise UsageError(f'{graph._title} cannot be drawn into "{file}": a drawing ends in {endings}; rename the file')
+        raise UsageError(f'{title} cannot be drawn into "{file}": a drawing ends in {endings}; rename the file')
     text = write(graph)
     try:
         file.write_text(text, encoding="utf-8")
     except OSError as error:
         raise UsageError(
-            f'{graph._title} cannot be drawn into "{file}": {error.strerror}; name a file in a folder that you can '
-            "write to"
+            f'{title} cannot be drawn into "{file}": {error.strerror}; name a file in a folder that you can write to'
         ) from error
     return text
 

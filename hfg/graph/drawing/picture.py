@@ -8,17 +8,20 @@ changes nothing there.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeGuard
 
 import msgspec
 
-from hfg.graph.graph import Graph
-from hfg.graph.structure.boxes import is_box
-from hfg.graph.structure.edges import Edge, is_feed
+from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, is_feed, is_port
 from hfg.graph.structure.gates import Gate
-from hfg.graph.structure.options import DEFAULT_CAPACITY, EdgeOptions
+from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.options import DEFAULT_CAPACITY, EdgeOptions, NodeOptions
+from hfg.graph.structure.subgraph import inside, is_box
 from hfg.nodetype import Node
-from hfg.ports import InnerSource, InnerTarget
+from hfg.ports import InnerSource, InnerTarget, Port
+
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
 
 __all__ = ["Arrow", "Box", "Look", "Picture", "Shape", "picture"]
 
@@ -82,20 +85,20 @@ class Picture(msgspec.Struct):
 
 def picture(graph: Graph) -> Picture:
     """Look at a graph, or at the inside of a subgraph alone."""
-    return _Look(graph).picture
+    return _Look(level_of(graph)).picture
 
 
 class _Look:
     """One walk through a graph and all that is inside."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
-        self.picture = Picture(graph.path or graph.name, [], [])
+    def __init__(self, level: Level) -> None:
+        self.level = level
+        self.picture = Picture(level.path or level.name, [], [])
         self.ids: dict[Any, str] = {}  # of nodes, and of ports that are drawn by themselves
         self.shapes: dict[str, Shape] = {}
         self.boxes = 0
-        self.edges = [edge for one in _all_graphs(graph) for edge in one.edges]
-        self.gates = [gate for one in _all_graphs(graph) for gate in one.gates]
+        self.edges = [edge for one in _depth_first(level) for edge in one.edges]
+        self.gates = [gate for one in _depth_first(level) for gate in one.gates]
         self.on_boxes = _ports_of_boxes(self.edges)
         for gate in self.gates:
             for node, what in ((gate.target, "gate"), (gate.by, "active")):
@@ -107,34 +110,35 @@ class _Look:
             self._edge(edge)
         for gate in self.gates:
             self._gate(gate)
-        for one in _all_graphs(graph):
+        for one in _depth_first(level):
             self._promotions(one)
 
     def _own_ports(self) -> None:
         """Draw the ports of the whole: inputs and outputs always, the others where they are used."""
-        graph = self.graph
+        ports = self.level.ports
         used = {id(end) for edge in self.edges for end in (edge.source, edge.target)}
-        for port in (graph.start, *graph.inputs.values(), *graph.outputs.values(), graph.stop, graph.abort):
+        for port in (ports.start, *ports.inputs.values(), *ports.outputs.values(), ports.stop, ports.abort):
             if id(port) in used or port.kind in ("input", "output"):
-                look: Look = "start" if port is graph.start else "stop" if port.kind == "slot" else "port"
+                look: Look = "start" if port is ports.start else "stop" if port.kind == "slot" else "port"
                 self._shape(0, port, port.name, look)
-        for port, name in self.on_boxes.get(graph._owner, {}).items():  # the inside of a subgraph, drawn alone
+        for port, name in self.on_boxes.get(self.level.owner, {}).items():  # the inside of a subgraph, drawn alone
             self._shape(0, port, name, "port")
 
     def _nodes(self) -> None:
-        stack = [iter(self.graph.nodes.items())]
+        stack = [iter(self.level.nodes.items())]
         while stack:
             depth = len(stack) - 1
             for name, node in stack[-1]:
                 ports = self.on_boxes.get(node, {})
-                if not is_box(node) or not (node._graph.nodes or ports):
+                inner = inside(node)
+                if inner is None or not (inner.nodes or ports):
                     self._shape(depth, node, _node_label(name, node._options), "node")
                     continue
                 self.picture.items.append((depth, Box(f"g{self.boxes}", _box_label(name, node._options))))
                 self.boxes += 1
                 for port, port_name in ports.items():
                     self._shape(depth + 1, port, port_name, "port")
-                stack.append(iter(node._graph.nodes.items()))
+                stack.append(iter(inner.nodes.items()))
                 break
             else:
                 stack.pop()
@@ -148,8 +152,8 @@ class _Look:
             if edge.active and self.shapes[end].look == "node":
                 self.shapes[end].is_state = True
 
-    def _end(self, end: Any) -> str:
-        if is_feed(end):
+    def _end(self, end: SourceEnd) -> str:
+        if not is_port(end):
             return self.ids[end] if end in self.ids else self._shape(0, end, "observable", "feed")
         port = _outside(end)
         return self.ids[port] if port in self.ids else self.ids[port.node]
@@ -162,28 +166,30 @@ class _Look:
         label = "gate" if gate.idle_rate_hz is None else f"gate, else {gate.idle_rate_hz:g} Hz"
         self.picture.arrows.append(Arrow(by, target, label, is_gate=True))
 
-    def _promotions(self, inside: Graph) -> None:
+    def _promotions(self, level: Level) -> None:
         """Lead a drawn parameter of a subgraph to those that it stands for."""
-        for name, ports in inside._promoted.items():
-            outer = self.ids.get(inside._owner._port("parameter", name))
+        if level.owner is None:
+            return
+        for name, ports in level.promotions.by_name.items():
+            outer = self.ids.get(level.owner.ports.parameters[name])
             if outer is not None:
                 self.picture.arrows += [Arrow(outer, self._end(inner), f"→ {inner.name}") for inner in ports]
 
-    def _shape(self, depth: int, of: Any, label: str, look: Look) -> str:
-        shape = Shape(f"n{len(self.shapes)}", label, look, is_active=look == "node" and of.active)
+    def _shape(self, depth: int, of: object, label: str, look: Look) -> str:
+        shape = Shape(f"n{len(self.shapes)}", label, look, is_active=isinstance(of, Node) and of.active)
         self.picture.items.append((depth, shape))
         self.shapes[shape.id] = shape
         self.ids[of] = shape.id
         return shape.id
 
 
-def _all_graphs(graph: Graph) -> Iterator[Graph]:
-    """Give a graph and all that are in its boxes."""
-    waiting = [graph]
+def _depth_first(level: Level) -> Iterator[Level]:
+    """Give a level and all that are in its boxes, each box before the next."""
+    waiting = [level]
     while waiting:
         one = waiting.pop()
         yield one
-        waiting += [node._graph for node in reversed(one.nodes.values()) if is_box(node)]
+        waiting += [inner for node in reversed(one.nodes.values()) if (inner := inside(node)) is not None]
 
 
 def _ports_of_boxes(edges: Iterable[Edge]) -> dict[Any, dict[Any, str]]:
@@ -197,7 +203,7 @@ def _ports_of_boxes(edges: Iterable[Edge]) -> dict[Any, dict[Any, str]]:
     return found
 
 
-def _outside(end: Any) -> Any:
+def _outside(end: PortEnd) -> Port:
     """Give the port of a subgraph that an inner side belongs to; another port is its own."""
     return end.outer if isinstance(end, InnerSource | InnerTarget) else end
 
@@ -205,7 +211,7 @@ def _outside(end: Any) -> Any:
 # --- labels ---
 
 
-def _node_label(name: str, options: Any) -> str:
+def _node_label(name: str, options: NodeOptions) -> str:
     said = []
     if options.max_rate_hz is not None:
         said.append(f"{options.max_rate_hz:g} Hz")
@@ -216,7 +222,7 @@ def _node_label(name: str, options: Any) -> str:
     return "\n".join([name, *said])
 
 
-def _box_label(name: str, options: Any) -> str:
+def _box_label(name: str, options: NodeOptions) -> str:
     each = ", ".join(options.iterate_over)
     return _node_label(name, options) + (f"\nfor each of {each}" if each else "")
 
@@ -229,7 +235,7 @@ def _ports_label(edge: Edge) -> str:
     return f"{source} → {target}" if source else f"→ {target}"
 
 
-def _source_name(end: Any) -> str:
+def _source_name(end: SourceEnd) -> str:
     if not _is_on_node(end):
         return ""
     kind = end.node._type
@@ -237,7 +243,7 @@ def _source_name(end: Any) -> str:
     return "" if is_only else end.name
 
 
-def _target_name(end: Any) -> str:
+def _target_name(end: SourceEnd) -> str:
     if not _is_on_node(end):
         return ""
     kind = end.node._type
@@ -245,8 +251,8 @@ def _target_name(end: Any) -> str:
     return "" if is_only else end.name
 
 
-def _is_on_node(end: Any) -> bool:
-    return not is_feed(end) and isinstance(end.node, Node) and not is_box(end.node)
+def _is_on_node(end: SourceEnd) -> TypeGuard[Port]:
+    return isinstance(end, Port) and isinstance(end.node, Node) and not is_box(end.node)
 
 
 def _options(options: EdgeOptions) -> Iterator[str]:

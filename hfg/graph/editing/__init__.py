@@ -5,7 +5,6 @@ changes     its steps, to be taken back  transactions  all or nothing, undo and 
 """
 
 from hfg.graph.editing.transactions import (
-    History,
     Transaction,
     edit,
     history_of,
@@ -18,7 +17,6 @@ from hfg.graph.editing.transactions import (
 )
 
 __all__ = [
-    "History",
     "Transaction",
     "edit",
     "history_of",

@@ -1,4 +1,4 @@
-"""What a command does to a drawn graph, in steps that can each be taken back exactly (rule R4).
+"""What a command does to a graph, in steps that can each be taken back exactly (rule R4).
 
 A change holds the very nodes and edges, with their places in the order, so that what is undone is as it was. Whoever
 makes a change has checked it; doing it cannot fail. A run reads changes too, to see which edges are gone for good.
@@ -7,18 +7,19 @@ Stands on `structure`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from typing_extensions import override
 
-from hfg.graph.graph import Graph
-from hfg.graph.structure.boxes import is_box
-from hfg.graph.structure.edges import Edge, is_single
+from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.membership import close_box, leave, open_box, place, set_options, settle, write_parameter
 from hfg.graph.structure.options import NodeOptions
-from hfg.nodetype import Node, Place
+from hfg.graph.structure.subgraph import inside
+from hfg.nodetype import Node
 from hfg.ports import ParameterPort
 
 __all__ = [
@@ -32,8 +33,6 @@ __all__ = [
     "ParameterChange",
     "PromotionChange",
     "Renaming",
-    "nodes_within",
-    "place",
     "undo_all",
 ]
 
@@ -67,36 +66,32 @@ class NodeChange(Change):
       inside: of a subgraph: the graph in it.
     """
 
-    graph: Graph
+    level: Level
     name: str
     node: Node
     options: NodeOptions
     position: int
-    inside: Graph | None
+    inside: Level | None
     added: bool
 
     @classmethod
-    def of(cls, node: Any, *, added: bool) -> NodeChange:
+    def of(cls, node: Node, *, added: bool) -> NodeChange:
         """Describe a node that is in a graph."""
-        where = node._place
-        position = list(where.graph.nodes).index(where.name)
-        inside = getattr(node, "_graph", None)
-        return cls(where.graph, where.name, node, node._options, position, inside, added)
+        where = node.place
+        level = level_of(where.graph)
+        return cls(level, where.name, node, node._options, level.members.position(where.name), inside(node), added)
 
     @override
     def do(self) -> None:
-        node: Any = self.node
         if self.added:
-            _insert(self.graph.nodes, self.position, self.name, node)
-            node._options = self.options
+            self.level.members.insert(self.position, self.name, self.node)
             if self.inside is not None:
-                node._graph = self.inside
-            place(node, self.graph, self.name)
+                open_box(self.node, self.inside)
+            settle(self.node, self.level, self.name, self.options)
         else:
-            del self.graph.nodes[self.name]
-            node._place = node._options = None
-            if self.inside is not None:
-                del node._graph
+            self.level.members.remove(self.name)
+            leave(self.node)
+            close_box(self.node)
 
     @override
     def inverse(self) -> Self:
@@ -112,13 +107,11 @@ class NodeSwap(Change):
 
     @override
     def do(self) -> None:
-        old, new = self.old, self.new
-        where, options = old.place, old._options
-        nodes = where.graph.nodes
-        nodes[where.name] = new  # the place in the order stays
-        old._place = old._options = None
-        new._options = options
-        place(new, where.graph, where.name)
+        where, options = self.old.place, self.old._options
+        level = level_of(where.graph)
+        level.members.swap(where.name, self.new)
+        leave(self.old)
+        settle(self.new, level, where.name, options)
 
     @override
     def inverse(self) -> Self:
@@ -135,11 +128,9 @@ class Renaming(Change):
 
     @override
     def do(self) -> None:
-        graph = self.node.place.graph
-        position = list(graph.nodes).index(self.before)
-        del graph.nodes[self.before]
-        _insert(graph.nodes, position, self.after, self.node)
-        place(self.node, graph, self.after)
+        level = level_of(self.node.place.graph)
+        level.members.rename(self.before, self.after)
+        place(self.node, level, self.after)
 
     @override
     def inverse(self) -> Self:
@@ -156,7 +147,7 @@ class OptionsChange(Change):
 
     @override
     def do(self) -> None:
-        self.node._options = self.after
+        set_options(self.node, self.after)
 
     @override
     def inverse(self) -> Self:
@@ -174,7 +165,7 @@ class ParameterChange(Change):
 
     @override
     def do(self) -> None:
-        self.node._parameters[self.name] = self.after
+        write_parameter(self.node, self.name, self.after)
 
     @override
     def inverse(self) -> Self:
@@ -183,32 +174,30 @@ class ParameterChange(Change):
 
 @dataclass(eq=False)
 class EdgeChange(Change):
-    """An edge is drawn (`added`) or rubbed out.
+    """An edge is declared (`added`) or deleted.
 
     Attributes:
       position: among the edges of the graph.
-      for_good: when it is rubbed out, what lies on it is gone; else other edges lead the same way (rule G1).
+      for_good: when it is deleted, what lies on it is gone; else other edges lead the same way (rule G1).
     """
 
-    graph: Graph
+    level: Level
     edge: Edge
     position: int
     added: bool
     for_good: bool = True
 
     @classmethod
-    def of(cls, graph: Graph, edge: Edge, *, added: bool, for_good: bool = True) -> EdgeChange:
+    def of(cls, level: Level, edge: Edge, *, added: bool, for_good: bool = True) -> EdgeChange:
         """Describe an edge that is in a graph."""
-        return cls(graph, edge, graph.edges.index(edge), added, for_good)
+        return cls(level, edge, level.edges.index(edge), added, for_good)
 
     @override
     def do(self) -> None:
         if self.added:
-            self.graph.edges.insert(self.position, self.edge)
-            _note(self.graph, self.edge)
+            self.level.connections.insert(self.position, self.edge)
         else:
-            del self.graph.edges[self.position]
-            _forget(self.graph, self.edge)
+            self.level.connections.remove(self.position)
 
     @override
     def inverse(self) -> Self:
@@ -217,18 +206,15 @@ class EdgeChange(Change):
 
 @dataclass(eq=False)
 class EdgeSwap(Change):
-    """An edge is drawn otherwise, in its place in the order: with other options, or with the ports of a new node."""
+    """An edge is declared otherwise, in its place in the order: with other options, or with the ports of a new node."""
 
-    graph: Graph
+    level: Level
     old: Edge
     new: Edge
 
     @override
     def do(self) -> None:
-        edges = self.graph.edges
-        edges[edges.index(self.old)] = self.new
-        _forget(self.graph, self.old)
-        _note(self.graph, self.new)
+        self.level.connections.swap(self.old, self.new)
 
     @override
     def inverse(self) -> Self:
@@ -239,7 +225,7 @@ class EdgeSwap(Change):
 class GateChange(Change):
     """A gate is set or taken away."""
 
-    graph: Graph
+    level: Level
     gate: Gate
     position: int
     added: bool
@@ -247,11 +233,9 @@ class GateChange(Change):
     @override
     def do(self) -> None:
         if self.added:
-            self.graph.gates.insert(self.position, self.gate)
-            self.graph._root._gated.add(self.gate.target)
+            self.level.gates.insert(self.position, self.gate)
         else:
-            del self.graph.gates[self.position]
-            self.graph._root._gated.discard(self.gate.target)
+            self.level.gates.remove(self.position)
 
     @override
     def inverse(self) -> Self:
@@ -262,60 +246,14 @@ class GateChange(Change):
 class PromotionChange(Change):
     """Parameters of the subgraph around a graph stand for others inside."""
 
-    graph: Graph
+    level: Level
     before: dict[str, list[ParameterPort[Any]]]
     after: dict[str, list[ParameterPort[Any]]]
 
     @override
     def do(self) -> None:
-        self.graph._promoted = {name: list(ports) for name, ports in self.after.items()}
+        self.level.promotions.become(self.after)
 
     @override
     def inverse(self) -> Self:
         return replace(self, before=self.after, after=self.before)
-
-
-def place(node: Any, graph: Graph, name: str) -> None:
-    """Say where a node is, and where all inside it are."""
-    node._place = Place(graph, name, f"{graph.path}/{name}" if graph._owner is not None else name)
-    waiting = [node]
-    while waiting:
-        inside = getattr(waiting.pop(), "_graph", None)
-        if inside is not None:
-            for inner_name, inner in inside.nodes.items():
-                inner._place = Place(inside, inner_name, f"{inside.path}/{inner_name}")
-                if is_box(inner):
-                    waiting.append(inner)
-
-
-def nodes_within(node: Any) -> Iterator[Any]:
-    """Give a node and all inside it."""
-    waiting = [node]
-    while waiting:
-        one = waiting.pop()
-        yield one
-        inside = getattr(one, "_graph", None)
-        if inside is not None:
-            waiting += reversed(inside.nodes.values())
-
-
-def _insert(nodes: dict[str, Node], position: int, name: str, node: Node) -> None:
-    """Put a node at its place in the order."""
-    behind = list(nodes.items())[position:]
-    for other, _ in behind:
-        del nodes[other]
-    nodes[name] = node
-    nodes.update(behind)
-
-
-def _note(graph: Graph, edge: Edge) -> None:
-    if is_single(edge.target):
-        graph._into[edge.target] = edge
-    else:
-        graph._pairs.add((edge.source, edge.target))
-
-
-def _forget(graph: Graph, edge: Edge) -> None:
-    if graph._into.get(edge.target) is edge:
-        del graph._into[edge.target]
-    graph._pairs.discard((edge.source, edge.target))

@@ -1,74 +1,70 @@
-"""Copies of nodes; of a subgraph as it is now, not as its `build` would make it. Stands on `structure`."""
+"""Copies of nodes; of a subgraph as it is now, not as its `build` would make it. Stands on levels."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar, cast
 
-from hfg.graph.graph import Graph
-from hfg.graph.structure.boxes import is_box
-from hfg.graph.structure.edges import Edge, is_single
+from hfg.graph.structure.edge import Edge
+from hfg.graph.structure.finding import same_port
 from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.level import Level
+from hfg.graph.structure.membership import leave, open_box, set_options
+from hfg.graph.structure.subgraph import inside, is_box
 from hfg.nodetype import Node
-from hfg.ports import InnerSource, InnerTarget
+from hfg.ports import InnerSource, InnerTarget, Port
 
 __all__ = ["copy_of"]
 
+End = TypeVar("End")
 
-def copy_of(node: Any, around: Graph) -> tuple[Any, Graph | None]:
+
+def copy_of(node: Node, around: Level) -> tuple[Node, Level | None]:
     """Give a node of the same type and parameters that is in no graph, and for a subgraph a copy of its inside."""
-    copies: dict[Any, Any] = {}
-    first = _copy(node, copies)
-    first._options = node._options
+    copies: dict[object, Node] = {}
+    first = copies[node] = node._copy()
+    set_options(first, node._options)  # by which an end of it shows whether it takes one edge alone
     waiting = [(node, first, around)]
-    insides: list[tuple[Graph, Graph]] = []
+    levels: list[tuple[Level, Level]] = []
+    boxes: list[tuple[Node, Level]] = []
     while waiting:  # without recursion, for subgraphs may be as deep as they like
         old, new, outer = waiting.pop()
-        if not is_box(old):
+        old_level = inside(old)
+        if old_level is None or not is_box(new):
             continue
-        inside = Graph._inside(new, outer)
-        new._graph = inside
-        insides.append((old._graph, inside))
-        for name, inner in old._graph.nodes.items():
-            copy = _copy(inner, copies)
-            copy._options = inner._options
-            inside.nodes[name] = copy
-            waiting.append((inner, copy, inside))
-    for old_graph, new_graph in insides:
-        _draw(old_graph, new_graph, copies)
-    first._options = None
-    copied: Graph | None = getattr(first, "_graph", None)
-    if copied is not None:
-        del first._graph  # whoever adds it gives it back
-    return first, copied
+        new_level = outer.make_inside(new)
+        levels.append((old_level, new_level))
+        boxes.append((new, new_level))
+        for name, inner in old_level.nodes.items():
+            copy = copies[inner] = inner._copy()
+            set_options(copy, inner._options)
+            new_level.members.append(name, copy)
+            waiting.append((inner, copy, new_level))
+    for box, new_level in boxes[1:]:  # whoever adds the first gives it its inside
+        open_box(box, new_level)
+    for old_level, new_level in levels:
+        _connect(old_level, new_level, copies)
+    leave(first)
+    return first, levels[0][1] if levels else None
 
 
-def _copy(node: Node, copies: dict[Any, Any]) -> Any:
-    copy = copies[node] = node._copy()
-    return copy
-
-
-def _draw(old: Graph, new: Graph, copies: dict[Any, Any]) -> None:
-    """Draw the same edges, gates and promotions between the copies."""
+def _connect(old: Level, new: Level, copies: dict[object, Node]) -> None:
+    """Declare the same edges, gates and promotions between the copies."""
     for edge in old.edges:
-        drawn = Edge(_end(edge.source, copies), _end(edge.target, copies), edge.options)
-        new.edges.append(drawn)
-        if is_single(drawn.target):
-            new._into[drawn.target] = drawn
-        else:
-            new._pairs.add((drawn.source, drawn.target))
+        new.connections.append(Edge(_end(edge.source, copies), _end(edge.target, copies), edge.options))
     for gate in old.gates:
-        target, by = copies.get(gate.target, gate.target), copies.get(gate.by, gate.by)
         if gate.target in copies:
-            new.gates.append(Gate(target, by, gate.idle_rate_hz))
-            new._root._gated.add(target)
-    new._promoted = {name: [_end(port, copies) for port in ports] for name, ports in old._promoted.items()}
+            new.gates.append(Gate(copies[gate.target], copies.get(gate.by, gate.by), gate.idle_rate_hz))
+    new.promotions.become(
+        {name: [_end(port, copies) for port in ports] for name, ports in old.promotions.by_name.items()}
+    )
 
 
-def _end(end: Any, copies: dict[Any, Any]) -> Any:
+def _end(end: End, copies: dict[object, Node]) -> End:
+    """Give what an end is among the copies; the whole graph's own ports, and observables, are what they are."""
+    found: Any = end
     if isinstance(end, InnerSource | InnerTarget):
-        outer = end.outer
-        return getattr(copies[outer.node].ports, f"{outer.kind}s")[outer.name].inner
-    node = getattr(end, "node", None)
-    if node not in copies:
-        return end  # the whole graph's own ports, or an observable
-    return getattr(copies[node].ports, f"{end.kind}s")[end.name]
+        relay: Any = same_port(copies[end.outer.node], end.outer)
+        found = relay.inner
+    elif isinstance(end, Port) and end.node in copies:
+        found = same_port(copies[end.node], end)
+    return cast(End, found)  # of the same kind, for the nodes are of the same type

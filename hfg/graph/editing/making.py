@@ -11,40 +11,42 @@ from hfg import registry
 from hfg.errors import GraphError, HfgError
 from hfg.graph.editing.commands import Replace
 from hfg.nodetype import Node
+from hfg.ports import ParameterSpec
 from hfg.types import accepts
 
 __all__ = ["as_meant", "fitting", "kept", "made"]
 
 
-def made(reference: str, parameters: dict[str, Any], path: str) -> Any:
+def made(reference: str, parameters: dict[str, Any], path: str) -> Node:
     """Make a node of a type that is found by name.
 
     Raises:
       GraphError: there is no such type, or a parameter is refused.
     """
     try:
-        kind: Any = registry.find(reference)
+        kind = registry.find(reference)
     except HfgError as error:
         raise GraphError(f'node "{path}": {error}') from error
     specs = kind._type.parameters
     values = {name: fitting(specs[name], value) if name in specs else value for name, value in parameters.items()}
     try:
-        return kind(**values)
+        node: Node = kind(**values)
     except (TypeError, ValueError) as error:
         raise GraphError(f'node "{path}": {error}') from error
+    return node
 
 
-def as_meant(value: Any, hint: Any) -> Any:
+def as_meant(value: object, hint: object) -> object:
     """What came over a wire may have lost its type: a list stands for a tuple, a text for an enum's member."""
     return _converted(value, hint, lambda one: accepts(one, hint))
 
 
-def fitting(spec: Any, value: Any) -> Any:
+def fitting(spec: ParameterSpec, value: object) -> object:
     """The same for a value of a parameter, which may have limits."""
     return _converted(value, spec.type, lambda one: spec.check(one) is None)
 
 
-def _converted(value: Any, hint: Any, fits: Callable[[Any], bool]) -> Any:
+def _converted(value: object, hint: Any, fits: Callable[[object], bool]) -> object:  # noqa: ANN401 - any type
     """A value as one of the type; what cannot be one is left as it is, for whoever checks it."""
     if fits(value):
         return value
@@ -62,7 +64,7 @@ def kept(old: Node, command: Replace) -> dict[str, Any]:
       GraphError: there is no such type, or it does not take the value of one of them.
     """
     try:
-        specs: Any = registry.find(command.type)._type.parameters
+        specs = registry.find(command.type)._type.parameters
     except HfgError as error:
         raise GraphError(f'node "{command.path}": {error}') from error
     values = {}
@@ -79,7 +81,7 @@ def kept(old: Node, command: Replace) -> dict[str, Any]:
     return values | command.parameters
 
 
-def _as_now(spec: Any, value: Any) -> Any:
+def _as_now(spec: ParameterSpec, value: object) -> object:
     """A value of a type that a reload has made anew, an enum or a dataclass, in that type."""
     if spec.check(value) is None:
         return value

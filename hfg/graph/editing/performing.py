@@ -6,8 +6,8 @@ All of a transaction or nothing: what is refused leaves the graph as it was. Sta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -25,54 +25,56 @@ from hfg.graph.editing.changes import (
     ParameterChange,
     PromotionChange,
     Renaming,
-    nodes_within,
     undo_all,
 )
 from hfg.graph.editing.copying import copy_of
 from hfg.graph.editing.enclosing import dissolve, enclose
 from hfg.graph.editing.making import as_meant, fitting, kept, made
-from hfg.graph.editing.pointing import graph_and_name, node_at, parameter_at, source_at, target_at
-from hfg.graph.graph import Graph
-from hfg.graph.structure.boxes import is_box
-from hfg.graph.structure.edges import Edge, refuse, type_of
-from hfg.graph.structure.gates import Gate, refuse_gate
+from hfg.graph.editing.pointing import level_and_name, node_at, parameter_at, source_at, target_at
+from hfg.graph.structure.assigning import move
+from hfg.graph.structure.connecting import declare_edge, refuse
+from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of, type_of
+from hfg.graph.structure.finding import same_port
+from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.gating import refuse_gate
+from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import edge_options
-from hfg.graph.structure.promotions import refuse_standing
+from hfg.graph.structure.promoting import refuse_standing
+from hfg.graph.structure.subgraph import inside, is_box
 from hfg.nodetype import Node
-from hfg.ports import InnerSource, InnerTarget
+from hfg.ports import ParameterPort, Port
 
 __all__ = ["perform"]
 
+Promoted: TypeAlias = dict[str, list[ParameterPort[Any]]]
 
-def perform(graph: Graph, commands: Sequence[c.Command]) -> list[Change]:
+
+def perform(level: Level, commands: Sequence[c.Command]) -> list[Change]:
     """Carry commands out, one after the other; all of them or, when one is refused, none.
 
     Raises:
       GraphError: one cannot be; the message says which, and why.
     """
-    hand = _Hand(graph)
-    root = graph._root
-    before, root._edited = root._edited, True
-    try:
-        for command in commands:
-            hand.carry_out(command)
-        hand.check_moved()
-    except BaseException:
-        undo_all(hand.changes)
-        raise
-    finally:
-        root._edited = before
+    hand = _Hand(level)
+    with level.whole.taking_commands():
+        try:
+            for command in commands:
+                hand.carry_out(command)
+            hand.check_moved()
+        except BaseException:
+            undo_all(hand.changes)
+            raise
     return hand.changes
 
 
 class _Hand:
     """Does what commands say and notes each step."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
+    def __init__(self, root: Level) -> None:
+        self.root = root
         self.changes: list[Change] = []
-        self.moved: list[tuple[Graph, Edge]] = []  # edges of nodes that were replaced
+        self.moved: list[tuple[Level, Edge]] = []  # edges of nodes that were replaced
 
     def carry_out(self, command: c.Command) -> None:
         """Do what one command says.
@@ -106,59 +108,61 @@ class _Hand:
     # --- nodes ---
 
     def _add(self, command: c.Add) -> None:
-        around, name = graph_and_name(self.graph, command.path)
+        around, name = level_and_name(self.root, command.path)
         node = made(command.type, command.parameters, command.path)
         try:
-            around.add(node, name=name, **command.options)
+            around.face.add(node, name=name, **command.options)
         except TypeError as error:
             raise GraphError(f'node "{command.path}": {error}; options are those of graph.add') from error
         self.changes.append(NodeChange.of(node, added=True))
 
     def _remove(self, command: c.Remove) -> None:
-        self.take_out(node_at(self.graph, command.path))
+        self.take_out(node_at(self.root, command.path))
 
-    def take_out(self, node: Any) -> None:
+    def take_out(self, node: Node) -> None:
         """Remove a node with all that refers to it."""
-        around: Graph = node.place.graph
+        around = level_of(node.place.graph)
         gone = set(nodes_within(node))
         for edge in [edge for edge in around.edges if _touches(edge, node)]:
             self.do(EdgeChange.of(around, edge, added=False))
-        for level in _levels(self.graph):
+        for level in self.root.walk():
             for gate in [gate for gate in level.gates if gate.target in gone or gate.by in gone]:
-                self.do(GateChange(level, gate, level.gates.index(gate), added=False))
-        promoted = {name: [port for port in ports if port.node is not node] for name, ports in around._promoted.items()}
+                self.do(GateChange(level, gate, level.gates.listed.index(gate), added=False))
+        promoted = {
+            name: [port for port in ports if port.node is not node] for name, ports in around.promotions.by_name.items()
+        }
         self.promote(around, promoted)
         self.do(NodeChange.of(node, added=False))
 
-    def promote(self, around: Graph, promoted: dict[str, Any]) -> None:
+    def promote(self, around: Level, promoted: Promoted) -> None:
         """Let other parameters stand for those inside, if that changes anything."""
-        before = {name: list(ports) for name, ports in around._promoted.items()}
+        before = around.promotions.copied()
         after = {name: ports for name, ports in promoted.items() if ports}
         if before != after:
             self.do(PromotionChange(around, before, after))
 
     def _copy(self, command: c.Copy) -> None:
-        node = node_at(self.graph, command.path)
-        around, name = graph_and_name(self.graph, command.to)
+        node = node_at(self.root, command.path)
+        around, name = level_and_name(self.root, command.to)
         _need_free(around, name, command.to)
-        copy, inside = copy_of(node, around)
-        self.do(NodeChange(around, name, copy, node._options, len(around.nodes), inside, added=True))
+        copy, inner = copy_of(node, around)
+        self.do(NodeChange(around, name, copy, node._options, len(around.nodes), inner, added=True))
 
     def _rename(self, command: c.Rename) -> None:
-        node = node_at(self.graph, command.path)
+        node = node_at(self.root, command.path)
         where = node.place
         if command.name == where.name:
             return
-        _need_free(where.graph, command.name, command.path)
+        _need_free(level_of(where.graph), command.name, command.path)
         self.do(Renaming(node, where.name, command.name))
 
     def _replace(self, command: c.Replace) -> None:
-        old = node_at(self.graph, command.path)
+        old = node_at(self.root, command.path)
         new = made(command.type, kept(old, command), command.path)
         if is_box(old) or is_box(new):
             self._replace_box(old, new)
             return
-        around: Graph = old.place.graph
+        around = level_of(old.place.graph)
         edges = [edge for edge in around.edges if _touches(edge, old)]
         for edge in edges:
             _counterpart(edge.source, old, new)
@@ -170,21 +174,19 @@ class _Hand:
             self.moved.append((around, other))
         self._hand_over(around, old, new)
 
-    def _replace_box(self, old: Any, new: Any) -> None:
+    def _replace_box(self, old: Node, new: Node) -> None:
         """A subgraph is built afresh, so its inside is another."""
-        around: Graph = old.place.graph
+        around = level_of(old.place.graph)
         name, options = old.place.name, old._options
-        position = list(around.nodes).index(name)
+        position = around.members.position(name)
         edges = [(around.edges.index(edge), edge) for edge in around.edges if _touches(edge, old)]
         for _, edge in edges:
             _counterpart(edge.source, old, new)
             _counterpart(edge.target, old, new)
-        gates = [
-            (level, gate) for level in _levels(self.graph) for gate in level.gates if old in (gate.target, gate.by)
-        ]
-        promoted = {key: list(ports) for key, ports in around._promoted.items()}
+        gates = [(level, gate) for level in self.root.walk() for gate in level.gates if old in (gate.target, gate.by)]
+        promoted = around.promotions.copied()
         self.take_out(old)
-        around.add(new, name=name, **msgspec.structs.asdict(options))
+        around.face.add(new, name=name, **msgspec.structs.asdict(options))
         added = NodeChange.of(new, added=True)
         self.changes.append(added)
         moved = NodeChange(around, name, new, added.options, position, added.inside, added=True)
@@ -195,25 +197,25 @@ class _Hand:
             self.do(EdgeChange(around, other, at, added=True))
             self.moved.append((around, other))
         for level, gate in gates:
-            self.do(GateChange(level, _gate_of(gate, old, new), len(level.gates), added=True))
+            self.do(GateChange(level, _gate_of(gate, old, new), len(level.gates.listed), added=True))
         self.promote(around, _promoted_by(around, promoted, old, new))
 
-    def _hand_over(self, around: Graph, old: Node, new: Node) -> None:
+    def _hand_over(self, around: Level, old: Node, new: Node) -> None:
         """Gates and promotions go on with the new node."""
-        for level in _levels(self.graph):
+        for level in self.root.walk():
             for gate in [gate for gate in level.gates if old in (gate.target, gate.by)]:
-                position = level.gates.index(gate)
+                position = level.gates.listed.index(gate)
                 self.do(GateChange(level, gate, position, added=False))
                 self.do(GateChange(level, _gate_of(gate, old, new), position, added=True))
-        self.promote(around, _promoted_by(around, around._promoted, old, new))
+        self.promote(around, _promoted_by(around, around.promotions.by_name, old, new))
 
     # --- options and parameters ---
 
     def _move(self, command: c.Move) -> None:
-        node = node_at(self.graph, command.path)
+        node = node_at(self.root, command.path)
         before = node._options
-        self.graph.move(node, group=command.group)
-        self._note_options(node, before)
+        move(self.root, node, command.group)
+        self.changes.append(OptionsChange(node, before, node._options))
 
     def _enable(self, command: c.Enable) -> None:
         self._set_enabled(command.path, True)
@@ -222,22 +224,18 @@ class _Hand:
         self._set_enabled(command.path, False)
 
     def _set_enabled(self, path: str, enabled: bool) -> None:
-        node = node_at(self.graph, path)
+        node = node_at(self.root, path)
         before = node._options
-        node._options = msgspec.structs.replace(before, enabled=enabled)
-        self._note_options(node, before)
-
-    def _note_options(self, node: Node, before: Any) -> None:
-        self.changes.append(OptionsChange(node, before, node._options))
+        self.do(OptionsChange(node, before, msgspec.structs.replace(before, enabled=enabled)))
 
     def _gate(self, command: c.Gate) -> None:
-        gate = Gate(node_at(self.graph, command.path), node_at(self.graph, command.by), command.idle_rate_hz)
-        refuse_gate(self.graph, gate.target, gate.by, gate.idle_rate_hz)
-        self.do(GateChange(self.graph, gate, len(self.graph.gates), added=True))
+        gate = Gate(node_at(self.root, command.path), node_at(self.root, command.by), command.idle_rate_hz)
+        refuse_gate(self.root, gate)
+        self.do(GateChange(self.root, gate, len(self.root.gates.listed), added=True))
 
     def _ungate(self, command: c.Ungate) -> None:
-        node = node_at(self.graph, command.path)
-        for level in _levels(self.graph):
+        node = node_at(self.root, command.path)
+        for level in self.root.walk():
             for position, gate in enumerate(level.gates):
                 if gate.target is node:
                     self.do(GateChange(level, gate, position, added=False))
@@ -245,11 +243,11 @@ class _Hand:
         raise GraphError(f'"{command.path}" has no gate that could be taken away')
 
     def _setparameter(self, command: c.SetParameter) -> None:
-        port = parameter_at(self.graph, command.path)
+        port = parameter_at(self.root, command.path)
         reached = list(_stands_for(port))
         before = [(one.node, one.name, one.value) for one in reached]
         try:
-            port.node._set_parameter(port.name, fitting(port.spec, command.value))
+            port.value = fitting(port.spec, command.value)
         except ValueError as error:
             raise GraphError(str(error)) from error
         self.changes += [ParameterChange(node, name, value, node._parameters[name]) for node, name, value in before]
@@ -257,19 +255,18 @@ class _Hand:
     # --- edges ---
 
     def _connect(self, command: c.Connect) -> None:
-        source, target = source_at(self.graph, command.source), target_at(self.graph, command.target)
-        around = _level_of(self.graph, source, target)
-        edge = around.connect(
-            source,
-            target,
-            active=command.active,
-            capacity=command.capacity,
-            overflow=command.overflow,
-            capacity_limit=command.capacity_limit,
-            initial=tuple(as_meant(value, type_of(target)) for value in command.initial),
-        )
-        home = around if around.edges and around.edges[-1] is edge else target.graph
-        self.changes.append(EdgeChange(home, edge, len(home.edges) - 1, added=True))
+        source, target = source_at(self.root, command.source), target_at(self.root, command.target)
+        around = _level_for(self.root, source, target)
+        said = {
+            "active": command.active,
+            "capacity": command.capacity,
+            "overflow": command.overflow,
+            "capacity_limit": command.capacity_limit,
+            "through": (),
+            "initial": tuple(as_meant(value, type_of(target)) for value in command.initial),
+        }
+        edge = declare_edge(around, source, target, said)
+        self.changes.append(EdgeChange(around, edge, len(around.edges) - 1, added=True))
 
     def _disconnect(self, command: c.Disconnect) -> None:
         around, edge = self._edge(command.source, command.target)
@@ -280,14 +277,13 @@ class _Hand:
         if edge.active == command.active:
             return
         said = msgspec.structs.asdict(edge.options) | {"active": command.active}
-        options = edge_options(lambda: f'"{command.source}" -> "{command.target}"', **said)
+        options = edge_options(lambda: f'"{command.source}" -> "{command.target}"', said)
         refuse(around, edge.source, edge.target, options)
         self.do(EdgeSwap(around, edge, Edge(edge.source, edge.target, options)))
 
-    def _edge(self, source_path: str, target_path: str) -> tuple[Graph, Edge]:
-        source, target = source_at(self.graph, source_path), target_at(self.graph, target_path)
-        levels: tuple[Graph, ...] = (_level_of(self.graph, source, target), self.graph)
-        for around in levels:
+    def _edge(self, source_path: str, target_path: str) -> tuple[Level, Edge]:
+        source, target = source_at(self.root, source_path), target_at(self.root, target_path)
+        for around in (_level_for(self.root, source, target), self.root):
             for edge in around.edges:
                 if edge.source is source and edge.target is target:
                     return around, edge
@@ -298,11 +294,11 @@ class _Hand:
     # --- subgraphs ---
 
     def _enclose(self, command: c.Enclose) -> None:
-        members = [node_at(self.graph, path) for path in dict.fromkeys(command.paths)]
+        members = [node_at(self.root, path) for path in dict.fromkeys(command.paths)]
         enclose(self.do, members, command.name)
 
     def _dissolve(self, command: c.Dissolve) -> None:
-        dissolve(self.do, node_at(self.graph, command.path), _levels(self.graph))
+        dissolve(self.do, node_at(self.root, command.path), self.root.walk())
 
 
 def _refuse_malformed(command: c.Command) -> None:
@@ -324,40 +320,28 @@ def _refuse_malformed(command: c.Command) -> None:
 
 def _touches(edge: Edge, node: Node) -> bool:
     """Whether an edge begins or ends at a port of a node, as seen from outside."""
-    return node in (_owner(edge.source), _owner(edge.target))
+    return node in (owner_of(edge.source), owner_of(edge.target))
 
 
-def _owner(end: Any) -> Any:
-    return None if isinstance(end, InnerSource | InnerTarget) else getattr(end, "node", None)
-
-
-def _levels(graph: Graph) -> list[Graph]:
-    """The whole graph and all inside it."""
-    found = [graph]
-    for level in found:
-        found += [node._graph for node in level.nodes.values() if is_box(node)]
-    return found
-
-
-def _level_of(graph: Graph, source: Any, target: Any) -> Graph:
-    """The graph in which an edge between two ends is drawn: where the nodes are; the root's own ports are anywhere."""
+def _level_for(root: Level, source: SourceEnd, target: TargetEnd) -> Level:
+    """The level at which an edge is declared: where its nodes are, for the ports of the whole may be named anywhere."""
     for end in (target, source):
-        home: Any = getattr(end, "graph", None)
-        if isinstance(home, Graph) and getattr(end, "node", None) is not graph:
-            return home
-    return graph
+        home = getattr(end, "graph", None)
+        if home is not None and getattr(end, "node", None) is not root.face:
+            return level_of(home)
+    return root
 
 
-def _counterpart(end: Any, old: Node, new: Node) -> Any:
+def _counterpart(end: SourceEnd, old: Node, new: Node) -> Any:  # noqa: ANN401 - a port of the same kind
     """The port of the new node that stands for one of the old.
 
     Raises:
       GraphError: there is none.
     """
-    if _owner(end) is not old:
+    if not isinstance(end, Port) or end.node is not old:
         return end
     try:
-        return getattr(new.ports, f"{end.kind}s")[end.name]
+        return same_port(new, end)
     except HfgError as error:
         where = old._place or new._place
         raise GraphError(
@@ -371,32 +355,32 @@ def _gate_of(gate: Gate, old: Node, new: Node) -> Gate:
     return Gate(target, by, gate.idle_rate_hz)
 
 
-def _promoted_by(around: Graph, promoted: dict[str, Any], old: Node, new: Node) -> dict[str, Any]:
+def _promoted_by(around: Level, promoted: Promoted, old: Node, new: Node) -> Promoted:
     """Let the parameters of the new node stand where those of the old one did.
 
     Raises:
       GraphError: it has none of this name, or one that cannot take the same values.
     """
-    found: dict[str, list[Any]] = {}
+    found: Promoted = {}
     for name, ports in promoted.items():
         found[name] = [_counterpart(port, old, new) for port in ports]
         for port in found[name]:
-            if port.node is new:
-                refuse_standing(around._owner.ports.parameters[name], port)
+            if port.node is new and around.owner is not None:
+                refuse_standing(around.owner.ports.parameters[name], port)
     return found
 
 
-def _need_free(around: Graph, name: str, path: str) -> None:
+def _need_free(around: Level, name: str, path: str) -> None:
     if need_name("a node", name) in around.nodes:
-        raise GraphError(f'"{path}": {around._title} has a node "{name}" already; choose another name')
+        raise GraphError(f'"{path}": {around.title} has a node "{name}" already; choose another name')
 
 
-def _stands_for(port: Any) -> Iterable[Any]:
+def _stands_for(port: ParameterPort[Any]) -> Iterator[ParameterPort[Any]]:
     """A parameter and all those inside that it stands for."""
     waiting = [port]
     while waiting:
         one = waiting.pop()
         yield one
-        inside = getattr(one.node, "_graph", None)
-        if inside is not None:
-            waiting += inside._promoted.get(one.name, ())
+        inner = inside(one.node)
+        if inner is not None:
+            waiting += inner.promotions.of(one.name)

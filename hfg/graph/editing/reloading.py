@@ -13,15 +13,17 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import CodeType, ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 from hfg.errors import GraphError
 from hfg.functions import NodeFunction
 from hfg.graph.editing.commands import Replace
-from hfg.graph.graph import Graph
-from hfg.graph.structure.boxes import is_box
+from hfg.graph.structure.subgraph import inside
 from hfg.nodetype import Node
+
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
 
 __all__ = ["reloaded"]
 
@@ -65,11 +67,11 @@ def reloaded(graph: Graph, module: str | ModuleType) -> Iterator[list[Replace]]:
 class _Reloaded(ModuleType):
     """What a module becomes when it is reloaded: whoever holds it sees the new one, but for its own functions."""
 
-    def __getattribute__(self, name: str) -> Any:
+    def __getattribute__(self, name: str) -> object:
         new = _newest(self)
         return super().__getattribute__(name) if new is self else getattr(new, name)
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         new = _newest(self)
         super().__setattr__(name, value) if new is self else setattr(new, name, value)
 
@@ -93,19 +95,19 @@ def _run(code: CodeType, module: ModuleType) -> None:
         ) from error
 
 
-def _nodes_of(graph: Graph, module: str) -> Iterator[tuple[Any, str]]:
+def _nodes_of(graph: Graph, module: str) -> Iterator[tuple[Node, str]]:
     """Give the nodes whose types are of a module, and by what references; not those inside such a subgraph."""
-    waiting: list[Any] = list(graph.nodes.values())
+    waiting = list(graph.nodes.values())
     while waiting:
         node = waiting.pop(0)
         reference = node._type.reference or _once_known_as.get(node._type.origin)
         if reference is not None and reference.startswith(f"{module}:"):
             yield node, reference
-        elif is_box(node):
-            waiting += node._graph.nodes.values()
+        elif (inner := inside(node)) is not None:
+            waiting += inner.nodes.values()
 
 
-def _types_in(owner: Any, module: str) -> Iterator[tuple[Any, str]]:
+def _types_in(owner: object, module: str) -> Iterator[tuple[Any, str]]:
     """Give the node types of a module, those inside its classes too, and their references."""
     for value in list(vars(owner).values()):
         if isinstance(value, NodeFunction) or (isinstance(value, type) and issubclass(value, Node)):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -19,11 +20,14 @@ from hfg.graph.editing.commands import Add, Command, Connect, Copy, Dissolve, En
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat.flattening import flatten
-from hfg.graph.graph import Graph
+from hfg.graph.structure.history import History
+from hfg.graph.structure.level import level_of
 from hfg.problem import Problem
 
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
+
 __all__ = [
-    "History",
     "Transaction",
     "edit",
     "history_of",
@@ -46,75 +50,9 @@ class Transaction(msgspec.Struct, frozen=True, eq=False):
     changes: tuple[Change, ...]
 
 
-class History:
-    """What was edited.
-
-    Attributes:
-      done: the last edit last.
-      undone: the one to be redone first last.
-      revision: of the graph behind the last edit; another one says that it was changed by hand.
-    """
-
-    def __init__(self, graph: Graph) -> None:
-        self._graph = graph
-        self.done: list[Transaction] = []
-        self.undone: list[Transaction] = []
-        self.revision = graph._revision
-
-    def note(self, transaction: Transaction) -> None:
-        """A transaction was carried out."""
-        self.forget_what_is_old()
-        self.done.append(transaction)
-        self.undone.clear()
-
-    def forget_what_is_old(self) -> bool:
-        """What was changed by hand makes what was edited before it final; whether that is so."""
-        if self.revision == self._graph._revision:
-            return False
-        self.revision = self._graph._revision
-        self.done.clear()
-        self.undone.clear()
-        return True
-
-    def next_undo(self) -> Transaction:
-        """Give what would be undone.
-
-        Raises:
-          UsageError: there is nothing.
-        """
-        return self._next(self.done, "undo", "nothing was edited by commands yet")
-
-    def next_redo(self) -> Transaction:
-        """Give what would be redone.
-
-        Raises:
-          UsageError: there is nothing.
-        """
-        return self._next(self.undone, "redo", "nothing was undone since the last edit")
-
-    def _next(self, listed: list[Transaction], what: str, why: str) -> Transaction:
-        by_hand = self.forget_what_is_old()
-        if not listed:
-            if by_hand:
-                why = "the graph was changed by hand since, which is final"
-            raise UsageError(f"{self._graph._title} has nothing to {what}: {why}")
-        return listed[-1]
-
-    def undo_done(self) -> None:
-        """The last transaction was undone."""
-        self.undone.append(self.done.pop())
-
-    def redo_done(self) -> None:
-        """The last one that was undone was carried out again."""
-        self.done.append(self.undone.pop())
-
-
-def history_of(graph: Graph) -> History:
+def history_of(graph: Graph) -> History[Transaction]:
     """Give the history of a whole graph."""
-    if graph._history is None:
-        graph._history = History(graph)
-    history: History = graph._history
-    return history
+    return level_of(graph).whole.history
 
 
 def edit(graph: Graph, commands: Sequence[Command]) -> None:
@@ -149,13 +87,13 @@ def reload(graph: Graph, module: str | ModuleType) -> None:
 
 
 def prepare(graph: Graph, commands: Sequence[Command], *, check: bool = True) -> Transaction:
-    """Carry commands out on the drawn graph and check the whole.
+    """Carry commands out on the graph and check the whole.
 
     Raises:
       GraphError: a command is refused, or the graph would have an error that it has not now; nothing was changed.
     """
     before = _errors(graph) if check and may_break(commands) else None
-    changes = perform(graph, commands)
+    changes = perform(level_of(graph), commands)
     if before is not None:
         try:
             refuse_new_errors(before, _errors(graph))
@@ -189,10 +127,11 @@ def refuse_new_errors(before: Sequence[Problem], after: Sequence[Problem]) -> No
 
 
 def _need_rest(graph: Graph, what: str) -> None:
-    if graph._owner is not None:
+    level = level_of(graph)
+    if level.owner is not None:
         raise UsageError(
-            f'{graph._title} is edited with the whole graph: write graph.{what} of "{graph._root.name}", '
-            f'with paths such as "{graph.path}/node"'
+            f'{level.title} is edited with the whole graph: write graph.{what} of "{level.whole.root.name}", '
+            f'with paths such as "{level.path}/node"'
         )
-    if graph._run is not None:
-        raise UsageError(f"{graph._title} runs: write `await run.{what}(...)`, which the run follows")
+    if level.whole.run is not None:
+        raise UsageError(f"{level.title} runs: write `await run.{what}(...)`, which the run follows")

@@ -1,20 +1,23 @@
 """What a graph is once its subgraphs are dissolved: plain data for runners and checks; `flat` makes it.
 
-Stands on `structure`, for the nodes and edges it refers to.
+Stands on `structure`, for the nodes, edges and levels it refers to.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 import msgspec
 
-from hfg.graph.graph import Graph
-from hfg.graph.structure.edges import Edge
+from hfg.graph.structure.edge import Edge
+from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.options import GroupSpec, NodeOptions, Overflow
 from hfg.nodetype import Node
 from hfg.problem import Problem
+
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
 
 __all__ = ["ROOT", "End", "EndKind", "FlatEdge", "FlatGate", "FlatGraph", "FlatNode", "Scope", "scope_end"]
 
@@ -125,6 +128,7 @@ class FlatGraph(msgspec.Struct, eq=False):
 
     Attributes:
       groups: of the whole graph.
+      graph: the whole, or the inside of what iterates.
       findings: what went wrong on the way; errors.
     """
 
@@ -135,6 +139,11 @@ class FlatGraph(msgspec.Struct, eq=False):
     gates: list[FlatGate]
     graph: Graph
     findings: list[Problem]
+
+    @property
+    def level(self) -> Level:
+        """What is behind the face of its graph."""
+        return level_of(self.graph)
 
     def walk(self) -> Iterator[FlatGraph]:
         """Give this graph and all that iterate inside it."""

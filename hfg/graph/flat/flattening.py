@@ -9,19 +9,20 @@ there.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
-
-import msgspec
+from typing import TYPE_CHECKING, Any
 
 from hfg.graph.flat.flat_graph import ROOT, End, EndKind, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
-from hfg.graph.graph import Graph
-from hfg.graph.structure.boxes import is_box, iterated
-from hfg.graph.structure.edges import Edge, is_feed
+from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, is_port
 from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.level import Level
 from hfg.graph.structure.options import NodeOptions, in_group
+from hfg.graph.structure.subgraph import inside, iterated
 from hfg.nodetype import Node
-from hfg.ports import InnerSource, InnerTarget, ParameterPort
+from hfg.ports import InnerSource, InnerTarget, ParameterPort, Port
 from hfg.problem import Problem
+
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
 
 __all__ = [
     "ROOT",
@@ -46,37 +47,30 @@ def flatten(graph: Graph) -> FlatGraph:
         flat, prefix, group = waiting.pop()
         levels = _collect_nodes(flat, prefix, group)
         for node in reversed(flat.nodes):
-            if is_box(node.node) and iterated(node.node):
-                inside = node.node._graph
-                node.iteration = FlatGraph([], [], [], graph.groups, [], inside, flat.findings)
+            inner = inside(node.node)
+            if inner is not None and iterated(node.node):
+                node.iteration = FlatGraph([], [], [], graph.groups, [], inner.face, flat.findings)
                 waiting.append((node.iteration, f"{node.path}/", node.options.group or "loop"))
         EdgeFollower(flat, levels).collect()
     return whole
 
 
-class _Level(msgspec.Struct, eq=False):
-    """One graph on the way through all: `depth` dissolved subgraphs lie around it."""
-
-    graph: Graph
-    depth: int
-
-
-def _collect_nodes(flat: FlatGraph, prefix: str, group: str) -> list[_Level]:
-    """Fill nodes and scopes; give the graphs they were found in, in depth-first order."""
+def _collect_nodes(flat: FlatGraph, prefix: str, group: str) -> list[tuple[Level, int]]:
+    """Fill nodes and scopes; give the levels they were found in, depth first, and how many scopes lie around each."""
     nodes, scopes = flat.nodes, flat.scopes
-    levels = [_Level(flat.graph, 0)]
+    levels = [(flat.level, 0)]
     # One entry for each graph that is under way: what is left of it, and what holds for its nodes.
     stack: list[tuple[Iterator[tuple[str, Node]], str, tuple[int, ...], str]] = [
-        (iter(flat.graph.nodes.items()), prefix, (), group)
+        (iter(flat.level.nodes.items()), prefix, (), group)
     ]
     while stack:
         rest, prefix, around, group = stack[-1]
         for name, node in rest:
             own: NodeOptions = node._options
-            box: object = node  # told apart from the node, for which type checkers would forget its class
             options = own if own.group is not None else in_group(own, group)
             path = prefix + name
-            if not is_box(box) or own.iterate_over:
+            inner = None if own.iterate_over else inside(node)
+            if inner is None:
                 index = len(nodes)
                 nodes.append(FlatNode(index, path, node, options, around))
                 for scope in around:
@@ -84,9 +78,8 @@ def _collect_nodes(flat: FlatGraph, prefix: str, group: str) -> list[_Level]:
                 continue
             scope = len(scopes)
             scopes.append(Scope(scope, path, node, around[-1] if around else None, options, []))
-            inside = box._graph
-            levels.append(_Level(inside, len(around) + 1))
-            stack.append((iter(inside.nodes.items()), f"{path}/", (*around, scope), options.group or group))
+            levels.append((inner, len(around) + 1))
+            stack.append((iter(inner.nodes.items()), f"{path}/", (*around, scope), options.group or group))
             break
         else:
             stack.pop()
@@ -96,7 +89,7 @@ def _collect_nodes(flat: FlatGraph, prefix: str, group: str) -> list[_Level]:
 class EdgeFollower:
     """Follows drawn edges from end to end."""
 
-    def __init__(self, flat: FlatGraph, levels: list[_Level]) -> None:
+    def __init__(self, flat: FlatGraph, levels: list[tuple[Level, int]]) -> None:
         self.flat = flat
         self.levels = levels
         self.ends: dict[Any, End] = {}  # by port: both ends of a port are the same, but for parameters as well
@@ -112,29 +105,28 @@ class EdgeFollower:
         """Fill edges and gates."""
         if self.scope_of:
             self._find_relays()
-        for level in self.levels:
-            for edge in level.graph.edges:
+        for level, _ in self.levels:
+            for edge in level.edges:
                 self.begin(edge)
-        for level in self.levels:
-            for gate in level.graph.gates:
+        for level, _ in self.levels:
+            for gate in level.gates:
                 self._gate(gate)
 
     def _find_relays(self) -> None:
-        for level in self.levels:
-            for edge in level.graph.edges:
-                self.depth_of[edge] = level.depth
+        for level, depth in self.levels:
+            for edge in level.edges:
+                self.depth_of[edge] = depth
                 relay = self.relay(edge.source)
                 if relay is not None:
                     self.behind.setdefault(relay, []).append(edge)
 
-    def relay(self, end: Any) -> Any:
+    def relay(self, end: SourceEnd) -> Port | None:
         """Give the port of a dissolved subgraph that an end is a side of; None if edges really begin or end there."""
         if isinstance(end, InnerSource | InnerTarget):
             return end.outer if end.node in self.scope_of else None
-        node = getattr(end, "node", None)
-        if not is_box(node) or end.kind == "parameter" or node not in self.scope_of:
+        if not isinstance(end, Port) or end.kind == "parameter" or end.node not in self.scope_of:
             return None
-        return end if end.name in getattr(node._type, f"{end.kind}s") else None
+        return end if end.name in getattr(end.node._type, f"{end.kind}s") else None
 
     def begin(self, edge: Edge) -> None:
         """Follow an edge unless it begins at a relay; those are met on the way."""
@@ -159,8 +151,8 @@ class EdgeFollower:
             if relay is None:
                 passed = (*via, *(self.scope_of[one.node] for one in relays))
                 if isinstance(target, ParameterPort):
-                    for parameter, inside in self._inner_parameters(target):
-                        self._finish(source, parameter, segments, (*passed, *inside))
+                    for parameter, further in self._inner_parameters(target):
+                        self._finish(source, parameter, segments, (*passed, *further))
                 else:
                     self._finish(source, target, segments, passed)
             elif any(relay is one for one in relays):
@@ -177,10 +169,11 @@ class EdgeFollower:
             if scope is None:
                 yield found, via
             else:
-                inside = self.flat.scopes[scope].subgraph._graph._promoted.get(found.name, ())
-                stack += [(inner, (*via, scope)) for inner in reversed(inside)]
+                inner = inside(self.flat.scopes[scope].subgraph)
+                behind = () if inner is None else inner.promotions.of(found.name)
+                stack += [(parameter, (*via, scope)) for parameter in reversed(behind)]
 
-    def _finish(self, source: Any, target: Any, segments: tuple[Edge, ...], via: tuple[int, ...]) -> None:
+    def _finish(self, source: SourceEnd, target: TargetEnd, segments: tuple[Edge, ...], via: tuple[int, ...]) -> None:
         begin, end = self._end(source), self._end(target)
         if begin is None or end is None:
             return
@@ -211,7 +204,7 @@ class EdgeFollower:
             )
         )
 
-    def _end(self, port: Any) -> End | None:
+    def _end(self, port: SourceEnd) -> End | None:
         found = self.ends.get(port)
         if found is None:
             found = self._make_end(port)
@@ -219,8 +212,8 @@ class EdgeFollower:
                 self.ends[port] = found
         return found
 
-    def _make_end(self, port: Any) -> End | None:
-        if is_feed(port):
+    def _make_end(self, port: SourceEnd) -> End | None:
+        if not is_port(port):
             return End(ROOT, "observable", "observable", port)
         if isinstance(port, InnerSource | InnerTarget):  # only those of what iterates come here: its boundary
             if port.kind in ("slot", "event"):
@@ -248,8 +241,8 @@ class EdgeFollower:
         if end.node >= 0:
             return f"{self.flat.nodes[end.node].path}.{end.name}"
         if end.node == ROOT:
-            inside = self.flat.graph.path
-            return f"{inside}.{end.name}" if inside else end.name
+            around = self.flat.graph.path
+            return f"{around}.{end.name}" if around else end.name
         return f"{self.flat.scopes[scope_end(end.node)].path}.{end.name}"
 
     def _gate(self, gate: Gate) -> None:
@@ -276,7 +269,7 @@ class EdgeFollower:
             return scope_end(self.scope_of[node])
         return index
 
-    def _report_ring(self, relay: Any, edge: Edge) -> None:
+    def _report_ring(self, relay: Port, edge: Edge) -> None:
         self.flat.findings.append(
             Problem(
                 path=relay.path,
@@ -288,7 +281,7 @@ class EdgeFollower:
             )
         )
 
-    def _report_border(self, port: Any) -> None:
+    def _report_border(self, port: Port) -> None:
         self.flat.findings.append(
             Problem(
                 path=self.flat.graph.path or port.path,

@@ -1,11 +1,15 @@
 """What a graph is made of, and why something cannot be part of it; each thing is refused where it is said.
 
-options     what is said about nodes, edges and groups besides
-naming      names and paths                         boxes       which nodes hold a graph
-members     what `add` refuses                      gates, promotions     the same for theirs
-edges       Edge, and every reason to refuse one at once
-boundary    the ports of the whole graph            subgraph    Subgraph: a node that holds a graph
-refusals    kept instead of raised, so that a check tells all
+level        one level of a graph: the whole, or the inside of a subgraph    whole    what all its levels share
+members      its nodes by name                    connections  its edges, and which leads into each input
+gates        who works while whom is active       promotions   which parameters stand for others inside
+boundary     the ports of the whole graph         groups       where nodes run      history  what can be undone
+edge         Edge, and what is asked of its ends  subgraph     Subgraph: a node that holds a graph
+options      what is said about nodes, edges and groups besides
+
+adding, connecting, gating, promoting, declaring, assigning      what changes a level, and refuses what cannot be
+membership   where a node is, said to the node    naming, finding      names, and what paths lead to
+refusals     kept instead of raised, so that a check tells all
 """
 
 __all__: list[str] = []

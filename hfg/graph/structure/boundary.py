@@ -5,11 +5,15 @@ Inside the graph an input of the graph is a source and an output a target, so th
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+import copy
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from hfg.ports import EventPort, InputPort, OutputPort, SlotPort
+from hfg.ports import EventPort, InputPort, OutputPort, Port, SlotPort
 
-__all__ = ["GraphInput", "GraphOutput", "lifecycle_ports"]
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
+
+__all__ = ["Boundary", "GraphInput", "GraphOutput"]
 
 T = TypeVar("T")
 
@@ -26,6 +30,44 @@ class GraphOutput(InputPort[T]):
     __slots__ = ()
 
 
-def lifecycle_ports(graph: Any) -> tuple[EventPort[None], SlotPort[object], SlotPort[object]]:
-    """Make `start`, `stop` and `abort`; the slots take any signal."""
-    return EventPort(graph, "start"), SlotPort(graph, "stop", object), SlotPort(graph, "abort", object)
+class Boundary:
+    """The ports of the whole graph.
+
+    Attributes:
+      start: the event that begins every run.
+      stop: the slot that ends the run well.
+      abort: the slot that ends it in failure.
+      inputs: by name, in order of declaration.
+      outputs: by name, in order of declaration.
+    """
+
+    __slots__ = ("abort", "inputs", "outputs", "start", "stop")
+
+    def __init__(self, graph: Graph) -> None:
+        self.start: EventPort[None] = EventPort(graph, "start")
+        self.stop: SlotPort[object] = SlotPort(graph, "stop", object)  # these two take any signal
+        self.abort: SlotPort[object] = SlotPort(graph, "abort", object)
+        self.inputs: dict[str, GraphInput[Any]] = {}
+        self.outputs: dict[str, GraphOutput[Any]] = {}
+
+    def for_inside(self) -> Boundary:
+        """Give what the inside of a subgraph sees of it: how the whole begins and ends (rule A10), no other port."""
+        seen = copy.copy(self)
+        seen.inputs, seen.outputs = {}, {}
+        return seen
+
+    def by_name(self) -> dict[str, Port]:
+        """Give all ports; inputs and outputs share their names."""
+        return {"start": self.start, "stop": self.stop, "abort": self.abort, **self.inputs, **self.outputs}
+
+    def has(self, port: object) -> bool:
+        """Say whether it is one of the three that are the whole graph's, wherever they are named (rule A10)."""
+        return port is self.start or port is self.stop or port is self.abort
+
+    def add_input(self, port: GraphInput[Any]) -> None:
+        """Add a port by which the graph is fed."""
+        self.inputs[port.name] = port
+
+    def add_output(self, port: GraphOutput[Any]) -> None:
+        """Add a port at which the graph is read."""
+        self.outputs[port.name] = port

@@ -1,16 +1,14 @@
-"""Gates: work coupled to activity without touching the node (rule A11). Stands on nodes and naming."""
+"""Gates: work coupled to activity without touching the node (rule A11). Stands on nodes."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Iterator
 
 import msgspec
 
-from hfg.errors import GraphError
-from hfg.graph.structure.naming import path_of
 from hfg.nodetype import Node
 
-__all__ = ["Gate", "refuse_gate"]
+__all__ = ["Gate", "Gates"]
 
 
 class Gate(msgspec.Struct, frozen=True, eq=False):
@@ -21,26 +19,37 @@ class Gate(msgspec.Struct, frozen=True, eq=False):
     idle_rate_hz: float | None = None
 
 
-def refuse_gate(graph: Any, target: Any, by: Any, idle_rate_hz: Any) -> None:
-    """Raise if the gate cannot be; changes nothing.
+class Gates:
+    """The gates of one level.
 
-    Raises:
-      GraphError: what is given is no node of this graph, or is gated already; or the rate is none.
+    Attributes:
+      listed: in order of gating.
     """
-    for node in (target, by):
-        if not isinstance(node, Node):
-            raise GraphError(
-                f"a gate couples nodes, got {node!r}; give the node itself, as in graph.gate(detector, by=fetch)"
-            )
-        if node._place is None or node._place.graph._root is not graph._root:
-            raise GraphError(
-                f'a gate couples nodes of one graph, but "{path_of(node)}" is not in {graph._title}; add it first'
-            )
-    name = path_of(target)
-    if target in graph._root._gated:
-        raise GraphError(f'"{name}" has a gate already; put what both gates mean into one state node or subgraph')
-    is_number = isinstance(idle_rate_hz, int | float) and type(idle_rate_hz) is not bool
-    if idle_rate_hz is not None and not (is_number and idle_rate_hz > 0):
-        raise GraphError(
-            f'the gate of "{name}": idle_rate_hz must be a number above 0, or None to rest, got {idle_rate_hz!r}'
-        )
+
+    __slots__ = ("_gated", "listed")
+
+    def __init__(self, gated: set[Node]) -> None:
+        """Begin without gates; `gated` is that of the whole graph, in which a node has at most one gate."""
+        self.listed: list[Gate] = []
+        self._gated = gated
+
+    def __iter__(self) -> Iterator[Gate]:
+        return iter(self.listed)
+
+    def append(self, gate: Gate) -> None:
+        """Set a gate behind all others."""
+        self.insert(len(self.listed), gate)
+
+    def insert(self, position: int, gate: Gate) -> None:
+        """Set a gate at its place in the order."""
+        self.listed.insert(position, gate)
+        self._gated.add(gate.target)
+
+    def remove(self, position: int) -> None:
+        """Take the gate at a position away."""
+        self._gated.discard(self.listed.pop(position).target)
+
+    def keep(self, fits: Callable[[Gate], bool]) -> None:
+        """Take all others away."""
+        for gate in [gate for gate in self.listed if not fits(gate)]:
+            self.remove(self.listed.index(gate))

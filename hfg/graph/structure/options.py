@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable
-from typing import Any, Final, Literal, TypeAlias, TypeVar
+from typing import Any, Final, Literal, TypeAlias, TypeGuard, TypeVar
 
 import msgspec
 
@@ -152,7 +152,7 @@ def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
 
 
 @functools.lru_cache(maxsize=1024)
-def _shared_node_options(**given: Any) -> NodeOptions:
+def _shared_node_options(**given: Any) -> NodeOptions:  # noqa: ANN401 - each checked by its name
     return NodeOptions(**given)
 
 
@@ -162,34 +162,39 @@ def in_group(options: NodeOptions, group: str | None) -> NodeOptions:
     return msgspec.structs.replace(options, group=group)
 
 
-def edge_options(
-    where: Callable[[], str],
-    active: bool,
-    capacity: int,
-    overflow: str,
-    capacity_limit: int | None,
-    through: Iterable[Any],
-    initial: Iterable[Any],
-) -> EdgeOptions:
-    """Check the options of an edge; plain edges share one object, plain active ones another.
+def edge_options(where: Callable[[], str], said: dict[str, Any]) -> EdgeOptions:
+    """Check the options of an edge, given by name; plain edges share one object, plain active ones another.
 
     Raises:
-      ConnectionError: a value is out of its range, or the options contradict each other.
+      ConnectionError: a value is out of its range, or the options contradict each other; the message begins with what
+        `where` gives.
     """
-    through = _listed(where, "through", through, "[ops.debounce(0.2)]")
-    initial = _listed(where, "initial", initial, "[0]")
+    said["through"] = through = _listed(where, "through", said["through"], "[ops.debounce(0.2)]")
+    said["initial"] = initial = _listed(where, "initial", said["initial"], "[0]")
     if (
         not through
         and not initial
-        and capacity_limit is None
-        and overflow == "wait"
-        and capacity == DEFAULT_CAPACITY
-        and type(active) is bool
+        and said["capacity_limit"] is None
+        and said["overflow"] == "wait"
+        and said["capacity"] == DEFAULT_CAPACITY
+        and type(said["active"]) is bool
     ):
-        return ACTIVE if active else PLAIN
+        return ACTIVE if said["active"] else PLAIN
     at = where()
-    if type(active) is not bool:
-        raise errors.ConnectionError(f"{at}: active must be True or False, got {active!r}")
+    if type(said["active"]) is not bool:
+        raise errors.ConnectionError(f"{at}: active must be True or False, got {said['active']!r}")
+    _need_queue(at, said)
+    broken = next((operator for operator in through if not callable(operator)), None)
+    if broken is not None:
+        raise errors.ConnectionError(
+            f"{at}: through takes reactivex operators such as ops.debounce(0.2), got {broken!r}"
+        )
+    return EdgeOptions(**said)
+
+
+def _need_queue(at: str, said: dict[str, Any]) -> None:
+    """Check what is said about the queue of an event edge; "latest" means a capacity of 1 (rule P5)."""
+    capacity, overflow, limit = said["capacity"], said["overflow"], said["capacity_limit"]
     _need_choice(at, "overflow", overflow, OVERFLOW, errors.ConnectionError)
     _need_whole(at, "capacity", capacity, 1, errors.ConnectionError)
     if overflow == "latest":
@@ -198,27 +203,15 @@ def edge_options(
                 f'{at}: overflow="latest" keeps one signal, got capacity={capacity}; '
                 'leave capacity out, or use overflow="drop_oldest"'
             )
-        capacity = 1
-    if capacity_limit is not None:
-        _need_whole(at, "capacity_limit", capacity_limit, capacity, errors.ConnectionError)
-        if overflow != "wait":
-            raise errors.ConnectionError(
-                f'{at}: capacity_limit bounds how far overflow="wait" may grow, '
-                f'got overflow="{overflow}", which never grows; leave one of them out'
-            )
-    broken = next((operator for operator in through if not callable(operator)), None)
-    if broken is not None:
+        said["capacity"] = 1
+    if limit is None:
+        return
+    _need_whole(at, "capacity_limit", limit, said["capacity"], errors.ConnectionError)
+    if overflow != "wait":
         raise errors.ConnectionError(
-            f"{at}: through takes reactivex operators such as ops.debounce(0.2), got {broken!r}"
+            f'{at}: capacity_limit bounds how far overflow="wait" may grow, '
+            f'got overflow="{overflow}", which never grows; leave one of them out'
         )
-    return EdgeOptions(
-        active=active,
-        capacity=capacity,
-        overflow=overflow,  # type: ignore[arg-type]  # checked above
-        capacity_limit=capacity_limit,
-        through=through,
-        initial=initial,
-    )
 
 
 def _listed(where: Callable[[], str], name: str, given: object, example: str) -> tuple[Any, ...]:
@@ -254,23 +247,23 @@ def group_spec(name: str, threads: int, policy: str, seed: int | None) -> GroupS
     return GroupSpec(name, threads, policy, seed)  # type: ignore[arg-type]  # checked above
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and type(value) is not bool and value == value  # NaN is none
 
 
-def _need_choice(where: str, name: str, value: Any, choices: tuple[str, ...], error: type[HfgError]) -> None:
+def _need_choice(where: str, name: str, value: object, choices: tuple[str, ...], error: type[HfgError]) -> None:
     if value not in choices:
         words = ", ".join(f'"{choice}"' for choice in choices)
         raise error(f"{where}: {name} must be one of {words}, got {value!r}")
 
 
-def _need_whole(where: str, name: str, value: Any, least: int | None, error: type[HfgError]) -> None:
+def _need_whole(where: str, name: str, value: object, least: int | None, error: type[HfgError]) -> None:
     if type(value) is not int or (least is not None and value < least):
         raise error(
             f"{where}: {name} must be a whole number{'' if least is None else f' from {least} on'}, got {value!r}"
         )
 
 
-def _need_positive(where: str, name: str, value: Any) -> None:
+def _need_positive(where: str, name: str, value: object) -> None:
     if value is not None and (not _is_number(value) or value <= 0):
         raise GraphError(f"{where}: {name} must be a number above 0, or None for no limit, got {value!r}")

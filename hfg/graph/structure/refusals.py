@@ -6,14 +6,13 @@ on as well as it can. Stands on naming.
 
 from __future__ import annotations
 
+import inspect
 import linecache
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 from hfg.errors import GraphError
 from hfg.graph.structure.naming import path_of
@@ -50,7 +49,7 @@ class Refusable:
 
     __slots__ = ("_ends",)
 
-    def __init__(self, *ends: Any) -> None:
+    def __init__(self, *ends: object) -> None:
         self._ends = ends
 
     def __enter__(self) -> None:
@@ -80,7 +79,7 @@ def problem_of(error: BaseException | None, path: str, why: str) -> Problem:
 
 def _where() -> str:
     """The user's line that is being executed."""
-    frame: FrameType | None = sys._getframe()
+    frame: FrameType | None = inspect.currentframe()
     while frame is not None and frame.f_code.co_filename.startswith(_OURS):
         frame = frame.f_back
     if frame is None:
@@ -90,7 +89,7 @@ def _where() -> str:
     return f"{Path(file).name}, line {line}" + (f", {code}" if code else "")
 
 
-def _name_of(end: Any) -> str:
+def _name_of(end: object) -> str:
     """What a refused port, node or name is called, whatever it is."""
     if isinstance(end, str):
         return end

@@ -1,18 +1,23 @@
 """Subgraphs: nodes that hold a graph; their ports are relays between outside and inside (rules G1-G4).
 
-Stands on `structure` and `nodetype`.
+Stands on `nodetype`; knows graphs and levels by name alone.
 """
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
+
+from typing_extensions import TypeIs
 
 from hfg.errors import UsageError
-from hfg.graph.graph import Graph
 from hfg.nodetype import Node
 from hfg.ports import Relaying
 
-__all__ = ["Subgraph"]
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
+    from hfg.graph.structure.level import Level
+
+__all__ = ["Subgraph", "inside", "is_box", "iterated"]
 
 
 class Subgraph(Node, Relaying):
@@ -43,11 +48,11 @@ class Subgraph(Node, Relaying):
         are those inside (rule G4).
     """
 
-    __slots__ = ("_graph",)
+    __slots__ = ("_level",)
 
     iterate_over: ClassVar[tuple[str, ...]] = ()
 
-    _graph: Graph  # written by the graph it is added to; not there before
+    _level: Level  # what lies inside; written by the graph it is added to (`membership`), not there before
 
     def build(self, graph: Graph) -> None:
         """Add the nodes inside and connect them, also with the inner sides of the subgraph's own ports."""
@@ -59,22 +64,27 @@ class Subgraph(Node, Relaying):
         Raises:
           UsageError: the subgraph was not added to a graph yet.
         """
-        graph: Graph | None = getattr(self, "_graph", None)
-        if graph is None:
+        level = inside(self)
+        if level is None:
             raise UsageError(
                 f'subgraph "{self._type.name}" has no graph yet: build() runs when it is added with graph.add(...)'
             )
-        return graph
+        return level.face
 
-    def _set_parameter(self, name: str, value: Any) -> None:
+    @property
+    def _graph(self) -> Graph:
+        """The same for floors that ask `hasattr` first: before it is built, the attribute is not there."""
+        return self._level.face
+
+    def _set_parameter(self, name: str, value: object) -> None:
         """Set it and every parameter inside that it stands for; all of them, or none if one refuses."""
-        graph: Graph | None = getattr(self, "_graph", None)
-        inside = [] if graph is None else graph._promoted.get(name, [])
+        level = inside(self)
+        standing_for = () if level is None else level.promotions.of(name)
         before = self._parameters.get(name)
         super()._set_parameter(name, value)
         done = []
         try:
-            for port in inside:
+            for port in standing_for:
                 done.append((port, port.value))
                 port.value = value
         except ValueError:
@@ -83,3 +93,21 @@ class Subgraph(Node, Relaying):
                 port.value = old
             self._parameters[name] = before
             raise
+
+
+def is_box(node: object) -> TypeIs[Subgraph]:
+    """Say whether a node is a subgraph."""
+    return isinstance(node, Subgraph)
+
+
+def inside(node: object) -> Level | None:
+    """Give what lies inside a subgraph; None for other nodes, and before it is built."""
+    return getattr(node, "_level", None) if isinstance(node, Subgraph) else None
+
+
+def iterated(node: object) -> tuple[str, ...]:
+    """Give the names of the inputs that a subgraph iterates over (rule G4); none for other nodes."""
+    if not isinstance(node, Subgraph) or node._options is None:
+        return ()
+    names: tuple[str, ...] = node._options.iterate_over
+    return names

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
+from hfg.graph.structure.level import level_of
+
 __all__ = [
     "ROOT",
     "Box",
@@ -253,7 +255,7 @@ class _Dissolving:
         if node is None:
             return
         if getattr(port, "kind", None) == "parameter" and id(node) in self.box_of:
-            for inner in node._graph._promoted.get(port.name, ()):
+            for inner in level_of(node._graph).promotions.of(port.name):
                 for real, entered in self._real(inner):
                     yield real, (self.box_of[id(node)], *entered)
         else:
@@ -299,7 +301,7 @@ class _Dissolving:
         if end.owner >= 0:
             return f"{self.result.leaves[end.owner].path}.{end.name}"
         if end.owner == ROOT:
-            inside = getattr(self.graph, "_owner", None)
+            inside = level_of(self.graph).owner
             return end.name if inside is None else f"{inside.place.path}.{end.name}"
         return f"{self.result.boxes[-2 - end.owner].path}.{end.name}"
 

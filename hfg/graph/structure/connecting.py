@@ -1,99 +1,84 @@
-"""Edges as they were drawn, and every reason to refuse one at once (rules P1-P9, G1, G4).
+"""Connecting: every reason to refuse an edge at once (rules P1-P9, G1, G4), and declaring one that may be.
 
-What only shows once relays are followed from end to end (two edges into one input, a queue on what turns out to be
-synchronous) is found by the check. Stands on ports, types and options; looks at graphs and never changes them.
+What only shows once ports of subgraphs are followed from end to end (two edges into one input, a queue on what turns
+out to be synchronous) is found by the check. Stands on levels, edges, types and options.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Any, Final, NoReturn
 
-import msgspec
 from reactivex import Observable
 
 from hfg import errors
-from hfg.graph.structure.boxes import is_box, iterated
-from hfg.graph.structure.options import EdgeOptions, Overflow
+from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, TargetEnd, end_path, is_port, type_of
+from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.options import PLAIN, EdgeOptions, edge_options
+from hfg.graph.structure.refusals import Refusable
+from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.nodetype import Node
 from hfg.ports import InnerSource, InnerTarget, Port, Source, Target
 from hfg.ports.observable import RunObservable
 from hfg.token import Token
 from hfg.types import accepts, describe, why_not
 
-__all__ = ["Edge", "end_path", "is_feed", "is_single", "refuse", "type_of"]
+__all__ = ["connect", "declare_edge", "refuse"]
 
 _SYNCHRONOUS: Final = ("output", "parameter")
 
 
-class Edge(msgspec.Struct, frozen=True, eq=False):
-    """One edge of one graph, before subgraphs are dissolved.
+def connect(level: Level, source: SourceEnd, target: TargetEnd, said: dict[str, Any]) -> Edge:
+    """Declare an edge; see `Graph.connect`, whose options `said` holds by name.
 
-    Attributes:
-      source: an output, event, parameter or inner side; or a plain reactivex observable, a feed from outside.
-      target: an input, slot, parameter or inner side.
-      options: shared with all edges that have the same.
+    Raises:
+      ConnectionError: the edge cannot be; nothing was changed.
     """
-
-    source: Any
-    target: Any
-    options: EdgeOptions
-
-    @property
-    def active(self) -> bool:
-        """A(e) of the paper: whether it also transports activity."""
-        return self.options.active
-
-    @property
-    def capacity(self) -> int:
-        """How many untaken signals its queue holds; for event edges."""
-        return self.options.capacity
-
-    @property
-    def overflow(self) -> Overflow:
-        """What happens to more of them."""
-        return self.options.overflow
-
-    @property
-    def label(self) -> str:
-        """Its ends, "a.out -> b.in"."""
-        return f"{end_path(self.source)} -> {end_path(self.target)}"
-
-    def __repr__(self) -> str:
-        return f"<{'active edge' if self.active else 'edge'} {self.label}>"
+    edge: Edge | None = None
+    with Refusable(source, target):
+        edge = declare_edge(_level_for(level, source, target), source, target, said)
+    return Edge(source, target, PLAIN) if edge is None else edge  # something to go on with, where refusals are kept
 
 
-def end_path(end: Any) -> str:
-    """Give the path of a port; an observable from outside has none."""
-    path = getattr(end, "path", None) if isinstance(end, Source | Target) else None
-    return path if isinstance(path, str) else "observable"
+def _level_for(level: Level, source: SourceEnd, target: TargetEnd) -> Level:
+    """Give the level to which an edge belongs.
 
-
-def is_feed(end: object) -> bool:
-    """Whether it is a plain observable, which feeds from outside; an event is one too, but a port."""
-    return not isinstance(end, Source | Target)
-
-
-def is_single(target: Any) -> bool:
-    """Whether at most one edge may lead into it (rule P2): inputs and parameters.
-
-    A subgraph's output seen from inside is a relay, at which streams may converge on their way into a slot (rule G1);
-    that no input gets two edges so is seen by the check. What iterates makes one list of each output (rule G4).
+    `graph.start.activates(...)` inside a subgraph asks the whole graph, whose port it is: the edge belongs where its
+    node is (rule A10).
     """
-    return target.kind in ("input", "parameter") or (target.kind == "output" and bool(iterated(target.node)))
+    if source is not level.ports.start:
+        return level
+    home = getattr(target, "graph", None)
+    if home is None or home is level.face or level_of(home).whole is not level.whole:
+        return level
+    return level_of(home)
 
 
-def refuse(graph: Any, source: Any, target: Any, options: EdgeOptions) -> None:
+def declare_edge(level: Level, source: SourceEnd, target: TargetEnd, said: dict[str, Any]) -> Edge:
+    """Add an edge that may be to a level.
+
+    Raises:
+      ConnectionError: it cannot be; nothing was changed.
+    """
+    level.need_rest("connecting")
+    options = edge_options(lambda: f'"{end_path(source)}" -> "{end_path(target)}"', said)
+    refuse(level, source, target, options)
+    level.connections.refuse_second(source, target)
+    edge = Edge(source, target, options)
+    level.connections.append(edge)
+    return edge
+
+
+def refuse(level: Level, source: SourceEnd, target: TargetEnd, options: EdgeOptions) -> None:
     """Raise if the edge cannot be; changes nothing.
 
     Raises:
       ConnectionError: naming both ends, what was expected and found, and what to do.
     """
     _need_ends(source, target)
-    if not is_feed(source):
-        _need_membership(graph, source, target)
-    _need_membership(graph, target, source)
-    if not is_feed(source):
+    if is_port(source):
+        _need_membership(level, source, target)
+    _need_membership(level, target, source)
+    if is_port(source):
         _need_types(source, target)
     if options.active or options.for_events:
         _need_right_options(source, target, options)
@@ -108,7 +93,7 @@ def refuse(graph: Any, source: Any, target: Any, options: EdgeOptions) -> None:
 # --- ends ---
 
 
-def _need_ends(source: Any, target: Any) -> None:
+def _need_ends(source: SourceEnd, target: TargetEnd) -> None:
     if not isinstance(source, Source) and not isinstance(source, Observable):
         _wrong_end(
             source,
@@ -120,7 +105,7 @@ def _need_ends(source: Any, target: Any) -> None:
         _wrong_end(target, "target", "an input, slot or parameter", swap=False)
 
 
-def _wrong_end(found: Any, role: str, expected: str, *, swap: bool) -> NoReturn:
+def _wrong_end(found: object, role: str, expected: str, *, swap: bool) -> NoReturn:
     if isinstance(found, Port | InnerSource | InnerTarget):
         what = (
             f'"{found.path}", which is an {found.kind}'
@@ -149,45 +134,51 @@ def _wrong_end(found: Any, role: str, expected: str, *, swap: bool) -> NoReturn:
     raise errors.ConnectionError(f"the {role} of an edge must be {expected}, got {what}; {remedy}")
 
 
-def _need_membership(graph: Any, end: Any, other: Any) -> None:
-    home: Any = end.graph
-    path: str = end.path
-    if isinstance(end, InnerSource | InnerTarget):
-        if home is graph:
-            return
-        if end.outer.node.place.graph is graph:
-            raise errors.ConnectionError(
-                f'"{path}" is the side inside the subgraph and cannot be connected outside of it; '
-                f'use "{end.outer.path}", or connect in build()'
-            )
-        raise errors.ConnectionError(
-            f'"{path}" belongs to {home._title}, not to {graph._title}; connect it there, in build()'
-        )
-    if home is graph:
+def _need_membership(level: Level, end: PortEnd, other: SourceEnd | TargetEnd) -> None:
+    """Refuse an end that does not belong to the level; `other` is the other end."""
+    home = end.graph
+    if home is level.face:
         return
+    if isinstance(end, InnerSource | InnerTarget):
+        raise _inner_side_elsewhere(level, end)
     if home is None:
         raise errors.ConnectionError(
-            f'"{path}" belongs to no graph: add its node to {graph._title} with graph.add(...) before connecting '
+            f'"{end.path}" belongs to no graph: add its node to {level.title} with graph.add(...) before connecting '
             f'"{end_path(other)}"'
         )
-    if any(end is port for port in (graph.start, graph.stop, graph.abort)):
-        return  # the whole graph's, wherever it is named (rule A10)
-    if graph._owner is not None and end.node is graph._owner:
-        raise errors.ConnectionError(
-            f'"{path}" is the side outside the subgraph and cannot be connected in its own graph; '
+    if not level.ports.has(end):
+        raise _port_elsewhere(level, end)
+
+
+def _inner_side_elsewhere(level: Level, end: InnerSource[Any] | InnerTarget[Any]) -> errors.ConnectionError:
+    if end.outer.node.place.graph is level.face:
+        return errors.ConnectionError(
+            f'"{end.path}" is the side inside the subgraph and cannot be connected outside of it; '
+            f'use "{end.outer.path}", or connect in build()'
+        )
+    return errors.ConnectionError(
+        f'"{end.path}" belongs to {level_of(end.graph).title}, not to {level.title}; connect it there, in build()'
+    )
+
+
+def _port_elsewhere(level: Level, end: Port) -> errors.ConnectionError:
+    if level.owner is not None and end.node is level.owner:
+        return errors.ConnectionError(
+            f'"{end.path}" is the side outside the subgraph and cannot be connected in its own graph; '
             + (
                 f"use graph.promote(self.{end.name}, node.ports.parameters[...])"
                 if end.kind == "parameter"
-                else f'use "{path}.inner"'
+                else f'use "{end.path}.inner"'
             )
         )
-    if home._root is not graph._root:
-        raise errors.ConnectionError(
-            f'"{path}" belongs to {home._title}, not to {graph._title}; '
+    home = level_of(end.graph)
+    if home.whole is not level.whole:
+        return errors.ConnectionError(
+            f'"{end.path}" belongs to {home.title}, not to {level.title}; '
             "an edge stays in one graph: add both nodes to the same, or link two runs"
         )
-    raise errors.ConnectionError(
-        f'"{path}" belongs to {home._title}, not to {graph._title}; '
+    return errors.ConnectionError(
+        f'"{end.path}" belongs to {home.title}, not to {level.title}; '
         "connect it there, or lead it over the border with a port of the subgraph and its .inner"
     )
 
@@ -195,17 +186,7 @@ def _need_membership(graph: Any, end: Any, other: Any) -> None:
 # --- types ---
 
 
-def type_of(end: Any) -> Any:
-    """Give the type that an edge meets; outside what iterates, collections of what is declared (rule G4)."""
-    names = iterated(end.node)
-    if not names or isinstance(end, InnerSource | InnerTarget):
-        return end.type
-    if end.kind == "input":
-        return Collection[end.type] if end.name in names else end.type
-    return list[end.type] if end.kind == "output" else end.type
-
-
-def _need_types(source: Any, target: Any) -> None:
+def _need_types(source: PortEnd, target: TargetEnd) -> None:
     sent, taken = type_of(source), type_of(target)
     reason = why_not(sent, taken)
     if reason is None:
@@ -220,7 +201,7 @@ def _need_types(source: Any, target: Any) -> None:
 # --- options ---
 
 
-def _need_right_options(source: Any, target: Any, options: EdgeOptions) -> None:
+def _need_right_options(source: SourceEnd, target: TargetEnd, options: EdgeOptions) -> None:
     said = options.for_events
     between = f'"{end_path(source)}" -> "{target.path}"'
     if options.active:
@@ -234,7 +215,7 @@ def _need_right_options(source: Any, target: Any, options: EdgeOptions) -> None:
                 f"{between}: operators may hold or drop signals, so the edge cannot be active; "
                 "leave out active=True, or the operators (rule P9)"
             )
-    if said is not None and getattr(source, "kind", None) in _SYNCHRONOUS and not isinstance(source, InnerSource):
+    if said is not None and isinstance(source, Port) and source.kind in _SYNCHRONOUS:
         raise errors.ConnectionError(
             f"{between}: {said} is for edges from events, "
             f'"{source.path}" is {"an output" if source.kind == "output" else "a parameter"}, '
@@ -242,7 +223,7 @@ def _need_right_options(source: Any, target: Any, options: EdgeOptions) -> None:
         )
 
 
-def _need_initial(source: Any, target: Any, initial: tuple[Any, ...]) -> None:
+def _need_initial(source: SourceEnd, target: TargetEnd, initial: tuple[Any, ...]) -> None:
     between = f'"{end_path(source)}" -> "{target.path}"'
     # Where a relay leads is for the check to see.
     is_relay = is_box(target.node) and target.name in target.node._type.slots
@@ -272,7 +253,7 @@ def _need_initial(source: Any, target: Any, initial: tuple[Any, ...]) -> None:
 # --- subgraphs ---
 
 
-def _need_same_manner(source: Any, target: Any) -> None:
+def _need_same_manner(source: SourceEnd, target: TargetEnd) -> None:
     """Refuse to change between synchronous and asynchronous at the border.
 
     Else the queue that an event has outside would belong to a synchronous edge.
@@ -287,18 +268,18 @@ def _need_same_manner(source: Any, target: Any) -> None:
     )
 
 
-def _need_passable(source: Any, target: Any, options: EdgeOptions) -> None:
+def _need_passable(source: SourceEnd, target: TargetEnd, options: EdgeOptions) -> None:
     """Rule G4: what iterates takes collections in and gives lists out, and nothing else crosses its border."""
     between = f'"{end_path(source)}" -> "{target.path}"'
     for end in (source, target):
-        owner = getattr(end, "node", None)
         # Inside nothing is refused: a relay without an edge on the other side is no edge at all (rule G1).
-        if not is_box(owner) or not iterated(owner) or isinstance(end, InnerSource | InnerTarget):
+        if not isinstance(end, Port) or not iterated(end.node):
             continue
-        names = {"slot": owner._type.slots, "event": owner._type.events}.get(end.kind, ())
+        kind = end.node._type
+        names = {"slot": kind.slots, "event": kind.events}.get(end.kind, ())
         if end.name in names:
             raise errors.ConnectionError(
-                f'{between}: "{owner._place.path}" iterates, so signals cannot cross its border; '
+                f'{between}: "{end.node.place.path}" iterates, so signals cannot cross its border; '
                 "use inputs and outputs, or take iterate_over out (rule G4)"
             )
     if not iterated(target.node) or isinstance(target, InnerTarget) or target.kind == "slot":

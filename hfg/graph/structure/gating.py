@@ -1,0 +1,47 @@
+"""Setting a gate, and every reason to refuse one (rule A11). Stands on levels."""
+
+from __future__ import annotations
+
+from hfg.errors import GraphError
+from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.level import Level
+from hfg.graph.structure.naming import path_of
+from hfg.graph.structure.refusals import Refusable
+from hfg.nodetype import Node
+
+__all__ = ["refuse_gate", "set_gate"]
+
+
+def set_gate(level: Level, gate: Gate) -> None:
+    """Couple the work of a node to the activity of another.
+
+    Raises:
+      GraphError: it cannot be; nothing was changed.
+    """
+    level.need_rest("gating")
+    with Refusable(gate.target):
+        refuse_gate(level, gate)
+        level.gates.append(gate)
+
+
+def refuse_gate(level: Level, gate: Gate) -> None:
+    """Raise if the gate cannot be; changes nothing.
+
+    Raises:
+      GraphError: what is given is no node of this graph, or is gated already; or the rate is none.
+    """
+    for node in (gate.target, gate.by):
+        if not isinstance(node, Node):
+            raise GraphError(
+                f"a gate couples nodes, got {node!r}; give the node itself, as in graph.gate(detector, by=fetch)"
+            )
+        if not level.holds(node):
+            raise GraphError(
+                f'a gate couples nodes of one graph, but "{path_of(node)}" is not in {level.title}; add it first'
+            )
+    name, rate = path_of(gate.target), gate.idle_rate_hz
+    if gate.target in level.whole.gated:
+        raise GraphError(f'"{name}" has a gate already; put what both gates mean into one state node or subgraph')
+    is_number = isinstance(rate, int | float) and type(rate) is not bool
+    if rate is not None and not (is_number and rate > 0):
+        raise GraphError(f'the gate of "{name}": idle_rate_hz must be a number above 0, or None to rest, got {rate!r}')

@@ -1,0 +1,168 @@
+"""One level of a graph: what lies directly in the whole, or directly inside one subgraph, with its own invariants.
+
+`Graph`, which users hold, is the face of a level; everything below the face works on levels. Nothing is checked here:
+who adds, connects or edits has done that. Stands on the tables of members, connections, gates and promotions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Protocol
+
+from hfg.errors import UsageError
+from hfg.graph.structure.boundary import Boundary
+from hfg.graph.structure.connections import Connections
+from hfg.graph.structure.gates import Gates
+from hfg.graph.structure.members import Members
+from hfg.graph.structure.naming import path_of
+from hfg.graph.structure.promotions import Promotions
+from hfg.graph.structure.subgraph import Subgraph, inside
+from hfg.graph.structure.whole import Whole
+from hfg.nodetype import Node
+
+if TYPE_CHECKING:
+    from hfg.graph.graph import Graph
+
+__all__ = ["HasLevel", "Level", "level_of", "nodes_within"]
+
+
+class HasLevel(Protocol):
+    """A graph, seen from below its face."""
+
+    @property
+    def _level(self) -> Level: ...
+
+
+def level_of(graph: HasLevel) -> Level:
+    """Give what is behind the face of a graph."""
+    return graph._level
+
+
+class Level:
+    """The structure of one graph.
+
+    Attributes:
+      name: for people; that of the whole.
+      whole: what all levels of one graph share.
+      owner: the subgraph whose inside this is; None at the root.
+      face: the graph that users hold; nodes and ports say it when they are asked where they are.
+      nodes: by name, in order of adding; written by `members`.
+      edges: in order of connecting; written by `connections`.
+      members: the table behind `nodes`; `connections`, `gates` and `promotions` are the others.
+      ports: those of the whole graph, as far as they are seen here.
+    """
+
+    __slots__ = (
+        "connections",
+        "edges",
+        "face",
+        "gates",
+        "members",
+        "name",
+        "nodes",
+        "owner",
+        "ports",
+        "promotions",
+        "whole",
+    )
+
+    def __init__(self, name: str, whole: Whole, *, face: Graph | None = None, owner: Subgraph | None = None) -> None:
+        """Begin empty: at the root behind a face that there is already, inside a subgraph with a new one."""
+        self.name = name
+        self.whole = whole
+        self.owner = owner
+        self.face = whole.make_face(self) if face is None else face
+        if owner is None:
+            whole.root = self
+            self.ports = Boundary(self.face)
+        else:
+            self.ports = whole.root.ports.for_inside()
+        self.members = Members()
+        self.connections = Connections()
+        self.gates = Gates(whole.gated)
+        self.promotions = Promotions()
+        self.nodes, self.edges = self.members.nodes, self.connections.edges
+
+    def make_inside(self, owner: Subgraph) -> Level:
+        """Make the empty inside of a subgraph that is to lie at this level."""
+        return Level(self.name, self.whole, owner=owner)
+
+    # --- where it is ---
+
+    @property
+    def path(self) -> str:
+        """That of the subgraph whose inside this is; "" at the root."""
+        return "" if self.owner is None else path_of(self.owner)
+
+    @property
+    def title(self) -> str:
+        """What messages call it."""
+        return f'graph "{self.name}"' if self.owner is None else f'the graph inside "{self.path}"'
+
+    @property
+    def around(self) -> Level | None:
+        """The level in which the subgraph lies whose inside this is, if it lies in any."""
+        if self.owner is None or self.owner._place is None:
+            return None
+        return level_of(self.owner._place.graph)
+
+    @property
+    def depth(self) -> int:
+        """How many subgraphs lie around it."""
+        depth, around = 0, self.around
+        while around is not None:
+            depth, around = depth + 1, around.around
+        return depth
+
+    def path_to(self, name: str) -> str:
+        """Give the path of a node of this name here."""
+        return name if self.owner is None else f"{self.path}/{name}"
+
+    def holds(self, node: Node) -> bool:
+        """Say whether a node lies anywhere in the same whole graph."""
+        return node._place is not None and level_of(node._place.graph).whole is self.whole
+
+    def walk(self) -> list[Level]:
+        """Give this level and all inside it, the outer ones first."""
+        found = [self]
+        for level in found:  # grows while it is walked through, which is the point: no recursion at any depth
+            found += [one for node in level.nodes.values() if (one := inside(node)) is not None]
+        return found
+
+    # --- by whom it is changed ---
+
+    def need_rest(self, doing: str) -> None:
+        """Refuse to change the structure under a run, which would not hear of it; and note that it was by hand.
+
+        Raises:
+          UsageError: the graph runs, and no commands are being carried out.
+        """
+        whole = self.whole
+        if whole.takes_commands:
+            return
+        if whole.run is not None:
+            raise UsageError(
+                f"{self.title} runs, so {doing} by hand is refused: use commands, which the run follows, as in "
+                "await run.edit(hfg.commands.Connect(...)), or stop the run first"
+            )
+        whole.history.changed_by_hand()
+
+    def check_invariants(self) -> None:
+        """Fail if the tables contradict each other; for tests."""
+        self.connections.check_invariants()
+        for name, node in self.nodes.items():
+            assert node._place is not None
+            assert (node._place.graph, node._place.path) == (self.face, self.path_to(name))
+        if self.owner is None:
+            assert self.whole.gated == {gate.target for level in self.walk() for gate in level.gates}
+
+
+def nodes_within(node: Node) -> Iterator[Node]:
+    """Give a node and all inside it."""
+    waiting = [node]
+    while waiting:
+        one = waiting.pop()
+        yield one
+        level = inside(one)
+        if level is not None:
+            waiting += reversed(level.nodes.values())
