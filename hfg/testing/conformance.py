@@ -321,6 +321,8 @@ class Replay:
                 return move
             if move.kind == "grow" and isinstance(event, QueueGrown) and move.edge == event.edge:
                 return move
+            if move.kind == "give up" and isinstance(event, TokenDrained):
+                return move
             if move.kind == "complete" or (
                 move.kind == "end events" and isinstance(event, TokenSent) and event.token.value is END
             ):

@@ -773,3 +773,42 @@ def test_until_ends_the_run_at_its_time() -> None:
     report = reference_run(graph, until_s=1.2)
     assert (report.outcome, report.events[-1].time) == ("until", 1.2)
     assert report.values("script.out -> sink.value") == [1, 2, 3]
+
+
+class EachPlus(hfg.Subgraph):
+    items = hfg.Input(int)
+    results = hfg.Output(int)
+    iterate_over = ("items",)
+
+    def build(self, graph: hfg.Graph) -> None:
+        self.items.inner >> graph.add(double()) >> self.results.inner
+
+
+class EachOfEach(hfg.Subgraph):
+    items = hfg.Input(list[int])
+    results = hfg.Output(list[int])
+    iterate_over = ("items",)
+
+    def build(self, graph: hfg.Graph) -> None:
+        self.items.inner >> graph.add(EachPlus()) >> self.results.inner
+
+
+@hfg.node
+def lists_of_lists() -> Iterator[list[list[int]]]:
+    yield from ([[1, 2], []], [], [[3]])
+
+
+@hfg.node
+def show_all(value: list[list[int]]) -> None:
+    """Take it."""
+
+
+@pytest.mark.rule("G3", "G4")
+def test_what_iterates_may_hold_what_iterates() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.add(lists_of_lists()) >> graph.add(EachOfEach()) >> graph.add(show_all())
+        return graph
+
+    found = every_schedule(build, lambda report: report.values("each_of_each.results -> show_all.value"))
+    assert found == [[[2, 4], []], [], [[6]], END]

@@ -161,7 +161,7 @@ class Calling(Firing):
     def set_up(self, station: Station) -> None:
         """Make the node as new: state, generator, not ended."""
         station.iterator = None
-        station.ending = station.ended = station.stops_itself = False
+        station.ending = station.ended = station.given_up = station.stops_itself = False
         station.unready = False
         station.set_up = True
         if station.leaf.inside is None:

@@ -264,7 +264,7 @@ class Firing(RunningCode):
         station = flight.station
         index = station.leaf.index
         if not flight.void and (outcome != "ended" or flight.writes):
-            self.send(index, self.shipments(flight, silent=outcome not in ("done", "ended")), flight)
+            self.send(index, self.shipments(flight, outcome), flight)
         if outcome == "done":
             station.changes.append((self.next_tick(), "processed", None))
         if failure is not None:
@@ -295,8 +295,8 @@ class Firing(RunningCode):
         """Teardown, setup, not ended."""
         raise NotImplementedError
 
-    def shipments(self, flight: Flight, *, silent: bool) -> list[tuple[Line, Any, int | None, float]]:
-        """One token for every edge of every output (F3); parameters send theirs unless the firing is silent (P8)."""
+    def shipments(self, flight: Flight, outcome: str) -> list[tuple[Line, Any, int | None, float]]:
+        """One token for every edge of every output (F3); parameters send theirs in firings of the function (P8, F4)."""
         station = flight.station
         shipments: list[tuple[Line, Any, int | None, float]] = []
         for line in self.in_order_of_outputs(station):
@@ -304,9 +304,9 @@ class Firing(RunningCode):
             value: Any = NO_MESSAGE
             activity: int | None = None
             stamp: float | None = None
-            if source.kind == "parameter" and not silent:
+            if source.kind == "parameter" and outcome == "done":
                 value = station.node._parameters[source.name]
-            elif source.kind == "output" and not silent and source.name in flight.writes:
+            elif source.kind == "output" and outcome in ("done", "ended") and source.name in flight.writes:
                 value, activity, stamp = flight.writes[source.name]
             if isinstance(value, Token):  # A4
                 activity = value.activity if activity is None else activity

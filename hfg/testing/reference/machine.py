@@ -8,13 +8,13 @@ follow from quiet alone are the moves: time goes on (R6), a queue grows (F8), op
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Collection, Set
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from hfg.errors import QueueLimit, Stalled
 from hfg.testing.reference.edits import Editing
-from hfg.testing.reference.state import Line
+from hfg.testing.reference.state import Line, Station
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
 from hfg.token import END, NO_MESSAGE, Token
@@ -24,7 +24,6 @@ from hfg.trace import (
     RunEnded,
     RunStarted,
     TokenDropped,
-    TokenProcessed,
     TokenTaken,
     TraceEvent,
 )
@@ -40,7 +39,7 @@ class Move:
       kind: "fire" node; "call" a slot of node with the token of `edge`; "go on" with the firing or call of node;
         "time out" the firing of node (X2); "timer": what a timer of node, or the operators of `edge`, waited for;
         "feed" the graph's input `edge`, "read" the output at the end of `edge` (P10); "wait" until `time`;
-        "grow" the queue of `edge`; "complete" operators; "end events"; "finish" the run.
+        "grow" the queue of `edge`; "give up" sources; "complete" operators; "end events"; "finish" the run.
       outcome: of "finish".
     """
 
@@ -54,6 +53,7 @@ class Move:
         "read",
         "wait",
         "grow",
+        "give up",
         "complete",
         "end events",
         "finish",
@@ -75,7 +75,7 @@ class Move:
                 return f"{self.kind} {self.edge}"
             case "call":
                 return f'call a slot of "{self.node}" over {self.edge}'
-            case "complete" | "end events":
+            case "give up" | "complete" | "end events":
                 return self.kind
         return f'{self.kind} "{self.node}"'
 
@@ -102,15 +102,16 @@ class ReferenceMachine(Editing):
         self.labels = {line.edge.label: line for line in self.lines}
 
     def start(self) -> list[TraceEvent]:
-        """Set up all nodes, lay the initial tokens, trigger `start` (A10)."""
+        """Lay the initial tokens, set up all nodes, trigger `start` (A10)."""
         self.connect_ports()
-        self.make_operators()
-        for station in self.stations:
-            self.set_up(station)
         for line in self.lines:
             for value in line.edge.initial:
                 self.lay(line, value)
+        self.make_operators()
+        for station in self.stations:
+            self.set_up(station)
         self.observe(RunStarted(self.now))
+        self.started = True
         self.trigger(ROOT, "start", activity=1)
         self.settle()
         return self.observed_since(0)
@@ -133,7 +134,7 @@ class ReferenceMachine(Editing):
             return []
         working = self.working_moves()
         moot = self.moot_sources()
-        if any(move.node not in {self.stations[index].path for index in moot} for move in working):
+        if any(self.is_owed(move, moot) for move in working):
             return working
         # Those who work for ended nodes only may go on, but neither time nor the end waits for them (R5).
         found = working + self.quiet_moves(moot)
@@ -147,11 +148,22 @@ class ReferenceMachine(Editing):
         if self.outcome is not None:
             return []
         moot = self.moot_sources()
-        idle = {self.stations[index].path for index in moot}
-        return [move for move in self.working_moves() if move.node not in idle] or self.quiet_moves(moot)
+        return [move for move in self.working_moves() if self.is_owed(move, moot)] or self.quiet_moves(moot)
 
-    def working_moves(self, without: int | None = None) -> list[Move]:
-        """Firings, calls, and what goes on in those under way."""
+    def is_owed(self, move: Move, moot: Set[int]) -> bool:
+        """Whether others wait for it: not for a firing of a source for ended nodes, whose slots go on, though (R5)."""
+        index = self.paths.get(move.node, ROOT)
+        if index not in moot:
+            return True
+        return move.kind == "call" or (move.kind == "go on" and self.is_calling(index))
+
+    def is_calling(self, index: int) -> bool:
+        """Whether a slot call of the node is under way."""
+        flight = self.stations[index].flight
+        return flight is not None and flight.what == "call"
+
+    def working_moves(self, only: Collection[int] | None = None) -> list[Move]:
+        """Firings, calls, and what goes on in those under way; of all nodes, or `only` of some."""
         found = [Move("feed", edge=name) for name, values in self.feeding.items() if values and self.can_feed(name)]
         found += self.timers_due()
         found += [Move("read", edge=line.edge.label) for line in self.lines if line.queue and self.is_read(line)]
@@ -160,9 +172,11 @@ class ReferenceMachine(Editing):
             if line is not None and not self.full_lines(owner):
                 found.append(Move("call", self.path_of(owner), line.edge.label))
         for index, station in enumerate(self.stations):
+            if only is not None and index not in only:
+                continue
             flight = station.flight
             if flight is not None:
-                if index != without and self.can_go_on(flight):
+                if self.can_go_on(flight):
                     found.append(Move("go on", station.path))
                 limit = station.leaf.options.max_duration_s
                 if (
@@ -190,12 +204,12 @@ class ReferenceMachine(Editing):
 
     def is_quiet_inside(self, index: int) -> bool:
         """Whether nothing moves inside an iterating subgraph (G4)."""
-        inside = {number for number, station in enumerate(self.stations) if station.leaf.within == index}
+        inside = {number for number in range(len(self.stations)) if self.is_inside(number, index)}
         paths = {self.stations[number].path for number in inside}
         paths |= {box.path for box in self.structure.boxes if inside & set(box.members)}
-        for move in self.working_moves(without=index):
+        for move in self.working_moves(inside):
             line = self.labels.get(move.edge)
-            if move.node in paths or (line is not None and line.edge.within == index):
+            if move.node in paths or (line is not None and line.edge.within in (index, *inside)):
                 return False
         return not any(
             self.stations[number].flight is not None
@@ -203,6 +217,11 @@ class ReferenceMachine(Editing):
             or self.may_fire(number, ignore="queues")
             for number in inside
         )
+
+    def is_inside(self, index: int, around: int) -> bool:
+        """Whether a node belongs to what iterates, directly or inside another one that does (G3, G4)."""
+        within = self.stations[index].leaf.within
+        return within is not None and (within == around or self.is_inside(within, around))
 
     def next_of(self, index: int) -> Move | None:
         """F9: of a node's calls and its firing, the one with the oldest place."""
@@ -242,11 +261,19 @@ class ReferenceMachine(Editing):
         line = self.queue_to_grow()
         if line is not None:
             return [Move("grow", edge=line.edge.label)]
-        busy = any(station.flight is not None for index, station in enumerate(self.stations) if index not in moot)
+        busy = any(
+            station.flight is not None and (index not in moot or self.is_calling(index))
+            for index, station in enumerate(self.stations)
+        )
         return [] if busy or self.held_open else [self.closing_move()]
 
     def closing_move(self) -> Move:
-        """What is next when only the end is left: operators give out what they hold (P9), events end (F13), then R5."""
+        """What is next when only the end is left.
+
+        Sources for ended nodes are given up (R5), operators give out what they hold (P9), events end (F13), then R5.
+        """
+        if self.sources_to_give_up():
+            return Move("give up")
         if any(line.operators is not None and not line.completed for line in self.lines):
             return Move("complete")
         if self.events_to_end():
@@ -255,7 +282,7 @@ class ReferenceMachine(Editing):
 
     def next_timer(self, without: Set[int] = frozenset()) -> float | None:
         """The next moment at which something could start: rate, gate, back-off, time-out, operator, waiting code."""
-        ignored = {id(self.stations[index].flight) for index in without}
+        ignored = {id(self.stations[index].flight) for index in without if not self.is_calling(index)}
         times: list[float | None] = [self.loop.next_time(ignored)]
         for index, station in enumerate(self.stations):
             if index in without:
@@ -319,6 +346,7 @@ class ReferenceMachine(Editing):
     def stalled(self) -> list[str]:
         """R5: sources that have not ended and are blocked, and edges with tokens that can never be taken."""
         found = []
+        moot = self.moot_sources()
         for index, station in enumerate(self.stations):
             resting = self.is_suspended_source(index) or self.is_resting(index)
             if (
@@ -326,32 +354,43 @@ class ReferenceMachine(Editing):
                 and self.is_enabled(index)
                 and not station.ended
                 and not resting
-                and not self.is_moot(index)
+                and index not in moot
             ):
                 found.append(station.path)
         return found + [
             line.edge.label for line in self.lines if line.queue and self.is_enabled(line.edge.target.owner)
         ]
 
-    def is_moot(self, index: int) -> bool:
-        """R5: a source with edges only into ended nodes."""
-        if not self.stations[index].type.is_source:
-            return False
-        lines = [line for line in self.lines if line.edge.source.owner == index]
-        return bool(lines) and all(self._ends_with(line) for line in lines)
-
-    def _ends_with(self, line: Line) -> bool:
-        """Whether what comes on the edge is for an ended node; its slots go on (F12)."""
-        target = line.edge.target.owner
-        return target >= 0 and self.stations[target].ended and line in self.lines_joined(target)
-
     def moot_sources(self) -> set[int]:
-        """Sources that have not ended but have edges only into ended nodes."""
-        return {
+        """R5: sources that have not ended but have edges only into ended nodes, or into others of them."""
+        found: set[int] = set()
+        left = {
             index
             for index, station in enumerate(self.stations)
-            if station.type.is_source and self.is_enabled(index) and not station.ended and self.is_moot(index)
+            if station.type.is_source and self.is_enabled(index) and (station.given_up or not station.ended)
         }
+        while more := {index for index in left - found if self._works_for_nobody(index, found)}:
+            found |= more
+        return found
+
+    def _works_for_nobody(self, index: int, moot: Set[int]) -> bool:
+        lines = [line for line in self.lines if line.edge.source.owner == index]
+        return bool(lines) and all(self._ends_with(line, moot) for line in lines)
+
+    def _ends_with(self, line: Line, moot: Set[int]) -> bool:
+        """Whether what comes on the edge is for a node that has ended or counts so; its slots go on (F12)."""
+        target = line.edge.target.owner
+        if target < 0 or line not in self.lines_joined(target):
+            return False
+        return self.stations[target].ended or target in moot
+
+    def sources_to_give_up(self) -> list[Station]:
+        """Those for which something waits: it is drained then, and whoever sent it may go on (R5, F12)."""
+        return [
+            self.stations[index]
+            for index in self.moot_sources()
+            if not self.stations[index].given_up and any(line.queue for line in self.lines_joined(index))
+        ]
 
     # --- what happens
 
@@ -386,6 +425,8 @@ class ReferenceMachine(Editing):
                 self.wait_until(move.time)
             case "grow":
                 self.grow(self.labels[move.edge])
+            case "give up":
+                self.give_up()
             case "complete":
                 self.complete_all()
             case "end events":
@@ -467,6 +508,12 @@ class ReferenceMachine(Editing):
         self.observe(QueueGrown(self.now, line.edge.label, line.capacity))
         self.settle()
 
+    def give_up(self) -> None:
+        """R5: they count as ended from now on."""
+        for station in self.sources_to_give_up():
+            station.given_up = station.ending = station.ended = True
+        self.settle()
+
     def complete_all(self) -> None:
         """P9: all events complete before the run ends."""
         for line in self.lines:
@@ -520,8 +567,7 @@ class ReferenceMachine(Editing):
         token = line.queue.pop(0).token
         target = line.edge.target
         self.observe(TokenTaken(self.now, line.edge.label, token))
-        if not line.edge.is_event:
-            self.observe(TokenProcessed(self.now, line.edge.label))
+        self.note_processed(line)
         if not token.is_marker and target.owner == ROOT:
             self.collected.setdefault(target.name, []).append(token.value)
         elif not token.is_marker:

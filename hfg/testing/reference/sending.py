@@ -289,7 +289,7 @@ class Sending(State):
         """Count one taken token as processed."""
         if not line.delay and line.unprocessed:  # else nobody waits any more, for the node was disabled meanwhile
             line.unprocessed -= 1
-            self.observe(TokenProcessed(self.now, line.edge.label))
+            self.note_processed(line)
 
     def end_once(self) -> bool:
         """END follows on all outputs as soon as they are free (F4); then drained modifiers act (F12)."""
@@ -344,8 +344,8 @@ class Sending(State):
         """Whether a node inside is amid a step of its own, so that the subgraph's activity is not looked at yet."""
         return False
 
-    def is_moot(self, index: int) -> bool:
-        """Whether a source works for ended nodes only (R5)."""
+    def moot_sources(self) -> set[int]:
+        """Sources that work for ended nodes only (R5)."""
         raise NotImplementedError
 
     def note_places(self, *, gated: bool = False) -> None:
@@ -355,6 +355,7 @@ class Sending(State):
           gated: look only at those that a gate is set on.
         """
         behind = {index for gate in self.structure.gates for index in gate.targets}
+        moot = self.moot_sources()
         for station in self.stations:
             if gated and station.leaf.index not in behind:
                 continue
@@ -365,7 +366,7 @@ class Sending(State):
                 station.timed = self.now if self.in_timers else None
             if self.is_next(station) and not self.says_ready(station):  # asked last, and not before its turn
                 station.place, station.unready = None, True
-            station.rested |= station.place is not None and self.is_moot(station.leaf.index)
+            station.rested |= station.place is not None and station.leaf.index in moot
 
     def is_next(self, station: Station) -> bool:
         """Whether a firing is the next thing that the node does (F9)."""

@@ -87,6 +87,7 @@ class Station:
     enabled: bool = True
     ending: bool = False  # `end()` has been called; END is due
     ended: bool = False
+    given_up: bool = False  # by R5: counts as ended, though it has sent no END
     flight: Flight | None = None
     place: int | None = None  # since when it is enabled for a firing (F9)
     timed: float | None = None  # when, if a timer made it so
@@ -140,6 +141,7 @@ class State:
         self.readers: set[str] = set()
         self.outcome: str | None = None
         self.in_timers = False  # whether what happens now happens because time went on
+        self.started = False  # whether the signals of `start` are on their edges (A10)
         self.error: BaseException | None = None
         self.observed: list[TraceEvent] = []
         self.lost_activity = 0
@@ -279,6 +281,8 @@ class State:
         if not self.is_enabled(index) or station.ending or station.ended:
             return False
         if station.type.process_kind == "none" and station.leaf.inside is None:
+            return False
+        if station.type.is_source and not self.started:
             return False
         if not self.has_all_inputs(index) or not self.outputs_are_free(index):
             return False

@@ -1,0 +1,538 @@
+"""Two readings of the rules: the same small graphs for the engine and for the oracle.
+
+What is expected was counted out on paper from the rules alone, before either was asked.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+import reactivex.operators as ops
+
+import hfg
+from hfg import END, NO_MESSAGE
+from hfg.testing import Recorder, recorder, reference_run
+from hfg.testing.nodes import (
+    Doubter,
+    Relay,
+    Scaled,
+    Script,
+    Tally,
+    add,
+    ascript,
+    double,
+    script,
+    sink,
+    slow_double,
+)
+from hfg.trace import FiringStarted, RunEnded, TokenSent
+
+Perform = Callable[..., Recorder]
+
+SEEDS = range(8)
+
+
+def by_engine(graph: hfg.Graph, seed: int) -> Recorder:
+    seen = recorder()
+    try:
+        hfg.run(graph, clock="virtual", policy="random", seed=seed, trace=seen)
+    except hfg.errors.RunError:
+        assert seen.outcome is not None
+    return seen
+
+
+def by_oracle(graph: hfg.Graph, seed: int) -> Recorder:
+    seen = recorder()
+    seen.extend(reference_run(graph, seed=seed, max_moves=5000).events)
+    return seen
+
+
+@pytest.fixture(params=[by_engine, by_oracle], ids=["engine", "oracle"])
+def perform(request: pytest.FixtureRequest) -> Callable[[Callable[[], hfg.Graph], Callable[[Recorder], Any]], Any]:
+    """Give what is read off a run; it must be the same under many schedules."""
+
+    def every_schedule(build: Callable[[], hfg.Graph], read: Callable[[Recorder], Any]) -> Any:
+        found = [read(request.param(build(), seed)) for seed in SEEDS]
+        assert all(one == found[0] for one in found), found
+        return found[0]
+
+    return every_schedule
+
+
+def starts(seen: Recorder, node: str, *, kind: str | None = None) -> list[float]:
+    """When the firings of a node began."""
+    return [
+        round(event.time, 6) for event in seen.of(FiringStarted) if event.node == node and kind in (None, event.kind)
+    ]
+
+
+def signs(seen: Recorder, edge: str) -> list[tuple[Any, int]]:
+    return [(token.value, token.activity) for token in seen.tokens(edge)]
+
+
+# --- P7: a delay ends the wave
+
+
+@pytest.mark.rule("P7")
+@pytest.mark.parametrize(
+    ("initial", "expected"), [((), [0.0, 1.0, 2.0, 3.0]), ((0,), [0.0, 0.0, 1.0, 2.0]), ((0, 0), [0.0, 0.0, 1.0, 2.0])]
+)
+def test_a_delay_ends_a_sequential_wave(perform: Any, initial: tuple[int, ...], expected: list[float]) -> None:
+    """A source, a middle, and behind the delay somebody slow, sequential all of them.
+
+    Without a delay the source waits for all three. With one it waits until no more lies there than there was at first.
+    """
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, middle = graph.add(script(values=(1, 2, 3))), graph.add(double())
+        source >> middle
+        slow = graph.add(slow_double(pause_s=1.0), release="sequential")
+        graph.connect(middle.out, slow.value, initial=initial)
+        return graph
+
+    assert perform(build, lambda seen: starts(seen, "script")) == expected
+
+
+# --- P8: parameters change between firings
+
+
+class Looks(hfg.Node):
+    """Takes a second, and reads its parameter before and after."""
+
+    value = hfg.Input(int)
+    seen = hfg.Output(tuple[int, int])
+    gain = hfg.Parameter(1)
+
+    async def process(self, value: int) -> tuple[int, int]:
+        before = self.gain
+        await asyncio.sleep(1.0)
+        return before, self.gain
+
+
+class Once(hfg.Node):
+    """Triggers its event after half a second, once."""
+
+    rung = hfg.Event(int)
+    done = hfg.State(False)
+
+    async def process(self) -> None:
+        if self.done:
+            raise hfg.EndOfStream
+        await asyncio.sleep(0.5)
+        self.done = True
+        self.rung.trigger(7)
+
+
+@hfg.node
+def pairs(value: tuple[int, int]) -> None:
+    """Take them."""
+
+
+def looking() -> hfg.Graph:
+    graph = hfg.Graph()
+    looks = graph.add(Looks())
+    graph.add(script(values=(1, 2))) >> looks.value
+    looks.seen >> graph.add(pairs()).value
+    return graph
+
+
+@pytest.mark.rule("P8")
+def test_a_signal_sets_a_parameter_between_firings_and_no_firing_waits_for_it(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = looking()
+        graph.connect(graph.add(Once()).rung, graph["looks"].ports.parameters["gain"])
+        return graph
+
+    found = perform(build, lambda seen: (seen.values("looks.seen -> pairs.value"), starts(seen, "looks")))
+    assert found == ([(1, 1), (7, 7), END], [0.0, 1.0, 2.0])
+
+
+# --- P9: operators lose nothing, and complete with their node
+
+
+@pytest.mark.rule("P9")
+def test_an_event_completes_when_its_node_has_ended_though_others_go_on(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, tally = graph.add(Script(count=2, every=1)), graph.add(Tally())
+        graph.connect(source.seen, tally.note, through=[ops.buffer_with_count(4), ops.map(len)])
+        graph.add(ascript(values=(1, 2), pause_s=1.0)) >> graph.add(sink())
+        return graph
+
+    def read(seen: Recorder) -> Any:
+        edge = "script.seen -> tally.note"
+        return [(one.time, one.token.value) for one in seen.of(TokenSent) if one.edge == edge], seen[-1].time
+
+    assert perform(build, read) == ([(0.0, 2)], 2.0)
+
+
+class Says(hfg.Node):
+    """A source: 1, 2, 3 ... with the given explicit modifiers; None lets A3 decide."""
+
+    out = hfg.Output(int)
+    signs = hfg.Parameter[tuple[int | None, ...]]((None,))
+    at = hfg.State(0)
+
+    def process(self) -> None:
+        if self.at == len(self.signs):
+            raise hfg.EndOfStream
+        self.at += 1
+        self.out.send(self.at, activity=self.signs[self.at - 1])
+
+
+# --- F4: the last firing
+
+
+class Farewell(hfg.Node):
+    """Has something to say at its end."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    gain = hfg.Parameter(3)
+
+    def process(self, value: int) -> int:
+        return value
+
+    def end(self) -> None:
+        self.out.send(99)
+
+
+@pytest.mark.rule("F4", "P8")
+def test_in_the_firing_of_the_end_parameters_are_silent(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        node = graph.add(Farewell())
+        graph.add(script(values=(1,))) >> node.value
+        graph.connect(node.out, graph.add(sink(), name="values").value)
+        graph.connect(node.ports.parameters["gain"], graph.add(sink(), name="gains").value)
+        return graph
+
+    found = perform(
+        build,
+        lambda seen: (seen.values("farewell.out -> values.value"), seen.values("farewell.gain -> gains.value")),
+    )
+    assert found == ([1, 99, END], [3, NO_MESSAGE, END])
+
+
+@pytest.mark.rule("F4", "A5", "T4")
+@pytest.mark.parametrize(("last_word", "expected"), [(True, [(99, 1), (END, 0)]), (False, [(END, 1)])])
+def test_end_is_a_sending_of_its_own(perform: Any, last_word: bool, expected: list[tuple[Any, int]]) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        node: Any = graph.add(Farewell() if last_word else double(), name="node")
+        graph.add(script(values=())) >> node.value
+        graph.start.activates(node.activate)
+        graph.connect(node.out, graph.add(sink()).value, active=True)
+        return graph
+
+    assert perform(build, lambda seen: signs(seen, "node.out -> sink.value")) == expected
+
+
+# --- A10: the beginning
+
+
+class Early(hfg.Node):
+    """Triggers while it is set up."""
+
+    ready_now = hfg.Event(int)
+
+    def setup(self) -> None:
+        self.ready_now.trigger(1)
+
+
+@pytest.mark.rule("A10", "F9")
+def test_the_signals_of_start_lie_on_their_edges_before_a_source_is_enabled(perform: Any) -> None:
+    """A source that `start` activates is active in its first firing, whatever others do while they are set up."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, early = graph.add(script(values=(1, 2))), graph.add(Early())
+        graph.connect(early.ready_now, graph.add(Tally()).note)
+        graph.start.activates(source.activate)
+        graph.connect(source.out, graph.add(sink()).value, active=True)
+        return graph
+
+    assert perform(build, lambda seen: signs(seen, "script.out -> sink.value")) == [(1, 1), (2, 0), (END, 0)]
+
+
+# --- F12, F13: behind the end
+
+
+class LastWord(hfg.Node):
+    out = hfg.Output(int)
+    at = hfg.State(0)
+
+    def process(self) -> None:
+        self.at += 1
+        if self.at > 1:
+            raise hfg.EndOfStream
+        self.out.send(self.at, activity=0)
+
+    def end(self) -> None:
+        if self.active:
+            self.out.send(99, activity=-1)
+
+
+class Three(hfg.Node):
+    a = hfg.Input(int)
+    b = hfg.Input(int)
+    c = hfg.Input(int)
+
+    def process(self, a: int, b: int, c: int) -> None: ...
+
+
+@pytest.mark.rule("F12", "P5", "A4")
+def test_tokens_are_drained_in_their_order_and_act_in_it(perform: Any) -> None:
+    """Of one edge -1 lies before END, which carries the activity: whoever has ended keeps it."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        first, other, three = (
+            graph.add(LastWord(), name="first"),
+            graph.add(LastWord(), name="other"),
+            graph.add(Three()),
+        )
+        graph.start.activates(first.activate)
+        graph.connect(first.out, three.a)
+        graph.connect(first.out, three.b, active=True, initial=(0,))
+        graph.connect(other.out, three.c)
+        return graph
+
+    found = perform(
+        build,
+        lambda seen: (signs(seen, "first.out -> three.b"), seen.drained("first.out -> three.b"), seen.active_at_end()),
+    )
+    assert found == ([(1, 0), (99, -1), (END, 1)], [99, END], ["three"])
+
+
+class Sometimes(hfg.Node):
+    """Four values; with the first and the third also a signal."""
+
+    out = hfg.Output(int)
+    rung = hfg.Event(int)
+    at = hfg.State(0)
+
+    def process(self) -> None:
+        self.at += 1
+        if self.at > 4:
+            raise hfg.EndOfStream
+        if self.at in (1, 3):
+            self.rung.trigger(self.at)
+        self.out.send(self.at)
+
+
+class Beside(hfg.Node):
+    value = hfg.Input(int)
+    beside = hfg.Input(int, optional=True)
+    both = hfg.Output(tuple[int, int | None])
+
+    def process(self, value: int, beside: int | None) -> tuple[int, int | None]:
+        return value, beside
+
+
+@hfg.node
+def anything(value: object) -> None:
+    """Take it."""
+
+
+@pytest.mark.rule("F13", "F4")
+def test_a_signal_behind_the_end_of_its_edge_is_dropped_and_nobody_waits_for_it(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, beside = graph.add(Sometimes()), graph.add(Beside())
+        graph.connect(source.out, beside.value)
+        graph.connect(source.rung, beside.beside)
+        graph.connect(beside.both, graph.add(anything()).value)
+        return graph
+
+    found = perform(
+        build,
+        lambda seen: (
+            seen.outcome,
+            seen.values("beside.both -> anything.value"),
+            seen.dropped("sometimes.rung -> beside.beside"),
+        ),
+    )
+    assert found == ("done", [(1, 1), (2, None), (3, None), (4, None), END], [3])
+
+
+# --- A4, A5: explicit modifiers
+
+
+@pytest.mark.rule("A4", "A5")
+@pytest.mark.parametrize(
+    ("modifiers", "expected", "left"),
+    [
+        pytest.param((0, None, None), [0, 1, 0, 0], False, id="an explicit 0 holds the activity back"),
+        pytest.param((-1, None), [-1, 1, 0], False, id="an explicit -1 does not"),
+        pytest.param((0, -1, 0), [0, -1, 0, 1], False, id="END carries what was held back"),
+    ],
+)
+def test_explicit_modifiers_of_an_active_sender(perform: Any, modifiers: Any, expected: list[int], left: bool) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source = graph.add(Says(signs=modifiers))
+        graph.start.activates(source.activate)
+        graph.connect(source.out, graph.add(sink()).value, active=True)
+        return graph
+
+    found = perform(build, lambda seen: [token.activity for token in seen.tokens("says.out -> sink.value")])
+    assert found == expected
+    assert perform(build, lambda seen: "says" in seen.active_at_end()) is left
+
+
+@pytest.mark.rule("A4")
+def test_an_explicit_plus_of_an_inactive_sender_goes_out_and_takes_nothing(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.connect(graph.add(Says(signs=(1, 1))).out, graph.add(sink()).value, active=True)
+        return graph
+
+    found = perform(build, lambda seen: (signs(seen, "says.out -> sink.value"), seen.active_at_end()))
+    assert found == ([(1, 1), (2, 1), (END, 0)], ["sink"])
+
+
+class Forks(hfg.Node):
+    """An explicit +1 on its event, then its output."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    said = hfg.Event(int)
+
+    def process(self, value: int) -> int:
+        self.said.trigger(value, activity=1)
+        return value
+
+
+@pytest.mark.rule("A3", "A4", "A5")
+def test_what_an_explicit_plus_took_may_still_fork_in_the_same_firing(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        forks = graph.add(Forks())
+        graph.add(script(values=(1, 2))) >> forks.value
+        graph.start.activates(forks.activate)
+        graph.connect(forks.said, graph.add(Tally()).note, active=True)
+        graph.connect(forks.out, graph.add(sink()).value, active=True)
+        return graph
+
+    found = perform(
+        build, lambda seen: (signs(seen, "forks.said -> tally.note"), signs(seen, "forks.out -> sink.value"))
+    )
+    assert found == ([(1, 1), (2, 1)], [(1, 1), (2, 0), (END, 0)])
+
+
+# --- R5: sources that work for nobody
+
+
+class Repeats(hfg.Node):
+    """A source without end; whoever is connected to its parameter waits for it."""
+
+    out = hfg.Output(int)
+    value = hfg.Parameter(0)
+
+    def process(self) -> int:
+        return self.value
+
+
+@pytest.mark.rule("R5", "F12")
+@pytest.mark.parametrize("count", [1, 5])
+def test_what_lies_before_a_source_that_is_given_up_is_drained(perform: Any, count: int) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        repeats, total = graph.add(Repeats()), graph.add(add())
+        graph.connect(graph.add(script(values=tuple(range(count)))).out, repeats.ports.parameters["value"])
+        graph.connect(repeats.out, total.a)
+        graph.connect(graph.add(script(values=(1,))).out, total.b)
+        return graph
+
+    assert perform(build, lambda seen: seen.outcome) == "done"
+
+
+@pytest.mark.rule("R5", "F12", "F7")
+def test_who_feeds_a_source_that_is_given_up_and_others_goes_on_for_those(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        repeats, total, source = graph.add(Repeats()), graph.add(add()), graph.add(script(values=tuple(range(9))))
+        graph.connect(source.out, repeats.ports.parameters["value"])
+        graph.connect(source.out, graph.add(sink()).value)
+        graph.connect(repeats.out, total.a)
+        graph.connect(graph.add(script(values=())).out, total.b)
+        return graph
+
+    found = perform(build, lambda seen: (seen.outcome, seen.values("script.out -> sink.value")))
+    assert found == ("done", [0, 1, 2, 3, 4, 5, 6, 7, 8, END])
+
+
+@pytest.mark.rule("R5", "F12")
+def test_the_slots_of_a_source_that_works_for_nobody_go_on(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        hums, total = graph.add(Hums(), max_rate_hz=10.0), graph.add(add())
+        graph.connect(hums.out, total.a)
+        graph.connect(graph.add(script(values=())).out, total.b)
+        graph.connect(graph.add(ascript(values=(1, 2), pause_s=1.0)).out, hums.note)
+        return graph
+
+    assert perform(build, lambda seen: (seen.outcome, seen.calls("hums"))) == ("done", ["note", "note"])
+
+
+class Hums(hfg.Node):
+    """A source without end that may be spoken to."""
+
+    out = hfg.Output(int)
+
+    def process(self) -> int:
+        return 0
+
+    @hfg.slot
+    def note(self, value: int) -> None: ...
+
+
+@pytest.mark.rule("A11", "R5")
+def test_a_resting_source_keeps_nothing_alive_beside_one_that_works_for_nobody(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        total, resting = graph.add(add()), graph.add(Repeats(), name="resting")
+        graph.connect(graph.add(Repeats()).out, total.a)
+        graph.connect(graph.add(script(values=(1, 2))).out, total.b)
+        graph.gate(resting, by=graph.add(Relay()))
+        return graph
+
+    found = perform(build, lambda seen: (seen.of(RunEnded)[-1].outcome, seen.firings("resting"), seen.firings("add")))
+    assert found == ("done", 0, 3)
+
+
+# --- A9
+
+
+@pytest.mark.rule("A9", "A4")
+def test_processed_carries_activity_that_an_explicit_zero_held_back(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, doubter = graph.add(Says(signs=(0,))), graph.add(Doubter())
+        graph.start.activates(source.activate)
+        graph.connect(source.out, graph.add(sink()).value, active=True)
+        graph.connect(source.processed, doubter.hear, active=True)
+        return graph
+
+    found = perform(
+        build, lambda seen: (signs(seen, "says.out -> sink.value"), signs(seen, "says.processed -> doubter.hear"))
+    )
+    assert found == ([(1, 0), (END, 0)], [(None, 1)])
+
+
+@pytest.mark.rule("P8", "P6")
+def test_a_token_sets_a_parameter_as_it_is_taken_also_in_a_silent_firing(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        scaled = graph.add(Scaled())
+        graph.connect(graph.add(script(values=(1, None, 1))).out, scaled.value)
+        graph.connect(graph.add(script(values=(5, 7, None))).out, scaled.ports.parameters["factor"])
+        graph.connect(scaled.out, graph.add(sink()).value)
+        return graph
+
+    assert perform(build, lambda seen: seen.values("scaled.out -> sink.value")) == [5, NO_MESSAGE, 7, END]
