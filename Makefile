@@ -73,5 +73,5 @@ $(READY): pyproject.toml
 	  echo "'$(PYTHON)' cannot make virtual environments, its modules venv or ensurepip are missing; install them (on Debian and Ubuntu the package python3-venv)" >&2; exit 1; }
 	rm -rf $(VENV)
 	"$(PYTHON)" -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,examples,bench]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,examples]'
 	@touch $@

@@ -1,4 +1,4 @@
-"""The drawings in the documentation are those of the graphs they name.
+"""The drawings in README and documentation are those of the graphs they name.
 
 A page names the graph in a comment above the drawing, `<!-- drawing: examples/figures/data.py:figure_2 -->`. With
 HFG_REDRAW=1 in the environment the drawings are written anew instead of compared.
@@ -15,7 +15,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 DRAWING = re.compile(r"<!-- drawing: (?P<target>\S+) -->\n```mermaid\n(?P<text>.*?)```", re.DOTALL)
-PAGES = [page for page in sorted((ROOT / "docs").rglob("*.md")) if DRAWING.search(page.read_text(encoding="utf-8"))]
+WRITTEN = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [page for page in WRITTEN if DRAWING.search(page.read_text(encoding="utf-8"))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
