@@ -7,6 +7,7 @@ The table says which floor a module or package stands on; every import statement
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -161,6 +162,23 @@ def test_imports_between_the_wings_of_the_graph_go_one_way(module: str) -> None:
         is_below = GRAPH_WINGS[other] < GRAPH_WINGS[wing]
         only_names = name == NAMED_FROM_BELOW and (name, line) not in imports
         assert is_below or only_names, f"{module}:{line} imports {name}: {other} stands on {wing} or beside it"
+
+
+@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.graph.")])
+def test_what_a_graph_keeps_on_its_nodes_is_written_in_one_place(module: str) -> None:
+    """A place or options that two modules write are soon two truths; a node's own methods write by `self`."""
+    for one in ast.walk(ast.parse(HFG[module].read_text(encoding="utf-8"))):
+        if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del) and re.match("_[a-z]", one.attr):
+            is_own = isinstance(one.value, ast.Name) and one.value.id == "self"
+            assert is_own or module == "hfg.graph.structure.membership", f"{module}:{one.lineno} writes {one.attr}"
+
+
+def test_a_circle_that_a_function_hides_is_seen(tmp_path: Path) -> None:
+    file = tmp_path / "late.py"
+    file.write_text(
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import hfg.cli\ndef f():\n    import hfg.graph\n"
+    )
+    assert [name for name, _ in imported("hfg.late", file, named=False) if name != "typing"] == ["hfg.graph"]
 
 
 @pytest.mark.parametrize("package", WITHOUT_CIRCLES)

@@ -228,7 +228,7 @@ class Graph:
         through: Iterable[Any] = (),
         initial: Iterable[Any] = (),
     ) -> Edge:
-        """Draw an edge from an output or event to an input or slot; a reactivex observable feeds from outside.
+        """Declare an edge from an output or event to an input or slot; a reactivex observable feeds from outside.
 
         Args:
           source: where it begins.

@@ -26,6 +26,7 @@ def drawn(graph: Graph, *, identity: bool = True) -> dict[str, Any]:
       identity: whether the nodes and ports themselves must be the same, or only what they are called.
     """
     level = level_of(graph)
+    level.check_invariants()
     return {
         "nodes": {
             name: {

@@ -1,7 +1,7 @@
 """Edits of a graph as data: what is to change, by paths and references alone (rule R4).
 
 A command can be logged, sent over a wire and carried out again: `encode` and `decode`. It says what, never how:
-`performing` carries it out on a drawn graph, `editing` undoes it, and a run follows. Stands on errors.
+`performing` carries it out on a graph, `transactions` undoes it, and a run follows. Stands on errors.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Move(Command, frozen=True):
 
 
 class Connect(Command, frozen=True):
-    """Draw an edge, as `graph.connect` does; operators are no data, so an edge with them is connected by hand."""
+    """Declare an edge, as `graph.connect` does; operators are no data, so an edge with them is connected by hand."""
 
     source: str
     target: str

@@ -1,4 +1,4 @@
-"""Carries commands out on a drawn graph: each is checked as if it were written by hand, and noted as changes.
+"""Carries commands out on a graph: each is checked as if it were written by hand, and noted as changes.
 
 All of a transaction or nothing: what is refused leaves the graph as it was. Stands on `commands`, `changes` and
 `enclosing`; a graph that runs is edited the same way, and the run follows.

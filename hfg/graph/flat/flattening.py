@@ -87,7 +87,7 @@ def _collect_nodes(flat: FlatGraph, prefix: str, group: str) -> list[tuple[Level
 
 
 class EdgeFollower:
-    """Follows drawn edges from end to end."""
+    """Follows declared edges from end to end, through the ports of subgraphs, which only forward."""
 
     def __init__(self, flat: FlatGraph, levels: list[tuple[Level, int]]) -> None:
         self.flat = flat
