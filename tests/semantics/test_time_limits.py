@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 from collections.abc import Iterator
 from typing import Any
 
+import anyio
 import pytest
 
 import hfg
@@ -218,6 +220,18 @@ def test_a_teardown_that_does_not_return_is_given_up(fast: bool) -> None:
     assert Life.story == ["+a", "+b", "+c", "-c", "-b", "-a"]
 
 
+class Unending(hfg.Node):
+    """Waits for ever and says when it is cancelled."""
+
+    story = hfg.State(factory=list)
+
+    async def process(self) -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            self.story.append("cancelled")
+
+
 class Lingers(hfg.Node):
     """Its teardown waits for ever, and when it is cancelled says so, or goes on waiting."""
 
@@ -254,6 +268,34 @@ def test_a_teardown_is_cancelled_at_its_limit_and_not_waited_for_again(resists: 
     assert drive(main) == pytest.approx(over)  # who resists has 0.1 s more, and is cancelled once more at the end
     assert [path for path, _ in Lingers.story] == ["b", "a"]
     assert [when for _, when in Lingers.story] == pytest.approx([5.0, 10.1 if resists else 10.0])
+
+
+class Slowly(Unending):
+    """Takes half a second to be torn down."""
+
+    async def teardown(self) -> None:
+        await asyncio.sleep(0.5)
+        self.story.append("torn down")
+
+
+@pytest.mark.rule("X3", "R6")
+@pytest.mark.parametrize("block", [anyio.move_on_after, asyncio.timeout])
+def test_whoever_is_cancelled_around_a_run_waits_for_its_teardown(block: Any) -> None:
+    graph = hfg.Graph()
+    node = graph.add(Slowly())
+
+    async def main() -> float:
+        with contextlib.suppress(TimeoutError):
+            async with contextlib.AsyncExitStack() as stack:
+                if block is asyncio.timeout:
+                    await stack.enter_async_context(block(1))
+                else:
+                    stack.enter_context(block(1))
+                await hfg.run_async(graph)
+        return asyncio.get_running_loop().time()
+
+    assert drive(main) == 1.5
+    assert node.story == ["cancelled", "torn down"]
 
 
 class Driver(hfg.Node):
@@ -314,18 +356,6 @@ def test_a_driver_that_hangs_in_a_thread_keeps_no_motor_of_its_group_running(han
         Driver.gate.set()
     assert len(raised.value.errors) == 1
     assert Motor.off == ["hfg group arm"]
-
-
-class Unending(hfg.Node):
-    """Waits for ever and says when it is cancelled."""
-
-    story = hfg.State(factory=list)
-
-    async def process(self) -> None:
-        try:
-            await asyncio.Event().wait()
-        finally:
-            self.story.append("cancelled")
 
 
 @pytest.mark.rule("X3")

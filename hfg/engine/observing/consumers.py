@@ -16,6 +16,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import anyio
+
 from hfg.errors import UsageError
 from hfg.trace import TraceEvent
 
@@ -267,6 +269,7 @@ class Consumers:
         self._listen(tell)
 
     async def end(self) -> None:
-        """The run is over: those behind a buffer take what lies in it, within a second."""
-        for listener in self._listeners:
-            await listener.end()
+        """The run is over: those behind a buffer take what lies in it, all together within a second."""
+        async with anyio.create_task_group() as ending:
+            for listener in list(self._listeners):
+                ending.start_soon(listener.end)

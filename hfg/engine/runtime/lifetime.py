@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -181,14 +181,17 @@ class Lifetime:
         """
         closing = asyncio.create_task(self._close(), name="hfg ending")
         cancelled: asyncio.CancelledError | None = None
-        while not closing.done():
-            try:
-                await asyncio.shield(closing)
-            except asyncio.CancelledError as error:
-                cancelled = error
-                self._engine.hurry()
-            except Exception:
-                break  # it comes out below
+        try:
+            await asyncio.wait({closing})
+        except asyncio.CancelledError as error:
+            cancelled = error
+            self._engine.hurry()
+            # A scope of anyio's that is cancelled cancels whatever is awaited in it, again and again, which would keep
+            # the loop busy, and a virtual clock from moving on.
+            with anyio.CancelScope(shield=True):
+                while not closing.done():
+                    with suppress(asyncio.CancelledError):
+                        await asyncio.wait({closing})
         if cancelled is not None:
             raise cancelled
         closing.result()
