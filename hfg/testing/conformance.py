@@ -357,6 +357,9 @@ class Replay:
         if isinstance(event, TokenSent | TokenDropped):
             line = self.machine.labels.get(event.edge)
             return None if line is None else self.machine.path_of(line.edge.source.owner)
+        if isinstance(event, TokenProcessed | TokenDrained):  # the first thing to be seen of who ends (F4, F12)
+            line = self.machine.labels.get(event.edge)
+            return None if line is None else self.machine.path_of(line.edge.target.owner)
         return getattr(event, "node", None)
 
     def _apply(self, move: Move) -> None:

@@ -200,6 +200,54 @@ def test_what_lies_before_a_node_that_ends_is_drained_before_the_end_that_is_sen
     replay(graph, trace)
 
 
+class SpeaksAtItsEnd(hfg.Node):
+    """Ends by one input and triggers into the other."""
+
+    a = hfg.Input(int)
+    b = hfg.Input(int)
+    said = hfg.Event(int)
+
+    def process(self, a: int, b: int) -> None:
+        pass
+
+    def end(self) -> None:
+        self.said.trigger(7)
+
+
+@pytest.mark.rule("F12", "P5")
+def test_what_lies_before_a_node_is_drained_before_its_end_hook_speaks() -> None:
+    graph, trace = hfg.Graph(), recorder()
+    node = graph.add(SpeaksAtItsEnd())
+    graph.connect(graph.add(numbers(count=0)).out, node.a)
+    graph.connect(node.said, node.b, initial=(1, 2), capacity=1, overflow="drop_newest")
+    run(graph, trace=trace)
+    assert trace.drained("speaks_at_its_end.said -> speaks_at_its_end.b") == [2, 7]  # there was room again for 7
+    replay(graph, trace)
+
+
+class SlowEnd(hfg.Node):
+    """A source that sees late that it has ended."""
+
+    text = hfg.Parameter(0)
+    out = hfg.Output(int)
+
+    async def process(self) -> None:
+        await asyncio.sleep(1)
+        raise hfg.EndOfStream
+
+
+@pytest.mark.rule("F4", "P8")
+def test_what_a_source_has_taken_for_a_parameter_is_processed_as_it_ends() -> None:
+    graph, trace = hfg.Graph(), recorder()
+    source, slow = graph.add(numbers(count=3)), graph.add(SlowEnd())
+    graph.connect(source.out, slow.ports.parameters["text"])
+    graph.connect(source.out, graph.add(Keep()).value)
+    run(graph, trace=trace)
+    assert trace.taken("numbers.out -> slow_end.text") == [1]
+    assert trace.drained("numbers.out -> slow_end.text") == [2, 3, END]
+    replay(graph, trace)
+
+
 @pytest.mark.rule("F12")
 def test_a_node_says_that_it_has_ended_once() -> None:
     graph = hfg.Graph()

@@ -55,7 +55,8 @@ def drain_left(edges: Sequence[Any]) -> None:
     All of it before any producer hears of that: one whose outputs are free by it may say END at once, and END is behind
     what lies here already (T4, P5).
     """
-    drained = [edge for edge in edges if not (type(edge) is EventEdge and edge.target_kind == "parameter")]
+    joined = [edge for edge in edges if not (type(edge) is EventEdge and edge.target_kind == "parameter")]
+    drained = [edge for edge in joined if edge.untaken]
     for edge in drained:
         worker: Worker = edge.target
         core = worker.core
@@ -68,7 +69,7 @@ def drain_left(edges: Sequence[Any]) -> None:
     for edge in drained:
         if type(edge) is EventEdge:
             freed(edge)
-    release([edge for edge in drained if type(edge) is not EventEdge and edge.held])
+    release([edge for edge in joined if type(edge) is not EventEdge and edge.held], drained=drained)
 
 
 def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:

@@ -163,7 +163,7 @@ def give_up(core: Core) -> bool:
         for edge in source.in_edges:
             core.upstairs.choose_step(edge.source)
     for source in given_up:
-        drain_left(source.in_edges)
+        drain_left([edge for edge in _joined(source) if edge.untaken])  # what it works on is its firing's affair
         modifiers, source.deferred = source.deferred, None
         for modifier in modifiers or ():  # there is no END of its own for which they would wait
             receive(source, (modifier,))

@@ -5,7 +5,7 @@ Stands on `sending`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from hfg.engine.model.worker import Worker
@@ -18,10 +18,14 @@ from hfg.trace import TokenProcessed, TokenTaken, TraceEvent
 __all__ = ["outputs_done", "outputs_free", "release", "take_from_reader"]
 
 
-def release(edges: Sequence[Any]) -> None:
+def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
     """These tokens are processed: free the producers' places, and transitively what waited for them (F5).
 
     Without recursion.
+
+    Args:
+      edges: where they lay.
+      drained: those of the edges whose tokens nobody has taken, which was told already (F12).
     """
     stack: list[Any] = list(reversed(edges))
     while stack:
@@ -31,7 +35,7 @@ def release(edges: Sequence[Any]) -> None:
         edge.held = False
         producer: Worker = edge.source
         core = producer.core
-        if core.trace is not None:
+        if core.trace is not None and edge not in drained:
             core.trace(TokenProcessed(core.now(), edge.label))
         outputs = producer.outputs
         outputs.missing -= 1

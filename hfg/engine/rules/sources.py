@@ -39,9 +39,12 @@ def _for_nobody(sources: Collection[Worker]) -> set[Worker]:
 
 def _feeds_only(source: Worker, given_up: Collection[Worker]) -> bool:
     edges = list(source.all_out_edges())
-    return bool(edges) and all(
-        joins(edge) and (edge.target.blocked & ENDED or edge.target in given_up) for edge in edges
-    )
+    return bool(edges) and all(joins(edge) and (_is_over(edge.target) or edge.target in given_up) for edge in edges)
+
+
+def _is_over(worker: Worker) -> bool:
+    """Whether it has said END, too."""
+    return bool(worker.blocked & ENDED) and worker.deferred is None
 
 
 def joins(edge: Any) -> bool:

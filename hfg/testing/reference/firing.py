@@ -238,6 +238,7 @@ class Firing(RunningCode):
             if not line.edge.is_event:
                 self.process(line)
         flight.taken = []
+        self.settle()  # what lies here is drained and who is free by that has its place, both before `end()` (F12, F9)
         hook = station.node._hook("end") if station.leaf.inside is None else None
         if hook is None:
             self.end_firing(flight, "ended")
