@@ -150,7 +150,7 @@ class Replay:
         lines = self.machine.lines
         events = [line.edge.source for line in lines if line.edge.source.kind == "event"]
         self._connected = {self.machine.event_path(source.owner, source.name) for source in events}
-        self._delays |= {line.edge.label for line in lines if line.delay}  # what is said of one that was removed, too
+        self._delays |= {line.edge.label for line in lines if line.slack}  # what is said of one that was removed, too
 
     def see(self, event: TraceEvent) -> None:
         """Take the next event of the run.
@@ -226,7 +226,7 @@ class Replay:
             return True
         if isinstance(event, EventTriggered):
             return event.event not in self._connected
-        if isinstance(event, TokenProcessed):  # a delay ends the wave: nobody waits, so nobody need be told when
+        if isinstance(event, TokenProcessed):  # a delay or buffer: nobody waits, so nobody is told when
             return event.edge in self._delays
         return isinstance(event, RunPaused | RunResumed)
 

@@ -223,7 +223,11 @@ def of_graph(graph: Any) -> list[Invariant]:
     from hfg.testing.reference.structure import dissolve
 
     edges = dissolve(graph).edges
-    synchronous = [edge.label for edge in edges if not edge.is_event and not edge.initial and edge.target.owner != -1]
+    synchronous = [
+        edge.label
+        for edge in edges
+        if not edge.is_event and not edge.initial and not edge.buffer and edge.target.owner != -1
+    ]
     return [*ALL, one_unprocessed_token(synchronous), activity_is_carried(edge.label for edge in edges if edge.active)]
 
 

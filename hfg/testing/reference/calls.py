@@ -26,6 +26,8 @@ class Calling(Firing):
         self.observe(TokenTaken(self.now, line.edge.label, lying.token))
         if not line.edge.is_event:
             line.unprocessed += 1
+            if self.is_pipelined(line):  # its place is free from now on (F6)
+                self.process(line)
         if is_box(owner) and lying.token.activity == 1:  # it has no activity but that of its nodes (G2)
             self.lose_activity(line.edge.label)
         if owner < 0:
@@ -241,7 +243,7 @@ class Calling(Firing):
     def _empty(self, which: Callable[[Line], bool]) -> None:
         for line in self.lines:
             if which(line):
-                occupied = not line.edge.is_event and not line.delay and bool(line.queue)
+                occupied = line.is_waited_for and bool(line.queue)
                 for lying in list(line.queue):
                     self.discard(line, lying, "disabled")
                 if occupied:

@@ -219,7 +219,7 @@ class Editing(Calling):
                     self.set_active(lying.sender, True, "returned")
                 else:
                     self.lose_activity(line.edge.label)
-        if not line.edge.is_event and (len(line.queue) > line.delay or line.unprocessed):
+        if not line.edge.is_event and line.under_way > line.slack:
             self.observe(TokenProcessed(self.now, line.edge.label))
         line.queue.clear()
         for station in self.stations:
@@ -289,6 +289,9 @@ class Editing(Calling):
                 self.process(line)
             else:
                 station.owed.append(line)
+        for line in station.flight.taken if station.flight is not None else ():
+            if self.is_pipelined(line):
+                self.process(line)
 
 
 def _is_switch(change: OptionsChange) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -9,6 +10,7 @@ from hfg.errors import EndOfStream, FiringTimeout, NodeError, UsageError
 from hfg.testing.reference.running_code import RunningCode
 from hfg.testing.reference.state import Flight, Line, Lying, Station, newest
 from hfg.testing.reference.structure import boundary_of
+from hfg.testing.reference.waiting import MOMENT_S
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import (
     ErrorRaised,
@@ -45,8 +47,7 @@ class Firing(RunningCode):
         self.observe(FiringStarted(self.now, station.path, flight.number, kind))
         self.receive_activity(index, [token.activity for token in tokens])
         if kind == "process":
-            rate = station.leaf.options.max_rate_hz
-            station.hold_until = self.now + 1 / rate if rate else station.hold_until
+            self.keep_rate(station)
         failure = self.set_parameters(station, taken)
         self.settle()  # a delay may be free (P7), the next firing may be enabled, all but "not busy" (F9)
         if kind == "end":
@@ -63,6 +64,16 @@ class Firing(RunningCode):
             self.run_process(flight, taken)
         self.settle()
 
+    def keep_rate(self, station: Station) -> None:
+        """F11: one start in each period of a grid that begins with the first; a late one does not move it."""
+        rate = station.leaf.options.max_rate_hz
+        if not rate:
+            return
+        if station.grid is None or station.grid[1] != 1 / rate:
+            station.grid = self.now, 1 / rate
+        begin, period = station.grid
+        station.hold_until = begin + (math.floor((self.now - begin + MOMENT_S) / period) + 1) * period
+
     def take_all(self, lines: list[Line]) -> Taken:
         """Take one token from each edge."""
         taken = []
@@ -76,6 +87,8 @@ class Firing(RunningCode):
                 self.note_processed(line)
             else:
                 line.unprocessed += 1
+                if self.is_pipelined(line):  # its place is free from now on (F5)
+                    self.process(line)
             taken.append((line, lying))
         return taken
 
@@ -275,13 +288,7 @@ class Firing(RunningCode):
             outcome = "abandoned"
         self.observe(FiringEnded(self.now, station.path, flight.number, outcome))
         station.flight, station.unready = None, False
-        for line in flight.taken:
-            if line.edge.is_event or line.delay:
-                continue
-            if self.is_pipelined(line):
-                self.process(line)
-            else:
-                station.owed.append(line)
+        station.owed += [line for line in flight.taken if line.unprocessed]
         self.be_idle(station)
 
     def be_idle(self, station: Station) -> None:
@@ -319,7 +326,9 @@ class Firing(RunningCode):
         return shipments
 
     def is_pipelined(self, line: Line) -> bool:
-        """F5: the consumer's mode, `auto` by whether the edge crosses groups."""
+        """F5, F6: the consumer's mode, `auto` by whether the edge crosses groups; slots of the whole answer at once."""
+        if line.edge.target.owner < 0:
+            return False
         options = self.stations[line.edge.target.owner].leaf.options
         if options.release != "auto":
             return bool(options.release == "pipelined")

@@ -122,8 +122,8 @@ class Sending(State):
             self.observe(TokenDropped(self.now, line.edge.label, token, "overflow"))
             return
         line.queue.append(Lying(token, self.next_tick(), sender, self.now))
-        if not line.edge.is_event and line.delay and len(line.queue) <= line.delay:
-            self.observe(TokenProcessed(self.now, line.edge.label))  # P7: a delay ends the wave
+        if not line.edge.is_event and line.slack and line.under_way <= line.slack:
+            self.observe(TokenProcessed(self.now, line.edge.label))  # a delay or a buffer ends the wave (P7, P4)
 
     # --- events
 
@@ -268,7 +268,7 @@ class Sending(State):
         """Say that a synchronous edge is free again, once a token was taken from it."""
         if line.edge.is_event:
             return
-        if not line.delay or len(line.queue) == line.delay:
+        if not line.slack or line.under_way == line.slack:
             self.observe(TokenProcessed(self.now, line.edge.label))
 
     def release_once(self) -> bool:

@@ -49,6 +49,24 @@ class Line:
         """How many initial tokens it began with; they make a delay of a synchronous edge (P7)."""
         return len(self.edge.initial)
 
+    @property
+    def slack(self) -> int:
+        """How many tokens may lie on a synchronous edge while its producer is free: delay (P7) and buffer (P4)."""
+        return self.delay + self.edge.buffer
+
+    @property
+    def under_way(self) -> int:
+        """How many tokens count against the slack.
+
+        What a consumer works on keeps the last relay of a buffer from passing on; behind a delay nobody waits for it.
+        """
+        return len(self.queue) + (0 if self.delay else self.unprocessed)
+
+    @property
+    def is_waited_for(self) -> bool:
+        """Whether a token is processed as a whole: neither delay nor buffer ends the wave in front of the consumer."""
+        return not self.edge.is_event and not self.slack
+
 
 @dataclass(eq=False)
 class Flight:
@@ -96,6 +114,7 @@ class Station:
     calls: int = 0
     owed: list[Line] = field(default_factory=list)  # taken by the last firing, processed when the outputs are (F5)
     hold_until: float = float("-inf")  # F11
+    grid: tuple[float, float] | None = None  # its beginning and its period (F11)
     last_function: float = float("-inf")  # for the idle rate of a gate
     afterwards: str = ""  # "enable" or "reset": what a subgraph around it wants as soon as its firing or call is over
     resting_until: float | None = None  # the back-off of a restart
@@ -229,9 +248,7 @@ class State:
         """Whether the producer's token is not processed yet (P4, P7)."""
         if not self.is_live(line):
             return False
-        if line.delay:
-            return len(line.queue) > line.delay
-        return bool(line.queue) or line.unprocessed > 0
+        return line.under_way > line.slack
 
     def outputs_are_free(self, owner: int) -> bool:
         """An output is free when all its live edges are (F5)."""

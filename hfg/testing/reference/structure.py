@@ -103,6 +103,7 @@ class Edge:
     via: tuple[int, ...]
     within: int | None = None  # the iterating subgraph around it
     parts: tuple[Any, ...] = ()  # the drawn edges that it consists of
+    buffer: int = 0  # relays in a row that a synchronous edge stands for (P4)
 
     @property
     def is_event(self) -> bool:
@@ -282,6 +283,7 @@ class _Dissolving:
                 initial=tuple(value for part, _ in reversed(parts) for value in part.options.initial),
                 via=via,
                 parts=tuple(part for part, _ in parts),
+                buffer=sum(getattr(part.options, "buffer", None) or 0 for part, _ in parts),
             )
         )
 
