@@ -158,7 +158,7 @@ class Graph:
           name: its part of the path; by default the type's name, then with _2, _3, in order of adding.
           group: where it runs, as declared with `group`; by default that of the subgraph around it, else the loop.
           priority: higher first, in a group with policy "priority".
-          max_rate_hz: at most so many firings a second, measured between starts (rule F11).
+          max_rate_hz: at most so many firings a second, on a grid that begins with the first (rule F11).
           on_error: what follows when its code fails (rule X1).
           restart_limit: for "restart": how often.
           restart_backoff_s: for "restart": the first pause.
@@ -202,6 +202,7 @@ class Graph:
         capacity_limit: int | None = None,
         through: Iterable[Callable[[Observable[Any]], Observable[Any]]] = (),
         initial: Iterable[T] = (),
+        buffer: int = 0,
     ) -> Edge: ...
     @overload
     def connect(
@@ -215,6 +216,7 @@ class Graph:
         capacity_limit: int | None = None,
         through: Iterable[Callable[[Observable[Any]], Observable[Any]]] = (),
         initial: Iterable[T] = (),
+        buffer: int = 0,
     ) -> Edge: ...
     def connect(
         self,
@@ -227,6 +229,7 @@ class Graph:
         capacity_limit: int | None = None,
         through: Iterable[Any] = (),
         initial: Iterable[Any] = (),
+        buffer: int = 0,
     ) -> Edge:
         """Declare an edge from an output or event to an input or slot; a reactivex observable feeds from outside.
 
@@ -239,6 +242,7 @@ class Graph:
           capacity_limit: of an event edge: how far "wait" may let the queue grow (rule F8).
           through: of an event edge: reactivex operators on the way (rule P9).
           initial: values that lie on it at the start, the oldest first (rule P7).
+          buffer: of an edge from an output into an input: by how many tokens the producer may run ahead (rule P4).
 
         Raises:
           ConnectionError: the edge cannot be; nothing was changed.
@@ -250,6 +254,7 @@ class Graph:
             "capacity_limit": capacity_limit,
             "through": through,
             "initial": initial,
+            "buffer": buffer,
         }
         return connect(self._level, source, target, said)
 

@@ -1,7 +1,7 @@
 """The edges of a running graph: what lies on them and who may put more (rules P4, P5, P7).
 
-Three state machines: a synchronous edge with one place, one with initial tokens (a delay), and an event edge with a
-queue. They hold tokens and count; the engine moves them. `source` and `target` are the engine's workers, opaque
+Three state machines: a synchronous edge with one place, one with room for more (a buffer, a delay), and an event edge
+with a queue. They hold tokens and count; the engine moves them. `source` and `target` are the engine's workers, opaque
 here. Stands on `token`; never waits.
 """
 
@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from hfg.token import Token
 
-__all__ = ["DelayEdge", "Edge", "EventEdge", "Overflow", "SyncEdge"]
+__all__ = ["BufferEdge", "Edge", "EventEdge", "Overflow", "SyncEdge"]
 
 Overflow = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
 
@@ -86,7 +86,7 @@ class SyncEdge(Edge):
     Attributes:
       token: the untaken token, or None.
       held: from the sending until it counts as processed (F5): the producer's place is occupied.
-      sequential: released when the consumer's outputs are processed, not when its firing is over (F5).
+      sequential: processed when the consumer's outputs are, not when the consumer has taken it (F5).
     """
 
     __slots__ = ("held", "sequential", "token")
@@ -148,21 +148,39 @@ class _QueueEdge(Edge):
         return list(self.queue)
 
 
-class DelayEdge(_QueueEdge):
-    """From an output into an input, with initial tokens: the delay of synchronous data flow (P7).
+class BufferEdge(_QueueEdge):
+    """From an output into an input, with room for more than one token: a buffer (P4), initial tokens (P7), or both.
+
+    It is a row of relays with pipelined release, the last of them the one edge that the consumer takes from; what lies
+    on all of them lies here in one queue.
 
     Attributes:
-      queue: untaken tokens, at most `delay` + 1.
-      delay: how many initial tokens it began with.
-      held: the producer's token counts as unprocessed, for more than `delay` tokens lie here.
+      queue: untaken tokens.
+      room: how many may lie here while the producer goes on: the places of the buffer and the initial tokens.
+      sequential: a token holds its place until the consumer's outputs are processed (F5). Never with initial tokens: a
+        delay ends the wave.
+      working: of a sequential one: the consumer has taken a token that is not processed yet.
+      held: the producer's newest token counts as unprocessed, for there is no room for it.
     """
 
-    __slots__ = ("delay", "held")
+    __slots__ = ("held", "room", "sequential", "working")
 
-    def __init__(self, index: int, label: str, active: bool, initial: tuple[Any, ...]) -> None:
+    def __init__(self, index: int, label: str, active: bool, initial: tuple[Any, ...], buffer: int) -> None:
         super().__init__(index, label, active, initial)
-        self.delay = len(initial)
+        self.room = len(initial) + buffer
+        self.sequential = False
+        self.working = False
         self.held = False
+
+    @property
+    def capacity(self) -> int:
+        """How many tokens it holds at most."""
+        return self.room + 1
+
+    @property
+    def crowded(self) -> bool:
+        """Whether it holds more than there is room for, so that its producer waits."""
+        return len(self.queue) + self.working > self.room
 
 
 class EventEdge(_QueueEdge):

@@ -123,6 +123,8 @@ def _add(graph: Graph, choose: Chooser, name: str) -> c.Command:
     boxes = ["", *(f"{node.place.path}/" for node in _all_nodes(graph) if hasattr(node, "_graph"))]
     kind = choose.one_of(_TYPES)
     options: dict[str, Any] = {"release": "pipelined"} if choose.chance(20) else {}
+    if choose.chance(10):
+        options["max_rate_hz"] = 70.0
     return c.Add(f"hfg.testing.nodes:{kind}", choose.one_of(boxes) + name, {}, options)
 
 
@@ -143,7 +145,10 @@ def _connect(graph: Graph, choose: Chooser) -> c.Command:
         sources += [f"{port.path}.inner" for port in [*box.ports.inputs.values(), *box.ports.slots.values()]]
         targets += [f"{port.path}.inner" for port in [*box.ports.outputs.values(), *box.ports.events.values()]]
     source, target = choose.one_of(sources), choose.one_of(targets)
-    return c.Connect(source, target, active=choose.chance(30))
+    data = target in free and source in [port.path for port in first.ports.outputs.values()]
+    return c.Connect(
+        source, target, active=choose.chance(30), buffer=choose.number(1, 2) if data and choose.chance(25) else 0
+    )
 
 
 def _about_an_edge(graph: Graph, choose: Chooser) -> c.Command | None:

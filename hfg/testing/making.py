@@ -159,10 +159,10 @@ class _Making:
     def _options(self, kind: str) -> dict[str, Any]:
         choose, allowed = self.choose, self.allowed
         options: dict[str, Any] = {}
-        if choose.chance(25):
+        if choose.chance(40 if allowed.threads else 25):
             options["release"] = choose.one_of(["sequential", "pipelined"])
         if allowed.rates and choose.chance(15):
-            options["max_rate_hz"] = choose.one_of([100.0, 30.0])
+            options["max_rate_hz"] = choose.one_of([100.0, 30.0, 70.0])
         if kind == "Failing" or (allowed.failures and choose.chance(5)):
             options["on_error"] = choose.one_of(
                 ["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"]
@@ -310,6 +310,8 @@ class _Making:
                     options.pop("capacity", None)
         if initial:
             options["initial"] = initial
+        if source[1] != "event" and target[1] in ("input", "parameter") and choose.chance(15):
+            options["buffer"] = choose.number(1, 3)
         self.pairs.add((source, target))
         self.edges.append(EdgePlan(source, target, options))
 

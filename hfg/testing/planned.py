@@ -79,6 +79,7 @@ def _edge(edge: Any) -> tuple[Any, ...]:
         edge.mandatory,
         getattr(edge, "sequential", None),
         getattr(edge, "initial", None),
+        getattr(edge, "room", None),
         getattr(edge, "overflow", None),
         getattr(edge, "capacity_limit", None),
         [scope.path for scope in edge.via],

@@ -171,7 +171,11 @@ class _Drawing:
         for number, (box, source, target) in enumerate(ends):
             options = {name: value for name, value in edge.options.items() if name == "active"}
             if number == outermost:
-                options |= {name: value for name, value in edge.options.items() if name not in ("active", "initial")}
+                apart = ("active", "initial", "buffer")
+                options |= {name: value for name, value in edge.options.items() if name not in apart}
+            buffer = _share(edge.options.get("buffer", 0), number, len(ends))
+            if buffer:
+                options["buffer"] = buffer
             if number == len(ends) - 1 and "initial" in edge.options:
                 options["initial"] = edge.options["initial"]
             self.segments[box].append(_Segment(box, source, target, options))
@@ -186,6 +190,11 @@ class _Drawing:
         if box:
             return [one for one in everything if one.name in members]
         return [one for one in everything if not self.around[one.name]]
+
+
+def _share(places: int, number: int, parts: int) -> int:
+    """How many places of a buffer lie on one part of an edge: they add up (G1)."""
+    return places // parts + (number < places % parts)
 
 
 def _port(end: tuple[str, str, str]) -> str:

@@ -14,7 +14,7 @@ from reactivex import operators as ops
 import hfg
 from hfg.trace import TraceEvent
 
-EXPECTED = "eb7d44bcd653cf6b"
+EXPECTED = "e5e53a4a02c189a5"
 
 
 @hfg.node

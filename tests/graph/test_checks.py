@@ -269,6 +269,24 @@ def test_queue_on_what_turns_out_to_be_synchronous_is_an_error(graph: Graph) -> 
     assert "capacity=3 is said on queue.a.inner -> queue/unit.a" in problem.what
 
 
+@pytest.mark.rule("P4", "G1")
+def test_a_buffer_on_what_turns_out_to_be_a_signal_or_to_lead_into_a_slot_is_an_error(graph: Graph) -> None:
+    class Ahead(Subgraph):
+        a = hfg.Input(int)
+
+        def build(self, graph: Graph) -> None:
+            graph.connect(self.a.inner, graph.add(Unit()).a, buffer=3)
+
+    unit, box = graph.add(Unit()), graph.add(Box())
+    graph.connect(unit.seen, graph.add(Ahead()).a)
+    graph.connect(unit.out, graph.add(Ahead()).a)
+    graph.connect(unit.out, box.look, buffer=2)
+    found = [problem for problem in graph.check() if problem.check == "buffer-without-join"]
+    assert [problem.path for problem in found] == ["unit.seen -> ahead/unit.a", "unit.out -> box/unit.look"]
+    assert "buffer=3 is said on ahead.a.inner -> ahead/unit.a" in found[0].what
+    assert "buffer=2 is said on unit.out -> box.look" in found[1].what
+
+
 @pytest.mark.rule("P7", "G1")
 def test_initial_tokens_that_turn_out_to_lie_before_a_slot_are_an_error(graph: Graph) -> None:
     box, unit = graph.add(Box()), graph.add(Unit())

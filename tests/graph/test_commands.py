@@ -154,7 +154,7 @@ def ends(graph: hfg.Graph) -> dict[object, list[object]]:
     """By port: where its edges lead, in order, and all that is said about them."""
     found: dict[object, list[object]] = {}
     for edge in flatten(graph).edges:
-        said = (edge.active, edge.capacity, edge.overflow, edge.capacity_limit, edge.through, edge.initial)
+        said = (edge.active, edge.capacity, edge.overflow, edge.capacity_limit, edge.through, edge.initial, edge.buffer)
         found.setdefault(edge.source.port, []).append((edge.target.port, *said))
     return found
 

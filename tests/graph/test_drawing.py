@@ -104,6 +104,8 @@ def test_labels_tell_of_queues_initial_tokens_operators_and_gates() -> None:
     graph.connect(a.done, b.begin, capacity=3, overflow="drop_oldest", through=[ops.take(1)])
     graph.connect(a.done, b.value, capacity_limit=99, initial=[1, 2, 3, 4, 5])
     graph.connect(reactivex.of(1), a.begin, overflow="latest")
+    c = graph.add(Station(), name="c")
+    graph.connect(a.ports.parameters["limit"], c.ports.parameters["limit"], buffer=4)
     graph.gate(a, by=b, idle_rate_hz=0.5)
     shown = graph.draw()
     for said in (
@@ -113,6 +115,7 @@ def test_labels_tell_of_queues_initial_tokens_operators_and_gates() -> None:
         "→ begin, latest",
         'n1 -.-o|"gate, else 0.5 Hz"| n0',
         "b<br/>disabled",
+        "limit, buffer 4",
     ):
         assert said in shown
 

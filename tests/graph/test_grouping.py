@@ -51,6 +51,8 @@ def plans(draw: st.DrawFn) -> list[dict[str, Any]]:
         options: dict[str, Any] = {"active": draw(st.booleans())}
         if target[1] in "ab":
             options["initial"] = tuple(draw(st.lists(st.integers(0, 9), max_size=3)))
+            if source[1] != "seen":
+                options["buffer"] = draw(st.integers(0, 5))
         if source[1] == "seen":
             options["capacity"] = draw(st.integers(1, 20))
             if not options["active"]:
@@ -118,6 +120,10 @@ class Boxing:
         for n in reversed(own):  # the one nearest to the consumer holds what is taken first
             count = len(rest) if n == own[0] else self.draw(st.integers(0, len(rest)))
             said[n]["initial"], rest = rest[:count], rest[count:]
+        places = options.get("buffer", 0)
+        for n in own:
+            count = places if n == own[-1] else self.draw(st.integers(0, places))
+            said[n]["buffer"], places = count, places - count
         outermost = min(range(len(parts)), key=lambda n: len(parts[n][0]))
         if "capacity" in options:
             said[outermost]["capacity"] = options["capacity"]
@@ -157,6 +163,7 @@ def edges_of(flat: FlatGraph) -> set[tuple[Any, ...]]:
             *(f"{flat.nodes[end.node].path.rpartition('/')[2]}.{end.name}" for end in (edge.source, edge.target)),
             edge.active,
             edge.initial,
+            edge.buffer,
             (edge.capacity, edge.overflow) if edge.is_event_edge else None,
         )
         for edge in flat.edges

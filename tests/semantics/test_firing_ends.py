@@ -170,7 +170,7 @@ def test_sequential_a_token_is_processed_when_all_it_led_to_is() -> None:
 
 
 @pytest.mark.rule("F5")
-def test_pipelined_a_token_is_processed_when_the_firing_is_over() -> None:
+def test_pipelined_a_token_is_processed_when_it_is_taken() -> None:
     assert released("pipelined")[0] == ("numbers.out -> forward.value", 0)
 
 

@@ -90,7 +90,7 @@ def test_types_that_do_not_fit_are_refused_and_both_ports_named() -> None:
 @pytest.mark.rule("P4", "F1")
 def test_a_synchronous_edge_holds_one_token_so_the_producer_waits_for_the_consumer() -> None:
     graph = hfg.Graph()
-    source, slow = graph.add(numbers(count=3)), graph.add(forward_later(), release="pipelined")
+    source, slow = graph.add(numbers(count=3)), graph.add(forward_later())
     graph.connect(source.out, slow.value)
     trace = traced(graph)
     assert [token.stamp for token in tokens(trace, "numbers.out -> forward_later.value")][:3] == [0, 1, 2]

@@ -329,7 +329,7 @@ async def uneven() -> AsyncIterator[int]:
 
 
 @pytest.mark.rule("F11")
-def test_the_rate_is_measured_between_starts() -> None:
+def test_the_rate_is_one_of_starts_not_of_pauses() -> None:
     graph = hfg.Graph()
     source, node = graph.add(numbers(count=3)), graph.add(forward_later(), max_rate_hz=0.8)
     graph.connect(source.out, node.value)

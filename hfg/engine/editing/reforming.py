@@ -26,7 +26,7 @@ from hfg.engine.runtime import plan, ports
 from hfg.engine.runtime.groups import Group
 from hfg.graph.flat import FlatEdge, FlatGraph
 from hfg.ports.automatic import AUTOMATIC_EVENTS
-from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
+from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.token import Token
 from hfg.trace import ActivityLost
 
@@ -249,17 +249,19 @@ class _Reforming:
         if edge.active != said.active:
             edge.active = said.active
             self.touched[edge.source] = None
-        if type(edge) is SyncEdge:
-            before, edge.sequential = edge.sequential, plan.is_sequential(edge.source, edge.target)
-            edge.follows = plan.follows(edge.source, edge.target, edge.sequential)
-            target: Worker = edge.target
-            if before is edge.sequential or not target.held or edge not in target.taken:
-                return
-            # its last firing is over, but not what it has sent (F5)
-            if before:
-                release((edge,))  # that was waited for until now
-            else:
-                target.taken = tuple(one for one in target.taken if one is not edge)
+        if type(edge) is EventEdge:
+            return
+        before, edge.sequential = edge.sequential, plan.is_sequential(edge)
+        edge.follows = plan.follows(edge)
+        target: Worker = edge.target
+        if not before or edge.sequential:
+            return
+        # what it has taken is processed by that (F5)
+        if edge in target.taken and (target.held or target.busy in ("firing", "ending")):
+            target.taken = tuple(one for one in target.taken if one is not edge)
+            release((edge,))
+        elif edge is target.call_edge and edge.token is None:
+            release((edge,))
 
     def _gates(self, flat: FlatGraph, workers: list[Worker]) -> None:
         core = self.core
@@ -293,7 +295,7 @@ class _Reforming:
             ports.bind_automatic(worker)
         for edge, _ in new:
             edge.live = wiring.is_live(edge)
-            if isinstance(edge, DelayEdge | EventEdge) and edge.initial:
+            if isinstance(edge, BufferEdge | EventEdge) and edge.initial:
                 _lay(edge)
                 if edge.target.blocked & ENDED:
                     drain_left((edge,))
@@ -312,9 +314,8 @@ class _Reforming:
                 rest(worker)
         with telling_behind(core):
             for edge in how.lost:
-                untaken_or_held = edge.held if not isinstance(edge, EventEdge) else False
                 discard(edge, "removed")
-                if untaken_or_held:
+                if not isinstance(edge, EventEdge):
                     release((edge,))
             for worker in how.gone:
                 if worker.active and worker.scope is None:

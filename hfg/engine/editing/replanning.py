@@ -29,7 +29,6 @@ from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode, flatten
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.subgraph import iterated
-from hfg.ports.edges import SyncEdge
 
 __all__ = ["Replan", "closes_a_ring", "replan"]
 
@@ -182,8 +181,8 @@ def _ends_of(flat: FlatEdge, source: Any, target: Any) -> tuple[Any, ...]:
     """What makes an edge the same: workers and names of ports; the graph's own ports and observables are themselves."""
     begin = source if getattr(source, "node", None) is not None else flat.source.port
     end = target if getattr(target, "node", None) is not None else flat.target.port
-    delayed = bool(flat.initial) and not flat.is_event_edge  # another kind of edge
-    return (begin, flat.source.kind, flat.source.name, end, flat.target.kind, flat.target.name, delayed)
+    roomy = bool(flat.initial or flat.buffer) and not flat.is_event_edge  # another kind of edge
+    return (begin, flat.source.kind, flat.source.name, end, flat.target.kind, flat.target.name, roomy)
 
 
 # --- refusals ---
@@ -230,7 +229,9 @@ def closes_a_ring(core: Core, new: Sequence[FlatEdge]) -> bool:
             if worker is not None:
                 for edges in worker.wired_out:
                     onward += [
-                        edge.target.node for edge in edges if type(edge) is SyncEdge and edge.target_kind in _JOINED
+                        edge.target.node
+                        for edge in edges
+                        if not getattr(edge, "initial", ()) and edge.target_kind in _JOINED
                     ]
             for one in onward:
                 if one is not None and one not in seen:

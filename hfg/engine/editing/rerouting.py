@@ -168,7 +168,7 @@ class _Blocks:
             source, target = edge.source.port, edge.target.port
             if edge.through or is_feed(source) or why_not(type_of(source), type_of(target)) is not None:
                 return False
-            if edge.initial or any(part.options.for_events for part in edge.segments):
+            if edge.initial or edge.buffer or any(part.options.for_events for part in edge.segments):
                 return False
             for other in (*staying, *found.new):
                 alone = edge.target.kind in ("input", "parameter") or other.source.port is source
@@ -179,7 +179,8 @@ class _Blocks:
 
 def _is_same(one: FlatEdge, other: FlatEdge) -> bool:
     ends = one.source.port is other.source.port and one.target.port is other.target.port
-    return ends and one.target.kind == other.target.kind and bool(one.initial) == bool(other.initial)
+    roomy = bool(one.initial or one.buffer) == bool(other.initial or other.buffer)
+    return ends and one.target.kind == other.target.kind and roomy
 
 
 class _Follower(EdgeFollower):

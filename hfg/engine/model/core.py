@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import Worker
 from hfg.errors import HfgError
-from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
+from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.token import Token
 from hfg.trace import TraceEvent
 
@@ -152,7 +152,7 @@ class Core:
         self.now = host.now
         self.workers: list[Worker] = []
         self._numbers = itertools.count()
-        self.edges: list[SyncEdge | DelayEdge | EventEdge] = []
+        self.edges: list[SyncEdge | BufferEdge | EventEdge] = []
         self.scopes: list[Scope] = []
         self.by_path: dict[str, Worker] = {}
         self.boundary: Worker | None = None

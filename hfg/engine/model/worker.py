@@ -91,6 +91,8 @@ class Worker:
       special: something about the next firing is not ordinary (a marker lies on an input ...): the fast step steps
         aside.
       step: runs its next piece of work; chosen for its shape by `specialise`.
+      taken: edges whose tokens were taken by the firing under way, or the last one, and are processed when its
+        outputs are (F5 sequential).
       right: A3's right to carry activity that A5 took earlier in this firing or call.
       stamp: of what it sends now (T5); None outside a firing or call: the present.
       written: per output what was written in this firing; None until the first.
@@ -125,6 +127,7 @@ class Worker:
         "gates_over",
         "generator",
         "given_up",
+        "grid_start",
         "group",
         "halt",
         "handlers",
@@ -144,6 +147,7 @@ class Worker:
         "live_inputs",
         "mandatory_ports",
         "meter",
+        "next_period",
         "next_start",
         "node",
         "observed",
@@ -273,7 +277,9 @@ class Worker:
         self.on_idle: list[Callable[[], None]] | None = None  # what waits until it is not busy
         self.ticket = 0  # which firing or call a late result belongs to (X2)
         self.full_edges = 0
-        self.next_start = 0.0
+        self.grid_start: float | None = None  # when its first firing with a rate began, and so its grid (F11)
+        self.next_period = 0  # of that grid: the first in which it may start again
+        self.next_start = 0.0  # when that begins
         self.rate_timer: Any = None
         self.limit_timer: Any = None
         self.backoff_timer: Any = None

@@ -82,7 +82,7 @@ class EdgeStatistics(msgspec.Struct, frozen=True):
       drained: processed without a firing because the consumer has ended (F12).
       untaken: what lies on it now.
       deepest: the most that ever lay on it.
-      capacity: places of its queue; None for an edge of data, which has one.
+      capacity: places of its queue; None for an edge of data, which has one, unless a buffer or a delay adds to that.
       grown: places that F8 added.
     """
 

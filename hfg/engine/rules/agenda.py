@@ -24,6 +24,7 @@ __all__ = [
     "let_follow",
     "must_wait",
     "note_full",
+    "note_start",
     "place",
     "queue",
     "remove_call",
@@ -73,6 +74,19 @@ def let_follow(core: Core, since: int) -> None:
             worker.queued = True
             worker.push_next(worker)
             core.followed += 1
+
+
+def note_start(worker: Worker, rate_hz: float) -> None:
+    """F11: a firing starts now; the next one may in the next period of the grid that the first one began.
+
+    Each place of the grid is found from its beginning, so that errors of floats never add up.
+    """
+    now = worker.core.now()
+    if worker.grid_start is None:
+        worker.grid_start = now
+    period = int((now - worker.grid_start + SAME_MOMENT_S) * rate_hz)
+    worker.next_period = max(worker.next_period, period) + 1  # (a clock as large as the date has fewer digits)
+    worker.next_start = worker.grid_start + worker.next_period / rate_hz
 
 
 def must_wait(worker: Worker) -> bool:

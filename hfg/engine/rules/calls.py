@@ -49,6 +49,8 @@ def call(worker: Worker) -> None:
             lose(edge)
     if type(edge) is EventEdge:
         freed(edge)
+    elif not edge.sequential:
+        release((edge,))
     if edge.target_kind == "parameter":
         set_parameter(worker, name, token.value)
         finish_call(worker, "done")
@@ -99,7 +101,7 @@ def refuse_coroutine(worker: Worker, coroutine: Any) -> TypeError:
 
 
 def finish_call(worker: Worker, outcome: Any) -> None:
-    """The automatic events follow (A9), then the call is over: an O->S token is processed (F6)."""
+    """The automatic events follow (A9), then the call is over: a sequential O->S token is processed (F6)."""
     core = worker.core
     derive_scopes(core)
     flush_automatic(worker)
@@ -108,7 +110,7 @@ def finish_call(worker: Worker, outcome: Any) -> None:
     worker.busy = "over"
     edge = worker.call_edge
     worker.call_edge = None
-    if type(edge) is SyncEdge:
+    if type(edge) is SyncEdge and edge.token is None:  # else it is the next one, which a pipelined edge has let in
         release((edge,))
     worker.right = False
     worker.stamp = None

@@ -12,7 +12,7 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, UNREADY, Worker
-from hfg.engine.rules.agenda import SAME_MOMENT_S, cancel_limit, consider, freed, idle_again, unplace
+from hfg.engine.rules.agenda import SAME_MOMENT_S, cancel_limit, consider, freed, idle_again, note_start, unplace
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
 from hfg.engine.rules.ending import end, source_ended
 from hfg.engine.rules.modifiers import automatic, derive_scopes, receive, touch
@@ -20,7 +20,7 @@ from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import flush_automatic, put_outputs
 from hfg.engine.rules.wiring import rewire
 from hfg.errors import EndOfStream, UsageError
-from hfg.ports.edges import DelayEdge, EventEdge, SyncEdge
+from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringStarted, TokenTaken
 from hfg.types import accepts, describe
@@ -86,7 +86,7 @@ def fire(worker: Worker) -> None:
     edges = worker.live_inputs
     tokens = [_take(edge) for edge in edges]
     worker.tokens = tokens
-    worker.taken = tuple(edge for edge in edges if type(edge) is SyncEdge)
+    worker.taken = tuple(edge for edge in edges if type(edge) is not EventEdge and edge.sequential)
     now = core.now()
     worker.stamp = now if worker.is_source else _newest_stamp(tokens, now)
     modifiers = [token.activity for token in tokens if token.activity]
@@ -100,7 +100,7 @@ def fire(worker: Worker) -> None:
             freed(edge)
             if not edge.live and not edge.queue:
                 rewire(worker)
-        elif type(edge) is DelayEdge and edge.held and len(edge.queue) <= edge.delay:
+        elif not edge.sequential:
             release((edge,))
     if modifiers:
         if worker.scopes:
@@ -118,7 +118,7 @@ def fire(worker: Worker) -> None:
     else:
         options = worker.options
         if options.max_rate_hz:
-            worker.next_start = now + 1.0 / options.max_rate_hz
+            note_start(worker, options.max_rate_hz)
         worker.gate_next = now
         if worker.paced:
             unplace(worker)  # what an input that has ended gave a place to is held by the rate from now on
@@ -141,6 +141,8 @@ def _take(edge: Any) -> Token[Any]:
         barrier.missing += 1
     else:
         token = edge.queue.popleft()
+        if type(edge) is BufferEdge:
+            edge.working = edge.sequential
         if not edge.queue:
             barrier.missing += 1
         elif type(edge.queue[0].value) is Marker:
@@ -374,8 +376,6 @@ def finish_firing(worker: Worker, outcome: Any) -> None:
     worker.tokens = []
     if worker.outputs.missing:
         worker.held = True
-        if taken:
-            release([edge for edge in taken if not edge.sequential])
     elif taken:
         release(taken)
     worker.right = False

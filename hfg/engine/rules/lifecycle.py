@@ -17,7 +17,7 @@ from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import send_end, telling_behind
 from hfg.engine.rules.sources import judge_sources
 from hfg.errors import NodeError
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.trace import NodeEnabled
 
 __all__ = [
@@ -163,8 +163,12 @@ def _settle_disabled(workers: Sequence[Worker]) -> None:
                 discard(edge, "disabled")
             # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
             worker.taken = ()
-            free = (*incoming, *(edge for edge in outgoing if edge in untaken))
-            release([edge for edge in free if type(edge) is not EventEdge and edge.held])
+            release([edge for edge in incoming if type(edge) is not EventEdge])
+            for edge in (edge for edge in outgoing if edge in untaken):
+                working = type(edge) is BufferEdge and edge.working
+                release((edge,))
+                if working:
+                    edge.working = True
         for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
             if worker.pending_end and worker.busy in AMID_NOTHING:
                 send_end(worker)

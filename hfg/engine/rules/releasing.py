@@ -11,7 +11,7 @@ from typing import Any
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules.agenda import consider, freed
 from hfg.engine.rules.sending import send_end
-from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.token import Token
 from hfg.trace import TokenProcessed, TokenTaken, TraceEvent
 
@@ -19,9 +19,9 @@ __all__ = ["outputs_done", "outputs_free", "release", "take_from_reader"]
 
 
 def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
-    """These tokens are processed: free the producers' places, and transitively what waited for them (F5).
+    """These tokens are processed: free the producers' places where there is room now (F5, P4, P7).
 
-    Without recursion.
+    And transitively what waited for them, without recursion.
 
     Args:
       edges: where they lay.
@@ -30,6 +30,10 @@ def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
     stack: list[Any] = list(reversed(edges))
     while stack:
         edge = stack.pop()
+        if type(edge) is BufferEdge:
+            edge.working = False
+            if edge.crowded:
+                continue
         if not edge.held:
             continue
         edge.held = False
@@ -48,7 +52,7 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
     released: Sequence[Any] = ()
     if worker.held:
         worker.held = False
-        released = [upstream for upstream in worker.taken if upstream.sequential]
+        released = worker.taken
     if worker.outputs.waiters is not None:
         worker.outputs.notify()
     if worker.pending_end and worker.busy in ("", "edit"):
@@ -72,7 +76,10 @@ def outputs_done(worker: Worker, trace: Callable[[TraceEvent], None] | None = No
         if not held or not taken:
             return
         upstream: Any = taken[0]
-        if not upstream.sequential or not upstream.held:
+        if type(upstream) is BufferEdge:
+            release(taken)
+            return
+        if not upstream.held:
             return
         upstream.held = False
         if trace is not None:
@@ -101,6 +108,6 @@ def take_from_reader(worker: Worker) -> Token[Any]:
         core.trace(TokenTaken(core.now(), edge.label, token))
     if isinstance(edge, EventEdge):
         freed(edge)
-    elif isinstance(edge, SyncEdge) or (edge.held and len(edge.queue) <= edge.delay):
+    else:
         release((edge,))
     return token

@@ -17,7 +17,7 @@ from hfg.engine.rules.modifiers import count_dropped, derive_scopes, drop, give_
 from hfg.errors import EngineInternalError, QueueOverflow
 from hfg.ports.edges import Edge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
-from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenSent
+from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, TokenSent
 
 __all__ = ["enqueue", "flush_automatic", "put", "put_outputs", "send_end", "tell", "telling_behind", "trigger"]
 
@@ -114,11 +114,15 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
             target.special = True
         arrived(edge)
     else:
+        if edge.held:
+            raise EngineInternalError(f'one token too many on synchronous edge "{edge.label}"')
         edge.queue.append(token)
         edge.deepest = max(edge.deepest, len(edge.queue))
-        if len(edge.queue) > edge.delay:
+        if edge.crowded:
             edge.held = True
             edge.source.outputs.missing += 1
+        elif core.trace is not None:
+            core.trace(TokenProcessed(core.now(), edge.label))
         if type(value) is Marker:
             target.special = True
         if len(edge.queue) == 1:

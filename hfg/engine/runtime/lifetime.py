@@ -27,7 +27,7 @@ from hfg.engine.runtime.code import answer
 from hfg.engine.runtime.groups import ThreadGroup
 from hfg.engine.runtime.watchdog import Watch, watchdog
 from hfg.errors import HfgError, NodeError, TeardownError
-from hfg.ports.edges import DelayEdge, EventEdge
+from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.token import Token
 from hfg.trace import RunEnded, RunStarted
 
@@ -78,7 +78,7 @@ class Lifetime:
         for worker in core.workers:
             self.carry(worker)
         for edge in core.edges:
-            if isinstance(edge, DelayEdge | EventEdge):
+            if isinstance(edge, BufferEdge | EventEdge):
                 edge.queue.extend(Token(value, 0, engine.now(), 0) for value in edge.initial)
                 if isinstance(edge, EventEdge):
                     note_full(edge)

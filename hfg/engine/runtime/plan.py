@@ -18,7 +18,7 @@ from hfg.engine.runtime.groups import Group
 from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode
 from hfg.graph.flat import Scope as FlatScope
-from hfg.ports.edges import DelayEdge, Edge, EventEdge, SyncEdge
+from hfg.ports.edges import BufferEdge, Edge, EventEdge, SyncEdge
 
 __all__ = [
     "Ends",
@@ -214,13 +214,14 @@ def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
         edge = EventEdge(
             flat.index, flat.label, flat.active, flat.capacity, flat.overflow, flat.capacity_limit, flat.initial
         )
-    elif flat.initial:
-        edge = DelayEdge(flat.index, flat.label, flat.active, flat.initial)
+    elif flat.initial or flat.buffer:
+        edge = BufferEdge(flat.index, flat.label, flat.active, flat.initial, flat.buffer)
     else:
         edge = SyncEdge(flat.index, flat.label, flat.active)
-        edge.sequential = is_sequential(source, target)
-        edge.follows = follows(source, target, edge.sequential)
     edge.source, edge.target = source, target
+    if type(edge) is not EventEdge:
+        edge.sequential = is_sequential(edge)
+        edge.follows = follows(edge)
     edge.via = tuple(core.scopes[scope] for scope in flat.via)
     edge.port_name = flat.target.name
     return edge
@@ -272,17 +273,23 @@ def _not_piped_yet(token: Any) -> None:
     raise UsageError("an event with operators on its edge was triggered in setup(): trigger it in a firing or a slot")
 
 
-def is_sequential(source: Worker, target: Worker) -> bool:
-    """F5: the consumer's mode; `auto` is sequential within a group."""
+def is_sequential(edge: Any) -> bool:
+    """F5: the consumer's mode; `auto` is sequential within a group. A delay ends the wave whatever the mode (P7)."""
+    source: Worker = edge.source
+    target: Worker = edge.target
     release = target.options.release if target.options is not None else "pipelined"
+    if type(edge) is BufferEdge and edge.initial:
+        return False
     if release == "auto":
         return source.group is target.group
     return bool(release == "sequential")
 
 
-def follows(source: Worker, target: Worker, sequential: bool) -> bool:
+def follows(edge: Any) -> bool:
     """R2: what a firing enables by an edge goes next; what comes from outside is a wave of its own."""
-    return sequential and source.options is not None and source.group is target.group and source.group.depth_first
+    source: Worker = edge.source
+    target: Worker = edge.target
+    return edge.sequential and source.options is not None and source.group is target.group and source.group.depth_first
 
 
 def _into(edge: Edge, target: Worker, flat: FlatEdge) -> None:

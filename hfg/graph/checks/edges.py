@@ -43,6 +43,16 @@ def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
                 remedy="leave it out, or send by an event",
                 check="queue-on-data",
             )
+        buffered = next((part for part in edge.segments if part.options.buffer), None)
+        if buffered is not None and (edge.is_event_edge or kind == "slot"):
+            yield Problem(
+                path=edge.label,
+                severity="error",
+                what=f"buffer={buffered.options.buffer} is said on {buffered.label}, a part of it",
+                why="it leads into a slot or comes from an event, and a buffer is for data into an input (rule P4)",
+                remedy="leave it out, or send by an event and say capacity=",
+                check="buffer-without-join",
+            )
         if edge.initial and (kind == "slot" or (kind == "parameter" and edge.is_event_edge)):
             yield Problem(
                 path=edge.label,

@@ -265,6 +265,8 @@ def _options(options: EdgeOptions) -> Iterator[str]:
     if options.through:
         count = len(options.through)
         yield "1 operator" if count == 1 else f"{count} operators"
+    if options.buffer:
+        yield f"buffer {options.buffer}"
     if options.initial:
         values = [repr(value) for value in options.initial]
         text = ", ".join(value if len(value) <= _LONGEST else f"{value[: _LONGEST - 1]}…" for value in values[:4])

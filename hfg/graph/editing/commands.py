@@ -95,6 +95,7 @@ class Connect(Command, frozen=True):
     overflow: Overflow = "wait"
     capacity_limit: int | None = None
     initial: tuple[Any, ...] = ()
+    buffer: int = 0
 
 
 class Disconnect(Command, frozen=True):

@@ -340,5 +340,6 @@ class _Border:
             capacity_limit=outside.capacity_limit,
             through=tuple(operator for one in parts for operator in one.options.through),
             initial=tuple(value for one in reversed(parts) for value in one.options.initial),
+            buffer=sum(one.options.buffer for one in parts),
         )
         return Edge(source, target, options)

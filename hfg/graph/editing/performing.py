@@ -264,6 +264,7 @@ class _Hand:
             "capacity_limit": command.capacity_limit,
             "through": (),
             "initial": tuple(as_meant(value, type_of(target)) for value in command.initial),
+            "buffer": command.buffer,
         }
         edge = declare_edge(around, source, target, said)
         self.changes.append(EdgeChange(around, edge, len(around.edges) - 1, added=True))

@@ -92,6 +92,7 @@ class FlatEdge(msgspec.Struct, eq=False):
         consists of, among several the one nearest to the source.
       through: operators, in the order signals meet them.
       initial: values, the one taken first in front.
+      buffer: places beside the one that every edge of data has; those of its parts together.
       via: the scopes it enters or leaves through their ports.
       segments: the edges it consists of, from source to target.
     """
@@ -106,6 +107,7 @@ class FlatEdge(msgspec.Struct, eq=False):
     capacity_limit: int | None
     through: tuple[Any, ...]
     initial: tuple[Any, ...]
+    buffer: int
     via: tuple[int, ...]
     segments: tuple[Edge, ...]
 

@@ -181,11 +181,12 @@ class EdgeFollower:
         if len(segments) > 1:
             edge = min(segments, key=self.depth_of.__getitem__)  # min gives the first of equals: nearest to the source
         options = edge.options
-        through, initial, active = options.through, options.initial, options.active
+        through, initial, active, buffer = options.through, options.initial, options.active, options.buffer
         if len(segments) > 1:
             through = tuple(operator for one in segments for operator in one.options.through)
             initial = tuple(value for one in reversed(segments) for value in one.options.initial)
             active = all(one.options.active for one in segments)
+            buffer = sum(one.options.buffer for one in segments)
         edges = self.flat.edges
         edges.append(
             FlatEdge(
@@ -199,6 +200,7 @@ class EdgeFollower:
                 options.capacity_limit,
                 through,
                 initial,
+                buffer,
                 via,
                 segments,
             )

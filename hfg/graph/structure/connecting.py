@@ -84,6 +84,8 @@ def refuse(level: Level, source: SourceEnd, target: TargetEnd, options: EdgeOpti
         _need_right_options(source, target, options)
     if options.initial:
         _need_initial(source, target, options.initial)
+    if options.buffer:
+        _need_data(source, target, options.buffer)
     if isinstance(target, InnerTarget):
         _need_same_manner(source, target)
     if is_box(target.node) or is_box(getattr(source, "node", None)):
@@ -248,6 +250,22 @@ def _need_initial(source: SourceEnd, target: TargetEnd, initial: tuple[Any, ...]
             raise errors.ConnectionError(
                 f"{between}: an initial value must be of type {describe(expected)}, got {value!r}"
             )
+
+
+def _need_data(source: SourceEnd, target: TargetEnd, buffer: int) -> None:
+    """Refuse a buffer on what is no edge from an output into an input; where a relay leads is for the check to see."""
+    between = f'"{end_path(source)}" -> "{target.path}"'
+    if not is_port(source) or source.kind == "event":
+        raise errors.ConnectionError(
+            f"{between}: buffer={buffer} is for edges from outputs, and signals wait in a queue anyway; "
+            "say how long it is by capacity=... (rules P4, P5)"
+        )
+    is_relay = is_box(target.node) and target.name in target.node._type.slots
+    if target.kind == "slot" and not is_relay:
+        raise errors.ConnectionError(
+            f"{between}: buffer={buffer} is for edges into inputs; "
+            "leave it out, or send by an event, whose edge has a queue (rules P4, F6)"
+        )
 
 
 # --- subgraphs ---

@@ -74,7 +74,7 @@ class NodeOptions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EdgeOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """How an edge transports; all but `active` and `initial` are for event edges (rules P4, P5).
+    """How an edge transports; all but `active`, `initial` and `buffer` are for event edges (rules P4, P5).
 
     Attributes:
       active: it also transports activity: the double line of the paper, A(e) = 1.
@@ -83,6 +83,7 @@ class EdgeOptions(msgspec.Struct, frozen=True, kw_only=True):
       capacity_limit: how far "wait" may let the queue grow; None without end.
       through: reactivex operators before the queue (rule P9).
       initial: values that lie on it at the start (rule P7).
+      buffer: of an edge from an output into an input: by how many tokens the producer may run ahead (rule P4).
     """
 
     active: bool = False
@@ -91,6 +92,7 @@ class EdgeOptions(msgspec.Struct, frozen=True, kw_only=True):
     capacity_limit: int | None = None
     through: tuple[Any, ...] = ()
     initial: tuple[Any, ...] = ()
+    buffer: int = 0
 
     @property
     def for_events(self) -> str | None:
@@ -177,6 +179,8 @@ def edge_options(where: Callable[[], str], said: dict[str, Any]) -> EdgeOptions:
         and said["capacity_limit"] is None
         and said["overflow"] == "wait"
         and said["capacity"] == DEFAULT_CAPACITY
+        and type(said["buffer"]) is int
+        and said["buffer"] == 0
         and type(said["active"]) is bool
     ):
         return ACTIVE if said["active"] else PLAIN
@@ -184,6 +188,7 @@ def edge_options(where: Callable[[], str], said: dict[str, Any]) -> EdgeOptions:
     if type(said["active"]) is not bool:
         raise errors.ConnectionError(f"{at}: active must be True or False, got {said['active']!r}")
     _need_queue(at, said)
+    _need_whole(at, "buffer", said["buffer"], 0, errors.ConnectionError)
     broken = next((operator for operator in through if not callable(operator)), None)
     if broken is not None:
         raise errors.ConnectionError(
