@@ -1,13 +1,26 @@
-"""The ordinary suite is the same each time; `make soak` draws examples that nobody has seen."""
+"""The ordinary suite is the same each time; `make soak` draws examples that nobody has seen.
+
+With `--fuse-after 0` all runs fuse their regions from the first firing on.
+"""
 
 from __future__ import annotations
 
 import pytest
 from hypothesis import settings
 
+from hfg.engine.runtime import settings as run_settings
+
 settings.register_profile("suite", derandomize=True)
 settings.register_profile("soak", derandomize=False, print_blob=True)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--fuse-after", type=int, default=None, help="fuse regions after so many firings of their head; 0: at once"
+    )
+
+
 def pytest_configure(config: pytest.Config) -> None:
+    if config.option.fuse_after is not None:
+        run_settings.FUSE_AFTER = config.option.fuse_after
     settings.load_profile("soak" if config.option.markexpr == "soak" else "suite")

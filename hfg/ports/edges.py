@@ -34,6 +34,8 @@ class Edge:
       ended: the consumer has taken END from it and waits for it no more (F4).
       handler: of the slot an event edge leads into, taking the value, where that is all there is to a call; None:
         the general way.
+      waits: at whose output barrier an unprocessed token of it counts: the source, or the head of the region of the
+        source; of no meaning for event edges.
       tap: sees every token that is put on it; None: nobody looks.
       via: the scopes (subgraphs) whose relays it passes; all must be enabled.
     """
@@ -57,6 +59,7 @@ class Edge:
         "target",
         "target_kind",
         "via",
+        "waits",
     )
 
     def __init__(self, index: int, label: str, active: bool) -> None:
@@ -64,6 +67,7 @@ class Edge:
         self.label = label
         self.active = active
         self.source: Any = None
+        self.waits: Any = None
         self.target: Any = None
         self.target_kind = "input"
         self.port_name = ""

@@ -49,6 +49,7 @@ class Held:
                 over()
                 return
             worker.busy = "edit"
+            worker.disturb()
             self._letting_go.append(over)
             left[0] -= 1
             if not left[0]:

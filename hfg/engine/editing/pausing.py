@@ -25,13 +25,9 @@ from hfg.trace import RunPaused, RunResumed, TokenSent, TraceEvent
 if TYPE_CHECKING:
     from hfg.engine.runtime.engine import Engine
 
-__all__ = ["Breakpoint", "Halt", "Pausing", "Step"]
+__all__ = ["Breakpoint", "Pausing", "Step"]
 
 _LOGGER = logging.getLogger("hfg.engine")
-
-
-class Halt(Exception):
-    """Thrown by the pump between two steps, so that not one more is made."""
 
 
 class Step(msgspec.Struct, frozen=True):
@@ -71,13 +67,6 @@ class Breakpoint:
         return f'<Breakpoint at "{self.path}", {self.hits} hits>'
 
 
-class _Stop:
-    """Stands among the groups that are to dispatch: the one place which the pump passes between two steps."""
-
-    def dispatch(self) -> None:
-        raise Halt
-
-
 class Pausing:
     """The part of the engine that may hold everything still.
 
@@ -106,8 +95,7 @@ class Pausing:
             return
         self.paused, self.why = True, why
         self._hold_groups(True)
-        if engine.core.pumping:
-            engine._ready_groups.appendleft(_Stop())  # type: ignore[arg-type]
+        engine.core.flags.append("paused")
         if engine.core.trace is not None:
             engine.core.trace(RunPaused(engine.now(), why))
         self.rest()
@@ -130,6 +118,8 @@ class Pausing:
         engine.kick()
 
     def _hold_groups(self, held: bool) -> None:
+        for core in self._engine.all_cores():
+            core.held = held
         for group in self._engine.groups.values():
             group.held = held
 
@@ -242,6 +232,9 @@ class Pausing:
         if self._stepping:
             raise UsageError(f"{what} cannot step while another step is under way: await that first")
         self._stepping = True
+        for core in self._engine.all_cores():
+            for region in list(core.regions):
+                region.dissolve()
 
     def _queued(self) -> Iterator[Worker]:
         """Those that could move now, group by group."""

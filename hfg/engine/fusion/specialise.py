@@ -5,29 +5,68 @@ Asked whenever its wiring or somebody's interest in it has changed. Stands on `s
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from hfg.engine.fusion.members import may_lead
+from hfg.engine.fusion.region import Region
+from hfg.engine.fusion.schedule import schedule
 from hfg.engine.fusion.slots import calls_step
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import firing
 
 __all__ = ["specialise"]
 
+Step = Callable[[Worker], None]
+
 
 def specialise(worker: Worker) -> None:
     """Give the worker the shortest step that is right for its present shape, behind its breakpoint if it has one."""
+    region = worker.region
+    if region is not None:
+        region.dissolve()  # which asks for each of its members, now or behind the call under way
+        return
     worker.step = _step_of(worker)
     if worker.halt is not None:
         worker.step = worker.halt(worker.step)
 
 
-def _step_of(worker: Worker):  # type: ignore[no-untyped-def]
+def _step_of(worker: Worker) -> Step:
     core = worker.core
     if worker.is_boundary_output:
-        return worker.process or _leave_lying
-    if core.inside is not None:
-        return core.inside.step  # one that iterates itself, too: whoever is around it counts what is queued (G3, G4)
+        return worker.process if worker.process is not None else _leave_lying
+    if core.inside is not None:  # one that iterates itself, too: whoever is around it counts what is queued (G3, G4)
+        step: Step = core.inside.step
+        return step
     if _lives_by_its_slots(worker):
         return calls_step(worker)
+    if may_lead(worker):
+        return _until_warm(worker)
     return firing.step
+
+
+def _until_warm(worker: Worker) -> Step:
+    """The interpreted way, until the node has fired so often that fusing pays; then a region behind it."""
+    core = worker.core
+    left = core.fuse_after
+
+    def step(worker: Worker) -> None:
+        nonlocal left
+        left -= 1
+        if (
+            left < 0
+            and not worker.special
+            and core.started
+            and not core.over
+            and not core.held
+            and worker.region is None
+        ):
+            region = Region(schedule(worker), specialise)
+            worker.step = region.step
+            worker.step(worker)
+        else:
+            firing.step(worker)
+
+    return step
 
 
 def _lives_by_its_slots(worker: Worker) -> bool:

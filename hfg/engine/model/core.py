@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from types import CoroutineType
+from types import FrameType
 from typing import Any, Protocol
 
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import Worker
 from hfg.errors import HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
-from hfg.token import Token
 from hfg.trace import TraceEvent
 
-__all__ = ["OF_ITS_OWN_KIND", "PENDING", "Core", "Host", "Timer", "Upstairs"]
+__all__ = ["PENDING", "Core", "Host", "Region", "Timer", "Upstairs"]
 
 
 class _Pending:
@@ -31,8 +30,30 @@ PENDING = _Pending()
 """What an executor returns for code that waits: its result comes later."""
 
 
-OF_ITS_OWN_KIND = frozenset({type(None), Token, CoroutineType})
-"""Types of results that do not simply leave: silence, a token passed on, code that is still to be awaited."""
+class Region(Protocol):
+    """Nodes whose firings are fused (see the wing `fusion`), as those below know it."""
+
+    head: Worker
+    running: bool
+    waves: int
+
+    def at_work(self, frame: FrameType | None) -> Worker | None:
+        """Whose call a running wave is in, by the line it is at."""
+
+    def disturb(self, worker: Worker) -> None:
+        """A member does not rest any more: the interpreted way goes on from here."""
+
+    def speaks(self, worker: Worker) -> bool:
+        """A member's code sends by itself: whether a fused call of it is under way."""
+
+    def dissolve(self) -> None:
+        """Its members are nodes like any others from here on."""
+
+    def measure_on(self) -> None:
+        """What was measured has been read: measure the next waves."""
+
+    def settle_counts(self) -> None:
+        """Let the members' counts say what the waves so far have done."""
 
 
 class Timer(Protocol):
@@ -170,6 +191,12 @@ class Core:
         self.over = False
         self.errors: list[HfgError] = []
         self.lost_activity = 0
+        self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
+        self.held = False  # the run is paused: nodes move one by one
+        self.regions: set[Region] = set()  # fused, and perhaps ahead of the counts of their members
+        self.flags: list[str] = []  # why the pump is to look round; not empty: a wave ends behind the call under way
+        self.slices = 0  # of the pump, for the watchdog
+        self.until = 0.0  # on the run's clock: the pump's slice is over
         self.followers: list[Worker] = []  # enabled by the sending under way, and to go next (R2)
         self.followed = 0  # how many have gone so; the pump counts waves, not hops, where time is virtual
         self.dirty_scopes: list[Scope] = []
@@ -183,6 +210,11 @@ class Core:
         self.inside: Any = None  # the iteration whose inside this is (G4)
         self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
         self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
+
+    def settle_counts(self) -> None:
+        """Somebody is about to read how often nodes have fired: fused regions count by waves."""
+        for region in self.regions:
+            region.settle_counts()
 
     def number_workers(self) -> int:
         """Give a number that no worker of this run has yet."""

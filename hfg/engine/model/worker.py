@@ -14,7 +14,7 @@ from hfg.ports.barrier import Barrier
 from hfg.ports.edges import Edge
 
 if TYPE_CHECKING:
-    from hfg.engine.model.core import Core
+    from hfg.engine.model.core import Core, Region
     from hfg.engine.model.scopes import Gate, Scope
     from hfg.engine.runtime.groups import Group
 
@@ -86,6 +86,7 @@ class Worker:
       placed, ahead: a firing is enabled and has its place in the agenda, behind `ahead` slot calls (F9).
       calls: edges whose oldest token waits for a slot call, in order of arrival; None until there is one.
       queued: it stands in its group's run queue.
+      follows: what a sequential edge has enabled goes next when the call is over for which it stands there (R2).
       busy: "" or what is under way: "firing", "call", "asking", "ending", "setup"; "edit": an edit holds it;
         "over": what was under way is over, but for what it releases.
       special: something about the next firing is not ordinary (a marker lies on an input ...): the fast step steps
@@ -121,6 +122,7 @@ class Worker:
         "events_due",
         "failed",
         "firings",
+        "follows",
         "full_edges",
         "gate_next",
         "gates",
@@ -170,6 +172,7 @@ class Worker:
         "queued",
         "rate_timer",
         "ready_hook",
+        "region",
         "restarts",
         "right",
         "room_waiters",
@@ -178,6 +181,7 @@ class Worker:
         "silent",
         "silent_code",
         "slot_edges",
+        "speaks",
         "special",
         "stamp",
         "step",
@@ -185,6 +189,7 @@ class Worker:
         "ticket",
         "tokens",
         "type",
+        "unfit",
         "unset",
         "waiting_room",
         "wants_token",
@@ -214,6 +219,7 @@ class Worker:
         self.ahead = 0
         self.calls: deque[Any] | None = None
         self.queued = False
+        self.follows = False
         self.busy = ""
         self.special = False
         self.step: Callable[[Worker], None] = _not_planned
@@ -243,6 +249,9 @@ class Worker:
         self.gates: list[Any] = []  # that look at its activity
         self.active_for_s: float | None = None
         self.halt: Callable[[Callable[[Worker], None]], Callable[[Worker], None]] | None = None  # R3: its breakpoint
+        self.region: Region | None = None  # in which its firings are fused
+        self.speaks = False  # its code sends by itself: the region says so before each call
+        self.unfit = False  # its firings turned out not to be plain calls
         self.observed = False  # somebody waits at its barriers: no short ways
         self.watched = False  # activity changes have consequences beyond the flag
         self.is_source = False
@@ -294,6 +303,11 @@ class Worker:
         self.failed = 0
         self.calls_failed = 0
         self.restarts = 0
+
+    def disturb(self) -> None:
+        """Something about it is not as it is at rest: if its firings are fused, they are not from here on."""
+        if self.region is not None:
+            self.region.disturb(self)
 
     def edges_in(self) -> tuple[Edge, ...]:
         """All edges into it, slots too."""

@@ -68,6 +68,7 @@ def glance(run: Run) -> Glance:
         run.statistics()
     now = engine.now() if engine.ended_at is None else engine.ended_at
     nodes = []
+    engine.core.settle_counts()
     for worker in engine.all_workers():
         if worker.type is None or worker.scope is not None:
             continue

@@ -168,6 +168,7 @@ class Measuring:
         now = self._engine.now()
         if now - self._mark_at >= _RATE_OVER_S:
             self._before_at, self._mark_at = self._mark_at, now
+            self._engine.core.settle_counts()
             for worker in self._workers():
                 meter = self._meter(worker)
                 meter.before, meter.mark = meter.mark, worker.firings + worker.call_number
@@ -175,6 +176,7 @@ class Measuring:
             self._mark_edges()
 
     def _mark_edges(self) -> None:
+        self._engine.core.settle_counts()
         self._marks = {edge: edge.sent for edge in self._edges()}
 
     def _edges(self) -> Iterator[Any]:

@@ -180,6 +180,10 @@ class Meter:
 
     def fold(self) -> None:
         """Sum up what was measured since the last look, and measure on."""
+        region = self.worker.region
+        if region is not None:
+            region.settle_counts()
+            region.measure_on()
         done = self._done()
         pieces, self._pieces = done - self._pieces, done
         batch, self._fresh = self._fresh, []

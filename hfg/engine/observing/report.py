@@ -81,6 +81,7 @@ class Report(msgspec.Struct, frozen=True):
 
 def node_reports(core: Core) -> dict[str, NodeReport]:
     """Count what every running node has done so far."""
+    core.settle_counts()
     return {
         worker.path: NodeReport(
             firings=worker.firings,
@@ -99,6 +100,7 @@ def node_reports(core: Core) -> dict[str, NodeReport]:
 
 def edge_reports(core: Core) -> dict[str, EdgeReport]:
     """Count what every edge has carried so far."""
+    core.settle_counts()
     return {
         edge.label: EdgeReport(
             sent=edge.sent,

@@ -57,23 +57,29 @@ def consider(worker: Worker) -> None:
         queue(worker)
 
 
+def _follow(worker: Worker) -> None:
+    """It goes next, when the sending is over; behind an earlier call if it stands in the queue for one (F9)."""
+    if worker.queued or worker.busy:
+        worker.follows = True
+    else:
+        worker.queued = True
+        worker.core.followers.append(worker)
+
+
 def let_follow(core: Core, since: int) -> None:
     """R2: what one sending has enabled over sequential edges of its group goes before all else of the group.
 
-    Depth first, in the order of the outputs and edges: so the last of them goes in first. Who stands in the queue
-    already, for a slot call that came before, keeps that place (F9).
+    Depth first, in the order of the outputs and edges: so the last of them goes in first.
 
     Args:
       core: the run.
       since: how many followers there were before the sending.
     """
     followers = core.followers
+    core.followed += len(followers) - since
     while len(followers) > since:
         worker = followers.pop()
-        if not worker.queued and not worker.busy:
-            worker.queued = True
-            worker.push_next(worker)
-            core.followed += 1
+        worker.push_next(worker)
 
 
 def note_start(worker: Worker, rate_hz: float) -> None:
@@ -112,6 +118,7 @@ def must_wait(worker: Worker) -> bool:
 def block(worker: Worker, reason: int) -> None:
     """Let no firing start; its place in the agenda is lost (D1)."""
     worker.blocked |= reason
+    worker.disturb()
     if reason == FULL:
         worker.placed = False  # a rate goes on holding it, and is to be over before a queue grows (F8)
     else:
@@ -150,7 +157,7 @@ def arrived(edge: Edge) -> None:
         if not edge.follows:
             consider(target)
         elif place(target):
-            target.core.followers.append(target)
+            _follow(target)
 
 
 def add_call(target: Worker, edge: Edge) -> None:
@@ -161,7 +168,7 @@ def add_call(target: Worker, edge: Edge) -> None:
     if target.blocked & CALLS_BLOCKED:
         return
     if edge.follows:
-        target.core.followers.append(target)
+        _follow(target)
     else:
         queue(target)
 
@@ -209,12 +216,26 @@ def idle_again(worker: Worker, *, asked: bool = False) -> None:
             return
     if not asked:
         worker.blocked &= ~UNREADY
+    if worker.follows:
+        worker.follows = False
+        if worker.placed or (worker.calls and not worker.blocked & CALLS_BLOCKED):
+            _go_next(worker)
+            return
     if worker.placed:
         queue(worker)
     else:
         consider(worker)
     if worker.calls and not worker.blocked & CALLS_BLOCKED:
         queue(worker)
+
+
+def _go_next(worker: Worker) -> None:
+    """What is left of the wave that has enabled it comes before all else of its group (R2)."""
+    if not worker.queued and not worker.busy:
+        worker.queued = True
+        worker.follows = bool(worker.calls and worker.placed)
+        worker.push_next(worker)
+        worker.core.followed += 1
 
 
 def _let_others(worker: Worker) -> None:

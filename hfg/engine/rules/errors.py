@@ -13,9 +13,9 @@ from hfg.engine.rules.agenda import block
 from hfg.engine.rules.modifiers import automatic, report_error
 from hfg.engine.rules.sending import flush_automatic, put_outputs
 from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit, in_words
-from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.ports.edges import EventEdge
 
-__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "fail_taken", "operator_failed", "time_out"]
+__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "operator_failed", "time_out"]
 
 
 def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
@@ -37,14 +37,6 @@ def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> No
         return
     worker.failed += 1
     apply_policy(worker, as_node_error(worker, what, error), answer=answer)
-
-
-def fail_taken(worker: Worker, stamp: float, taken: tuple[SyncEdge, ...], error: BaseException) -> None:
-    """The function of a short step raised: the firing is one like any other from here."""
-    worker.busy = "firing"
-    worker.stamp = stamp
-    worker.taken = taken
-    fail(worker, f"firing {worker.firings}", error, answer=True)
 
 
 def fail_call(worker: Worker, slot: str, error: BaseException) -> None:

@@ -25,7 +25,7 @@ from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringStarted, TokenTaken
 from hfg.types import accepts, describe
 
-__all__ = ["complete_firing", "finish_firing", "fire", "merge", "step", "write"]
+__all__ = ["complete_firing", "finish_firing", "fire", "merge", "step", "take", "when_done", "write"]
 
 
 def step(worker: Worker) -> None:
@@ -84,7 +84,7 @@ def fire(worker: Worker) -> None:
     worker.ticket += 1
     worker.special = False
     edges = worker.live_inputs
-    tokens = [_take(edge) for edge in edges]
+    tokens = [take(edge) for edge in edges]
     worker.tokens = tokens
     worker.taken = tuple(edge for edge in edges if type(edge) is not EventEdge and edge.sequential)
     now = core.now()
@@ -132,7 +132,7 @@ def _place_next(worker: Worker) -> None:
         consider(worker)
 
 
-def _take(edge: Any) -> Token[Any]:
+def take(edge: Any) -> Token[Any]:
     """Remove the oldest token (rule F3); its place is freed by the caller once the firing is on record."""
     barrier = edge.target.inputs
     if type(edge) is SyncEdge:
@@ -234,7 +234,7 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
             call = partial(_open, worker, step)
         else:
             call, arguments = step, (worker.generator,)
-    worker.core.host.execute(worker, call, arguments, _done(worker))
+    worker.core.host.execute(worker, call, arguments, when_done(worker))
 
 
 def _open(worker: Worker, step: Callable[[Any], Any]) -> Any:
@@ -252,7 +252,7 @@ def _open(worker: Worker, step: Callable[[Any], Any]) -> Any:
     return step(iterator)
 
 
-def _done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
+def when_done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
     """What follows when the process function is over."""
     ticket = worker.ticket
 
@@ -273,7 +273,7 @@ def complete_firing(worker: Worker, result: Any) -> None:
     """The process function ran to its end: its outputs leave together (F3)."""
     if type(result) is CoroutineType and not worker.group.threaded:
         # a plain function has called an async one, or a generator has yielded a call of one
-        worker.core.host.drive(worker, result, _done(worker))
+        worker.core.host.drive(worker, result, when_done(worker))
         return
     try:
         if type(result) is CoroutineType:
@@ -341,7 +341,7 @@ def write(worker: Worker, position: int, value: Any, activity: int | None, stamp
       UsageError: outside a firing (also in a slot handler, F9), or twice in one firing.
     """
     path = f"{worker.path}.{worker.out_names[position]}"
-    if worker.busy not in ("firing", "ending"):
+    if worker.busy not in ("firing", "ending") and (worker.region is None or not worker.region.speaks(worker)):
         where = "in a slot handler" if worker.busy == "call" else "outside a firing"
         raise UsageError(
             f'output "{path}" was written {where}: outputs belong to process() and end(); trigger an event instead'

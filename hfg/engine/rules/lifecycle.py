@@ -47,6 +47,7 @@ def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], Non
 
     def begin() -> None:
         worker.busy = "setup"
+        worker.disturb()
         action(worker, over)
 
     def over() -> None:

@@ -44,6 +44,7 @@ def set_active(worker: Worker, active: bool, cause: Any) -> None:
     if worker.active == active:
         return
     worker.active = active
+    worker.disturb()
     core = worker.core
     node = worker.node
     # under the virtual clock code in a thread sees what was when it began, or chance would say what it sees (R6)

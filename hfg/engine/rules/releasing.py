@@ -5,7 +5,7 @@ Stands on `sending`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from hfg.engine.model.worker import Worker
@@ -13,9 +13,9 @@ from hfg.engine.rules.agenda import consider, freed
 from hfg.engine.rules.sending import send_end
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.token import Token
-from hfg.trace import TokenProcessed, TokenTaken, TraceEvent
+from hfg.trace import TokenProcessed, TokenTaken
 
-__all__ = ["outputs_done", "outputs_free", "release", "take_from_reader"]
+__all__ = ["outputs_free", "release", "take_from_reader"]
 
 
 def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
@@ -37,7 +37,7 @@ def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
         if not edge.held:
             continue
         edge.held = False
-        producer: Worker = edge.source
+        producer: Worker = edge.waits
         core = producer.core
         if core.trace is not None and edge not in drained:
             core.trace(TokenProcessed(core.now(), edge.label))
@@ -60,35 +60,6 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
     else:
         consider(worker)
     return released
-
-
-def outputs_done(worker: Worker, trace: Callable[[TraceEvent], None] | None = None, time: float = 0.0) -> None:
-    """All its tokens are processed: the short form of `release`, up a chain; `trace` hears of it, at `time`."""
-    while True:
-        taken = worker.taken
-        if worker.outputs.waiters is not None or worker.pending_end or len(taken) > 1:
-            release(outputs_free(worker))
-            return
-        held = worker.held
-        worker.held = False
-        if not worker.inputs.missing and not worker.blocked and not worker.placed:
-            consider(worker)
-        if not held or not taken:
-            return
-        upstream: Any = taken[0]
-        if type(upstream) is BufferEdge:
-            release(taken)
-            return
-        if not upstream.held:
-            return
-        upstream.held = False
-        if trace is not None:
-            trace(TokenProcessed(time, upstream.label))
-        worker = upstream.source
-        outputs = worker.outputs
-        outputs.missing -= 1
-        if outputs.missing:
-            return
 
 
 def take_from_reader(worker: Worker) -> Token[Any]:

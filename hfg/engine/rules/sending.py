@@ -99,7 +99,7 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
             return
         edge.token = token
         edge.held = True
-        edge.source.outputs.missing += 1
+        edge.waits.outputs.missing += 1
         add_call(target, edge)
     elif target.blocked & ENDED:
         _drain(edge, token)
@@ -109,7 +109,7 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
             raise EngineInternalError(f'a second token on synchronous edge "{edge.label}"')
         edge.token = token
         edge.held = True
-        edge.source.outputs.missing += 1
+        edge.waits.outputs.missing += 1
         if type(value) is Marker:
             target.special = True
         arrived(edge)
@@ -120,7 +120,7 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
         edge.deepest = max(edge.deepest, len(edge.queue))
         if edge.crowded:
             edge.held = True
-            edge.source.outputs.missing += 1
+            edge.waits.outputs.missing += 1
         elif core.trace is not None:
             core.trace(TokenProcessed(core.now(), edge.label))
         if type(value) is Marker:

@@ -17,7 +17,7 @@ from typing import Any
 
 from hfg.clock import current_clock
 from hfg.engine.editing.edits import Edits
-from hfg.engine.editing.pausing import Halt, Pausing
+from hfg.engine.editing.pausing import Pausing
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.core import Core
 from hfg.engine.model.policies import make_policy
@@ -42,9 +42,9 @@ __all__ = ["Engine"]
 _LOGGER = logging.getLogger("hfg.engine")
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
 _SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
-_VIRTUAL_SLICE_STEPS = 2048  # in virtual time a slice must not depend on how fast the machine is
+_VIRTUAL_SLICE_WAVES = 2048  # in virtual time a slice must not depend on how fast the machine is
+_VIRTUAL_LOOK_WAVES = 8  # it ends sooner only where code has spent virtual time
 _VIRTUAL_LOOKS_BESIDE_WORK = 256  # how long it goes on beside work in a thread before it waits for that
-_VIRTUAL_LOOK_STEPS = 8  # it ends sooner only where code has spent virtual time
 
 _MOST_AT_ONE_INSTANT = 3_000_000  # firings, before a run with `until_s` is taken to stand still
 
@@ -114,6 +114,7 @@ class Engine:
         self.taps = Taps(self)
         self.core.debug = settings.debug
         self.core.fast = settings.fast
+        self.core.fuse_after = settings.fuse_after
         self.flat: FlatGraph = flat
         self.holds = 0
         self.readers: list[Worker] = []
@@ -188,7 +189,7 @@ class Engine:
             elif name == "loop":
                 groups[name] = LoopGroup(name, policy, clock)
             else:
-                groups[name] = SideGroup(name, policy, clock, self._ready_groups)
+                groups[name] = SideGroup(name, policy, clock, self._ready_groups, self.core.flags)
         return groups
 
     def on_loop(self) -> bool:
@@ -243,10 +244,11 @@ class Engine:
         if self.virtual and (policy or self._ready_groups) and self._waits_for_work():
             return
         core.pumping = True
+        core.slices += 1
+        core.flags.clear()
+        drain = self._drain_virtual if self.virtual else self._drain
         try:
-            self._drain(policy, self._loop_group.take, self._ready_groups)
-        except Halt:
-            pass
+            drain(policy, self._loop_group.take, self._ready_groups)
         except Exception as error:
             self.internal_fault(error)
         except KeyboardInterrupt:
@@ -313,13 +315,14 @@ class Engine:
             self.misused(self.core.current or self.core.speaker, error)
 
     def _drain(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
-        """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock."""
-        core = self.core
-        between_looks = _VIRTUAL_LOOK_STEPS if self.virtual else _SLICE_STEPS
-        left = between_looks
-        looks = _VIRTUAL_SLICE_STEPS // _VIRTUAL_LOOK_STEPS
-        instant = self.loop.time() if self.virtual else 0.0
-        until = 0.0
+        """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock.
+
+        A flag ends the slice at once: a pause, the end of the run, or the watchdog, which raises it when nodes take so
+        long that the slice is over before the next look.
+        """
+        flags = self.core.flags
+        until = self.core.until = self.now() + _SLICE_S
+        left = _SLICE_STEPS
         while True:
             if ready_groups:
                 ready_groups.popleft().dispatch()
@@ -328,33 +331,51 @@ class Engine:
                 worker.step(worker)
             elif not ready_groups:
                 return
+            if flags:
+                return
             left -= 1
             if not left:
-                if core.over:
+                if self.now() >= until:
                     return
-                if self.virtual:
-                    looks -= 1
-                    self.beside_work += 1
-                    if not looks:
-                        self._same_instant()
-                    if not looks or self.loop.time() != instant:  # what is due by now has its turn
-                        return
-                    left = between_looks
-                    continue
-                now = time.monotonic()
-                if not until:
-                    until = now + _SLICE_S
-                elif now >= until:
+                left = _SLICE_STEPS
+
+    def _drain_virtual(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
+        """The same where time stands still: a slice is a number of waves, however fast the machine is (R6).
+
+        What has gone in front of the queue belongs to its wave, so that fused regions and single steps count alike.
+        """
+        core, flags = self.core, self.core.flags
+        instant = self.loop.time()
+        core.followed = 0
+        for _ in range(_VIRTUAL_SLICE_WAVES // _VIRTUAL_LOOK_WAVES):
+            left = _VIRTUAL_LOOK_WAVES
+            while left > 0:
+                if ready_groups:
+                    ready_groups.popleft().dispatch()
+                if policy:
+                    worker = take()
+                    worker.step(worker)
+                elif not ready_groups:
                     return
-                left = between_looks
+                if flags:
+                    return
+                left -= 1
+                if left <= 0:
+                    left += core.followed
+                    core.followed = 0
+            self.beside_work += 1
+            if self.loop.time() != instant:  # code has spent time: what is due by now has its turn
+                return
+        self._same_instant()
 
     def _same_instant(self) -> None:
         """R6: with `until_s`, something that goes on and on without letting time pass is refused in the end."""
         now = self.loop.time()
         if now != self._instant:
             self._instant, self._instant_steps = now, 0
-        self._instant_steps += _VIRTUAL_SLICE_STEPS
+        self._instant_steps += _VIRTUAL_SLICE_WAVES
         if self._instant_steps > _MOST_AT_ONE_INSTANT and self.settings.until_s is not None:
+            self.core.settle_counts()
             busiest = max(self.core.workers, key=lambda worker: worker.firings + worker.call_number)
             self.finish(
                 "failed",
@@ -459,6 +480,7 @@ class Engine:
             return
         self.ended_how = (outcome, error)
         self.core.over = True
+        self.core.flags.append("over")
         self.ended_at = self.now()
         for worker in self.all_workers():
             worker.core.over = True

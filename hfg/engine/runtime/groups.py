@@ -11,7 +11,7 @@ import contextvars
 import queue
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 from hfg.engine.model.policies import FairShare, Fifo, Policy
@@ -85,8 +85,16 @@ class _Turn:
 class SideGroup(LoopGroup):
     """Nodes on the loop that are told apart from the loop group: they have a policy of their own."""
 
-    def __init__(self, name: str, policy: Policy, clock: Callable[[], float], ready_groups: deque[Dispatching]) -> None:
+    def __init__(
+        self,
+        name: str,
+        policy: Policy,
+        clock: Callable[[], float],
+        ready_groups: deque[Dispatching],
+        flags: Sequence[str],
+    ) -> None:
         super().__init__(name, policy, clock)
+        self._flags = flags
         self._into = self.push, self.push_next
         self.push, self.push_next = self._push, self._push_next
         self._ready_groups = ready_groups
@@ -110,7 +118,7 @@ class SideGroup(LoopGroup):
         self._stands = False
         try:
             for _ in range(_DISPATCH_STEPS):
-                if self.held or not len(self.policy):
+                if self.held or self._flags or not len(self.policy):
                     return
                 worker = self.take()
                 worker.step(worker)

@@ -218,7 +218,7 @@ def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
         edge = BufferEdge(flat.index, flat.label, flat.active, flat.initial, flat.buffer)
     else:
         edge = SyncEdge(flat.index, flat.label, flat.active)
-    edge.source, edge.target = source, target
+    edge.source, edge.target, edge.waits = source, target, source
     if type(edge) is not EventEdge:
         edge.sequential = is_sequential(edge)
         edge.follows = follows(edge)

@@ -8,7 +8,10 @@ from hfg.engine.observing.consumers import check_consumer
 from hfg.errors import UsageError
 from hfg.trace import TraceEvent
 
-__all__ = ["Settings"]
+__all__ = ["FUSE_AFTER", "Settings"]
+
+FUSE_AFTER = 250
+"""Firings of a head before its region is fused: forming one costs about as much as they save."""
 
 
 class Settings:
@@ -26,6 +29,7 @@ class Settings:
         seed: int | None = None,
         trace: Callable[[TraceEvent], None] | None = None,
         fast: bool = True,
+        fuse_after: int | None = None,
         until_s: float | None = None,
         allow_idle: bool = False,
         block_warning_s: float = 0.1,
@@ -44,6 +48,7 @@ class Settings:
         self.seed = seed
         self.trace = trace
         self.fast = fast
+        self.fuse_after = FUSE_AFTER if fuse_after is None else fuse_after
         self.until_s = until_s
         self.allow_idle = allow_idle
         self.block_warning_s = block_warning_s

@@ -8,13 +8,17 @@ Stands on `core`.
 from __future__ import annotations
 
 import logging
+import sys
 import threading
 import time
 
 from hfg.engine.model.core import Core
+from hfg.engine.model.worker import Worker
 
 __all__ = ["Watch", "watchdog"]
 
+_SLICE_S = 0.005  # how long the pump may keep the loop to itself where nodes are slow
+_LOOKS_WHILE_BUSY = 20  # quick looks after the loop was at work; then at leisure, so that an idle robot sleeps
 _LOGGER = logging.getLogger("hfg.engine")
 
 
@@ -27,17 +31,22 @@ class Watch:
         self.seen: tuple[int, int, int] | None = None
         self.since = 0.0
         self.warned: set[int] = set()
+        self.slice = -1
+        self.thread = threading.get_ident()
+        self.virtual: bool = core.host.epoch is None  # type: ignore[attr-defined]
 
-    def look(self, now: float) -> None:
-        """Compare with the last look; any thread."""
-        worker = self.core.current or self.core.speaker
+    def look(self, now: float) -> bool:
+        """Compare with the last look; any thread. Whether the loop is at work."""
+        self._end_slice()
+        worker = self._at_work()
         if worker is None:
             self.seen = None
-            return
-        seen = (worker.index, worker.firings, worker.call_number)
+            return self.core.pumping
+        region = worker.region
+        seen = (worker.index, worker.firings + (region.waves if region is not None else 0), worker.call_number)
         if seen != self.seen:
             self.seen, self.since = seen, now
-        elif now - self.since >= self.limit_s and worker.index not in self.warned:
+        elif now - self.since >= self.limit_s > 0 and worker.index not in self.warned:
             self.warned.add(worker.index)
             _LOGGER.warning(
                 'node "%s" has blocked the loop for more than %g s: nothing else on the loop can move; '
@@ -47,6 +56,23 @@ class Watch:
                 self.limit_s,
                 extra={"path": worker.path},
             )
+        return True
+
+    def _end_slice(self) -> None:
+        """Nodes are slow, and the pump does not come to look at the clock: let it leave behind the call under way."""
+        core = self.core
+        slice_ = core.slices if core.pumping else -1
+        if slice_ == self.slice and slice_ >= 0 and not core.flags and not self.virtual:
+            core.flags.append("slice")
+        self.slice = slice_
+
+    def _at_work(self) -> Worker | None:
+        """Whose code runs on the loop; in a fused region the line tells it."""
+        worker = self.core.current or self.core.speaker
+        region = worker.region if worker is not None else None
+        if region is None or not region.running:
+            return worker
+        return region.at_work(sys._current_frames().get(self.thread)) or worker
 
 
 class _Watchdog:
@@ -61,12 +87,11 @@ class _Watchdog:
     def watch(self, core: Core, limit_s: float) -> Watch:
         """Begin to watch a run; a limit of 0 or less watches nothing."""
         watch = Watch(core, limit_s)
-        if limit_s > 0:
-            with self._lock:
-                self._watches.append(watch)
-                if self._thread is None:
-                    self._thread = threading.Thread(target=self._live, name="hfg watchdog", daemon=True)
-                    self._thread.start()
+        with self._lock:
+            self._watches.append(watch)
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._live, name="hfg watchdog", daemon=True)
+                self._thread.start()
         return watch
 
     def forget(self, watch: Watch) -> None:
@@ -76,7 +101,7 @@ class _Watchdog:
                 self._watches.remove(watch)
 
     def _live(self) -> None:
-        idle = 0
+        idle = looks = 0
         while True:
             with self._lock:
                 watches = list(self._watches)
@@ -88,9 +113,11 @@ class _Watchdog:
                 else:
                     idle = 0
             now = time.monotonic()
-            for watch in watches:
-                watch.look(now)
-            self._wake.wait(min([watch.limit_s / 4 for watch in watches], default=0.05))
+            if any([watch.look(now) for watch in watches]):  # noqa: C419 - each has its look
+                looks = _LOOKS_WHILE_BUSY
+            looks -= 1
+            often = [watch.limit_s / 4 for watch in watches if watch.limit_s > 0]
+            self._wake.wait(_SLICE_S if looks > 0 else min(often, default=0.05))
 
 
 watchdog = _Watchdog()

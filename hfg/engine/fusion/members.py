@@ -1,0 +1,82 @@
+"""Which running nodes may be members of a fused region, and which may lead one.
+
+A member's firings are calls of its function and nothing else: what else a firing may be asked to do (a gate, a time
+limit, `ready()`, slots, somebody who looks) is for the interpreted way. Stands on the model.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hfg.engine.model.policies import Fifo
+from hfg.engine.model.worker import ENDED, Worker
+from hfg.ports.edges import SyncEdge
+
+__all__ = ["may_be_inside", "may_lead"]
+
+
+def _is_plain(worker: Worker) -> bool:
+    """Its firings are calls of a function and nothing else."""
+    options, kind = worker.options, worker.type
+    return (
+        options is not None
+        and kind is not None
+        and worker.scope is None
+        and not worker.unfit
+        and _nobody_looks(worker)
+        and not worker.group.threaded
+        and isinstance(worker.group.policy, Fifo)
+        and not options.max_duration_s
+        and not worker.gates_over
+        and worker.iteration is None
+        and worker.ready_hook is None
+        and not worker.slot_edges
+        and "processed" not in worker.events
+        and len(worker.out_names) == len(kind.outputs)
+        and not any(worker.wants_token)
+        and all(edge.target_kind == "input" and not edge.ended for edge in worker.in_edges)
+        and (not worker.is_async or not kind.events)
+    )
+
+
+def _nobody_looks(worker: Worker) -> bool:
+    """No edit waits for it, nobody at its barriers, no breakpoint, no tap."""
+    return (
+        not worker.observed
+        and worker.on_idle is None
+        and worker.halt is None
+        and all(edge.tap is None for edges in worker.out_edges for edge in edges)
+    )
+
+
+def may_be_inside(worker: Worker) -> bool:
+    """Whether it may follow the head: its inputs are all fed by outputs of its own group, in the same wave (R2)."""
+    return (
+        not worker.is_source
+        and not worker.blocked & ENDED
+        and worker.type is not None
+        and worker.type.process_kind in ("function", "async")
+        and 0 < len(worker.live_inputs) == len(worker.in_edges)
+        and all(type(edge) is SyncEdge and edge.follows for edge in worker.in_edges)
+        and not worker.paced
+        and _is_plain(worker)
+    )
+
+
+def may_lead(worker: Worker) -> bool:
+    """Whether a region may begin with it: a source, or a function with an edge into each input that it waits for."""
+    core = worker.core
+    if not core.fast or core.debug or core.trace is not None or core.inside is not None:
+        return False
+    if worker.type is None or worker.process is None or not _is_plain(worker) or worker.paced:
+        return False
+    if worker.is_source:
+        return bool(worker.type.process_kind == "generator")
+    if worker.type.process_kind not in ("function", "async"):
+        return False
+    return bool(0 < len(worker.live_inputs) == len(worker.in_edges) and _has_all(worker))
+
+
+def _has_all(worker: Worker) -> bool:
+    fed: set[Any] = {edge.port_name for edge in worker.live_inputs}
+    return all(name in fed for name in worker.mandatory_ports)

@@ -1,0 +1,340 @@
+"""A fused region: nodes whose firings run as one generated function a wave, with values in locals.
+
+*Operator fusion* with *guards* and *side exits*, as in a tracing JIT. Inside of a wave there are no tokens, barriers or
+run queues; outside of one the members look as the rules leave them. What keeps that true:
+
+- **arm**: before a wave that follows something unusual one looks whether everything inside rests and nobody there
+  could pass activity on. From then on the output barrier of the head stands for those of all members: a token that has
+  left the region counts at the head (`Edge.waits`), for until it is processed no member can fire again anyway (F5).
+- **disturb**: whoever changes what a wave takes for granted (blocks a member, makes it active, waits for it) says so
+  to the worker, and the region is disarmed: what the members would say is written down, and the interpreted way goes
+  on.
+- **side exit**: when a call brings what is not plain (an error, a token, code that waits) or a flag is up, the wave
+  ends behind that call: what the locals hold is put on the edges, who is enabled by it in front of the run queue, and
+  the firing under way is finished as any other.
+- **dissolve**: whenever wiring or somebody's interest changes, `specialise` is asked, and the region is gone.
+
+Counts follow from the number of waves; who reads them has them settled first. Stands on `schedule` and `writing`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from types import CodeType, FrameType
+from typing import Any
+
+from hfg.engine.fusion.schedule import Schedule
+from hfg.engine.fusion.writing import Wave, write_wave
+from hfg.engine.model.core import PENDING
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules import agenda, ending, errors, firing
+from hfg.engine.rules.releasing import release
+from hfg.errors import EndOfStream
+from hfg.ports.edges import EventEdge
+from hfg.token import NO_MESSAGE, Token
+
+__all__ = ["Region"]
+
+_MOST_EXITS = 16  # by one member, before it is asked whether they are the rule
+
+
+class Region:
+    """A head and those that fire behind it in one wave.
+
+    Attributes:
+      head: whose step runs a wave.
+      schedule: the members in their order, and the edges between them.
+      step: what the head's step is while the region lasts.
+      armed: everything inside rests, or a wave runs.
+      running: a wave is under way.
+    """
+
+    def __init__(self, schedule: Schedule, respecialise: Callable[[Worker], None]) -> None:
+        self.schedule = schedule
+        self.order = order = schedule.order
+        self.head = head = order[0]
+        self.core = head.core
+        self.entries: tuple[Any, ...] = head.live_inputs
+        self.held_entries = tuple(edge for edge in self.entries if type(edge) is not EventEdge and edge.sequential)
+        self.inner = [edge for out in schedule.outs for edge, _, to in out if to is not None]
+        self.border = [edge for out in schedule.outs for edge, _, to in out if to is None]
+        self.carriers = [worker for worker in order if any(edge.active for edge in worker.all_out_edges())]
+        self.armed = False
+        self.running = False
+        self.doomed = False
+        self.detached: Any = None  # the wave whose call waits, and goes on as a firing like any other
+        self._after: Callable[[Any, BaseException | None], None] | None = None
+        self._lender = next((worker for worker in order if worker.is_async), None)
+        self.waves = 0  # not yet in the counts of members and edges
+        self.silent = [0] * len(order)  # silent firings, likewise
+        self.spread = [0] * len(order)  # how often all behind a member were silent since it was
+        self._exits = [0] * len(order)
+        self._formed_at = head.firings
+        self._respecialise = respecialise
+        for worker in order:
+            if worker.region is not None:
+                worker.region.dissolve()
+        for worker in order:
+            worker.region = self
+        self.core.regions.add(self)
+        self._plain = write_wave(self, measured=False)
+        self._measured: Wave | None = write_wave(self, measured=True) if head.meter is not None else None
+        self._wave = self._measured or self._plain
+        self.step = self._wave.step
+
+    # --- armed or not -----------------------------------------------------------------------------------------------
+
+    def arm(self) -> bool:
+        """Before a wave that follows something unusual: does everything inside rest, and would no activity move?"""
+        if self.doomed or self.head.outputs.missing or any(worker.active for worker in self.carriers):
+            return False
+        for worker in self.order[1:]:
+            if worker.busy or worker.blocked or worker.placed or worker.outputs.missing or worker.pending_end:
+                return False
+            if worker.calls or worker.on_idle is not None or worker.inputs.missing != len(worker.live_inputs):
+                return False
+        for edge in self.border:
+            edge.waits = self.head
+        self.armed = True
+        return True
+
+    def disarm(self) -> None:
+        """The interpreted way goes on: write down what finished waves still wait for, where that way looks for it."""
+        if self.armed:
+            self.armed = False
+            self.settle_counts()
+            self._write_barriers(len(self.order))
+
+    def disturb(self, worker: Worker) -> None:
+        """A member does not rest any more; of the head only its next wave asks."""
+        if self.running:
+            self.core.flags.append("disturbed")
+        elif worker is not self.head:
+            self.disarm()
+
+    def dissolve(self) -> None:
+        """Its members are nodes like any others from here on; from within a wave, from its end on."""
+        if self.running:
+            self.doomed = True
+            self.core.flags.append("dissolved")
+            return
+        self.disarm()
+        if self in self.core.regions:
+            self.core.regions.discard(self)
+            for worker in self.order:
+                worker.region = None
+            for worker in self.order:
+                self._respecialise(worker)
+
+    def decline(self, worker: Worker) -> None:
+        """The head's next piece of work is not a plain wave."""
+        self.disarm()
+        firing.step(worker)
+
+    # --- counts -----------------------------------------------------------------------------------------------------
+
+    def settle_counts(self) -> None:
+        """Each member has fired once a wave, and each inner edge has carried one token."""
+        waves, self.waves = self.waves, 0
+        if waves:
+            for worker in self.order:
+                worker.firings += waves
+            for edge in self.inner:
+                edge.sent += waves
+        spread = 0
+        for number, worker in enumerate(self.order):
+            worker.silent += self.silent[number] + spread
+            spread += self.spread[number]
+            self.silent[number] = self.spread[number] = 0
+
+    # --- the end of a wave --------------------------------------------------------------------------------------------
+
+    def over(self, done: int) -> None:
+        """So many waves have run to their end."""
+        self.running = False
+        self.waves += done
+        head, core = self.head, self.core
+        if core.followers:
+            self._let_follow(self.schedule.followers)
+        if head.outputs.missing:
+            head.held = True
+            head.taken = self.held_entries
+        elif self.held_entries:
+            release(self.held_entries)
+        if self.doomed:
+            self.dissolve()
+        elif self._wave is self._measured and all(worker.meter.left <= 0 for worker in self.order):
+            self._wave = self._plain
+            head.step = self.step = self._plain.step
+        agenda.consider(head)
+
+    def measure_on(self) -> None:
+        """What was measured has been read: measure the next waves."""
+        if self._measured is not None and self._wave is not self._measured and self.head.step is self.step:
+            self._wave = self._measured
+            self.head.step = self.step = self._measured.step
+
+    def _let_follow(self, candidates: Sequence[Worker]) -> None:
+        """Those outside whom the wave has enabled go next, in the order R2 prescribes."""
+        core = self.core
+        for worker in reversed(candidates):
+            if worker in core.followers:
+                worker.push_next(worker)
+        core.followed += len(core.followers)
+        core.followers.clear()
+
+    # --- side exits -------------------------------------------------------------------------------------------------
+
+    def leave(self, k: int, found: dict[str, Any]) -> Any:
+        """Something about the firing of member k is not plain: what it gave back, or what happened meanwhile."""
+        result = found[f"r{k}"] if f"r{k}" in found else found[f"v{k}_0"]
+        if self.detached is not None:
+            self.detached = None
+            return result  # of the coroutine that has waited, so that it comes back as its firing's
+        if not self.core.flags:
+            self._note_exit(k)
+        worker = self.materialise(k, found)
+        firing.complete_firing(worker, result)
+        self._left()
+        return None
+
+    def caught(self, error: BaseException, found: dict[str, Any]) -> None:
+        """Which call has raised is told by its line, so it costs nothing until it happens.
+
+        Raises:
+          BaseException: what is no error of a node (Ctrl-C, and what ends a task or the program).
+        """
+        if self.detached is not None:
+            self.detached = None
+            raise error
+        traceback: Any = error.__traceback__
+        k = self._wave.calls.get(traceback.tb_lineno)
+        if k is None:
+            self.running = False
+            raise error  # a fault of ours
+        worker = self.materialise(k, found)
+        if worker.is_source and isinstance(error, StopIteration | EndOfStream):
+            ending.source_ended(worker)
+        elif isinstance(error, Exception):
+            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+        else:
+            self._left()
+            raise error
+        self._left()
+
+    def _left(self) -> None:
+        if self.doomed:
+            self.dissolve()
+
+    def _note_exit(self, k: int) -> None:
+        """A member that is hardly ever plain is none: the region forms anew without it."""
+        self._exits[k] += 1
+        waves = self.head.firings + self.waves - self._formed_at
+        if self._exits[k] >= _MOST_EXITS and self._exits[k] * 8 > waves:
+            self.order[k].unfit = self.doomed = True
+
+    def materialise(self, k: int, found: dict[str, Any]) -> Worker:
+        """Members before k have fired and k is amid its firing: let the interpreted way see it so."""
+        self.waves += found["done"]
+        self.settle_counts()
+        self.armed = self.running = False
+        order, stamp = self.order, found["stamp"]
+        for j in range(k):
+            order[j].firings += 1
+            for edge, output, to in self.schedule.outs[j]:
+                if to is None:
+                    continue
+                edge.sent += 1
+                if to > k:
+                    value = found.get(f"v{j}_{output}")
+                    value = NO_MESSAGE if value is None else value
+                    edge.token = Token(value, 0, stamp, edge.sent)
+                    order[to].inputs.missing -= 1
+                    order[to].special = order[to].special or value is NO_MESSAGE
+        self._write_barriers(k)
+        worker = order[k]
+        worker.firings += 1
+        worker.ticket += 1
+        worker.busy = "firing"
+        worker.stamp = stamp
+        worker.taken = worker.live_inputs if k else self.held_entries
+        self._queue_behind(k)
+        self.core.speaker = worker
+        return worker
+
+    def _queue_behind(self, k: int) -> None:
+        """Who stands behind member k is enabled by now, or by an outside edge that was waited for (R2)."""
+        behind = self.schedule.behind[k]
+        for worker in behind:
+            if worker in self.schedule.position and agenda.place(worker):
+                worker.queued = True
+                self.core.followers.append(worker)
+        self._let_follow(behind)
+
+    def _write_barriers(self, k: int) -> None:
+        """F5: who of those that have fired, the first k, still waits for what it has sent."""
+        for edge in self.border:
+            edge.waits = edge.source
+        done = [False] * len(self.order)
+        for j in reversed(range(k)):
+            worker, missing = self.order[j], 0
+            for edge, _, to in self.schedule.outs[j]:
+                if to is not None:
+                    edge.held = to >= k or not done[to]
+                missing += edge.held
+            worker.outputs.missing = missing
+            worker.held = missing > 0
+            done[j] = not missing
+            if missing:
+                worker.taken = worker.live_inputs if j else self.held_entries
+
+    # --- code that waits --------------------------------------------------------------------------------------------
+
+    def start(self, waves: Any) -> None:
+        """Run a wave in which there is async code, with the identity of a task: once a wave, not once a call.
+
+        A call that really waits becomes a firing like any other; the wave's coroutine stays around it.
+        """
+        lender: Any = self._lender
+        if lender.carrier.start(waves, self._late) is not PENDING:
+            return
+        frame = waves.cr_frame
+        found = dict(frame.f_locals)
+        k = self._wave.calls[frame.f_lineno]
+        worker = self.order[k]
+        lender.carrier, worker.carrier = worker.carrier, lender.carrier  # whoever cancels the node means this code
+        self.detached = waves
+        self._note_exit(k)
+        self.materialise(k, found)
+        host = self.core.host
+        host.begin(worker)
+        self._after = host.late(worker, firing.when_done(worker))
+        self._left()
+
+    def _late(self, result: Any, error: BaseException | None) -> None:
+        after, self._after = self._after, None
+        assert after is not None
+        after(result, error)
+
+    # --- who is at work ----------------------------------------------------------------------------------------------
+
+    def at_work(self, frame: FrameType | None) -> Worker | None:
+        """Whose call a running wave is in, by the line it is at; None if the frames are of something else."""
+        codes: tuple[CodeType | None, ...] = (self._plain.code, self._measured.code if self._measured else None)
+        while frame is not None:
+            if frame.f_code in codes:
+                return self.order[self._wave.calls.get(frame.f_lineno, 0)]
+            frame = frame.f_back
+        return None
+
+    def speaks(self, worker: Worker) -> bool:
+        """A member sends by itself, which a plain call does not: whether it is the one whose call runs.
+
+        It leaves the wave behind this call, and the next region says before each of its calls that it runs.
+        """
+        if not self.running or self.at_work(sys._getframe(1)) is not worker:
+            return False
+        worker.speaks = self.doomed = True
+        self.core.flags.append("speaks")
+        return True

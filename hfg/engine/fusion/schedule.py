@@ -1,0 +1,123 @@
+"""The static schedule of a region: who fires after whom in a wave, found by running rule R2 once without values.
+
+At rest each member of a region fires exactly once a wave, silent or not, and over sequential edges R2 prescribes depth
+first. So the order is known before any value is: *static scheduling of synchronous data flow* (Lee and Messerschmitt,
+1987). Stands on `members`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hfg.engine.fusion.members import may_be_inside
+from hfg.engine.model.worker import Worker
+
+__all__ = ["MOST_MEMBERS", "Schedule", "schedule"]
+
+MOST_MEMBERS = 64
+"""Members of one region: Python compiles long functions slowly, and a wave is what the loop may have to wait for."""
+
+
+class Schedule:
+    """In which order the members of a region fire.
+
+    Attributes:
+      order: the members, the head first.
+      position: of each member in `order`.
+      outs: per member its live output edges in the order of their sending, each with the number of its output and the
+        position of the member it leads to; None where it leaves the region.
+      behind: per member who would stand in front of the run queue when its turn has come, the next one first.
+      followers: those outside who would stand there when the last member has fired.
+    """
+
+    def __init__(self, order: list[Worker], behind: list[tuple[Worker, ...]], followers: tuple[Worker, ...]) -> None:
+        self.order = order
+        self.position = {worker: number for number, worker in enumerate(order)}
+        self.behind = behind
+        self.followers = followers
+        self.outs: list[list[tuple[Any, int, int | None]]] = [
+            [(edge, output, self._inside(edge)) for edge, output in _sending(worker)] for worker in order
+        ]
+
+    def _inside(self, edge: Any) -> int | None:
+        """Where the edge leads to; its target may be a member by name only, fed past the region (a second edge)."""
+        return self.position.get(edge.target) if edge.follows and edge.target_kind == "input" else None
+
+
+def schedule(head: Worker) -> Schedule:
+    """Find the members of the region that begins with the head, and their order."""
+    inside = _closure(head)
+    while True:
+        found = _simulate(head, inside)
+        if len(found.order) == len(inside):
+            return found
+        inside = set(found.order)  # who was fed by one that has dropped out drops out as well
+
+
+def _sending(worker: Worker) -> list[tuple[Any, int]]:
+    """Its live edges with the number of their output, slots first (F9)."""
+    edges = [(edge, output) for output, edges in enumerate(worker.out_edges) for edge in edges]
+    return sorted(edges, key=lambda one: one[0].target_kind != "slot")
+
+
+def _closure(head: Worker) -> set[Worker]:
+    """The head and everybody whose inputs all come from here, at most `MOST_MEMBERS`."""
+    inside, todo = {head}, [head]
+    missing: dict[Worker, int] = {}
+    while todo and len(inside) < MOST_MEMBERS:
+        for edge, _ in reversed(_sending(todo.pop())):
+            target: Worker = edge.target
+            if not edge.follows or edge.target_kind != "input" or target in inside:
+                continue
+            if target.region is not None and target.region.head is not target:
+                continue
+            if target not in missing and not may_be_inside(target):
+                continue
+            missing[target] = missing.get(target, len(target.live_inputs)) - 1
+            if not missing[target] and len(inside) < MOST_MEMBERS:
+                inside.add(target)
+                todo.append(target)
+    return inside
+
+
+def _simulate(head: Worker, inside: set[Worker]) -> Schedule:
+    """Run R2 without values: a stack of those who are enabled, depth first.
+
+    The region ends where somebody from outside would have to fire between two members: all that is enabled then is for
+    the run queue.
+    """
+    left = _edges_left(inside)
+    order: list[Worker] = []
+    behind: list[tuple[Worker, ...]] = []
+    stack = [head]
+    while stack:
+        worker = stack.pop()
+        if worker not in inside:
+            return Schedule(order, behind, (worker, *reversed(stack)))
+        order.append(worker)
+        behind.append(tuple(reversed(stack)))
+        enabled: list[Worker] = []
+        for edge, _ in _sending(worker):
+            target: Worker = edge.target
+            if not edge.follows:
+                continue
+            if edge.target_kind == "slot":  # each of its tokens is a call of its own
+                if target not in enabled and target not in stack:
+                    enabled.append(target)
+                continue
+            left[target] -= 1
+            if not left[target]:
+                enabled.append(target)
+        stack.extend(reversed(enabled))
+    return Schedule(order, behind, ())
+
+
+def _edges_left(inside: Sequence[Worker] | set[Worker]) -> dict[Worker, int]:
+    """How many edges lead from members to each target: the last token of them may enable it."""
+    left: dict[Worker, int] = {}
+    for worker in inside:
+        for edge, _ in _sending(worker):
+            if edge.follows and edge.target_kind != "slot":
+                left[edge.target] = left.get(edge.target, 0) + 1
+    return left

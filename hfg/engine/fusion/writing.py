@@ -1,0 +1,455 @@
+"""Writes the function that runs one wave of a region: straight-line Python, one line a call.
+
+What is known when the region is formed is text; what depends on the region's objects comes in as closures, so that
+regions of one shape share their compiled code. A member's values are locals, `v3_0` for the first output of member 3;
+`None` is NO_MESSAGE. Behind each call stands one guard: the type of the result is that of the last one, and no flag is
+up. Everything else is a side exit of the region.
+
+Which call raised, and which one is under way, is told by the line; the lines are known to `linecache`, so a traceback
+and a debugger show which node it is. Stands on `schedule`.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import linecache
+from collections.abc import Callable
+from time import monotonic
+from types import CodeType, CoroutineType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules.agenda import consider, freed
+from hfg.engine.rules.firing import take
+from hfg.engine.rules.releasing import release
+from hfg.engine.rules.sending import put
+from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.token import NO_MESSAGE, Token
+
+if TYPE_CHECKING:
+    from hfg.engine.fusion.region import Region
+
+__all__ = ["Wave", "write_wave"]
+
+_EXCEPTIONAL = frozenset({Token, CoroutineType})
+"""Results that do not simply leave: a token passed on, code that is still to be awaited."""
+
+_KEPT_SOURCES = 256
+_numbers = itertools.count(1)
+_shown: dict[str, None] = {}  # names of the newest sources that linecache knows
+
+
+class Wave(NamedTuple):
+    """The code of a region's wave.
+
+    Attributes:
+      step: runs a wave, or several; the step of the head.
+      calls: which line calls which member.
+      code: of the function in which the calls stand.
+    """
+
+    step: Callable[[Worker], None]
+    calls: dict[int, int]
+    code: CodeType
+
+
+def write_wave(region: Region, *, measured: bool) -> Wave:
+    """Write, compile and bind the wave of a region; `measured`: each call tells the member's meter how long it took."""
+    writer = _Writer(region, measured)
+    text = writer.write()
+    name = f"<hfg region {next(_numbers)}: {region.head.path}>"
+    _show(name, text, writer.calls, [worker.path for worker in region.order])
+    names: dict[str, Any] = {}
+    exec(_renamed(_compiled(text), name), names)
+    bound = names["build"](region, _Names(region, measured), *_TOOLS)
+    return Wave(bound[0], writer.calls, bound[1].__code__)
+
+
+class _Names:
+    """What the text of a wave takes from its region, by the number of the member."""
+
+    def __init__(self, region: Region, measured: bool) -> None:
+        core = region.core
+        host: Any = core.host
+        order = region.order
+        self.core = core
+        self.head = region.head
+        self.now = core.now
+        self.epoch = host.epoch
+        self.flags = core.flags
+        self.queue = region.head.group.policy
+        self.ready = host._ready_groups
+        self.entries = region.entries
+        self.workers = order
+        self.calls = [worker.process if worker.meter is None else worker.meter.code for worker in order]
+        self.unset = [worker.unset for worker in order]
+        self.edges = [[edge for edge, _, _ in out] for out in region.schedule.outs]
+        self.took = [worker.meter.took if measured else None for worker in order]
+        self.splits = [worker.node._split for worker in order]
+
+
+def _take_queued(edge: Any) -> Token[Any]:
+    """The oldest token of an edge with a queue, with all that follows from its being taken."""
+    token: Token[Any] = take(edge)
+    if type(edge) is EventEdge:
+        freed(edge)
+    elif not edge.sequential:
+        release((edge,))
+    return token
+
+
+def _values(region: Region, k: int, result: Any) -> list[Any] | None:
+    """What member k has sent, or gives back, by output; None if that is not plain: a modifier or stamp, or twice."""
+    worker = region.order[k]
+    written, count = worker.written, len(region.order[k].out_edges)
+    if written is None:
+        values = [None] * count if result is None else worker.node._split(result)
+        return None if any(type(value) in _EXCEPTIONAL for value in values) else list(values)
+    entries = [entry for entry in written if entry is not None]
+    if result is not None or any(modifier is not None or stamp is not None for _, modifier, stamp in entries):
+        return None
+    if any(type(value) in _EXCEPTIONAL for value, _, _ in entries):
+        return None
+    worker.written = None
+    return [None if entry is None else entry[0] for entry in written]
+
+
+_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, consider, _take_queued, _values)
+_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, consider, take_queued, values_of"
+
+
+@functools.lru_cache(maxsize=512)
+def _compiled(text: str) -> CodeType:
+    return compile(text, "<hfg region>", "exec")
+
+
+def _renamed(code: CodeType, name: str) -> CodeType:
+    """The same code under a name of its own, so that its lines can be told from those of other regions."""
+    constants = tuple(_renamed(one, name) if isinstance(one, CodeType) else one for one in code.co_consts)
+    return code.replace(co_filename=name, co_consts=constants)
+
+
+def _show(name: str, text: str, calls: dict[int, int], paths: list[str]) -> None:
+    """Let tracebacks and debuggers show the lines, each call with the path of its node."""
+
+    def lines() -> str:
+        shown = text.splitlines()
+        for line, member in calls.items():
+            shown[line - 1] += f'  # node "{paths[member]}"'
+        return "\n".join(shown) + "\n"
+
+    linecache.cache[name] = (lines,)
+    _shown[name] = None
+    while len(_shown) > _KEPT_SOURCES:
+        oldest = next(iter(_shown))
+        del _shown[oldest]
+        linecache.cache.pop(oldest, None)
+
+
+class _Writer:
+    """Writes the text of one wave; `calls` says afterwards which line calls which member."""
+
+    def __init__(self, region: Region, measured: bool) -> None:
+        self.order = region.order
+        self.outs = region.schedule.outs
+        self.position = region.schedule.position
+        self.entries = region.entries
+        self.measured = measured
+        self.head = self.order[0]
+        self.is_source = self.head.is_source
+        self.has_border = bool(region.border)
+        self.carries = self.head in region.carriers
+        self.is_async = any(worker.is_async for worker in self.order)
+        host: Any = region.core.host
+        self.real = host.epoch is not None  # time goes on while code runs
+        self.loops = self.real and not self.head.paced and (self.is_source or self._one_queue())
+        self.single = [self._is_single(worker) for worker in self.order]
+        self.lines: list[str] = []
+        self.calls: dict[int, int] = {}
+        self.indent = 0
+
+    def _one_queue(self) -> bool:
+        return len(self.entries) == 1 and type(self.entries[0]) is EventEdge
+
+    def _is_single(self, worker: Worker) -> bool:
+        """What it gives back is the value of its one output, or nothing."""
+        return not _speaks(worker) and worker.type.result in ("none", "single")
+
+    def say(self, text: str, call: int | None = None) -> None:
+        self.lines.append("    " * self.indent + text)
+        if call is not None:
+            self.calls[len(self.lines)] = call
+
+    # --- the parts, in the order of the text --------------------------------------------------------------------------
+
+    def write(self) -> str:
+        """The whole text."""
+        self._bindings()
+        self._entrance()
+        self.say("try:")
+        self.indent += 1
+        if self.loops:
+            self.say("while True:")
+            self.indent += 1
+        self._head()
+        for k in range(1, len(self.order)):
+            self._member(k)
+        self._end_of_wave()
+        self._exit()
+        return "\n".join(self.lines) + "\n"
+
+    def _bindings(self) -> None:
+        say = self.say
+        say(f"def build(region, names, {_TOOL_NAMES}):")
+        self.indent = 1
+        say("core, head, now, epoch, flags = names.core, names.head, names.now, names.epoch, names.flags")
+        say("queue, ready, inputs, outputs = names.queue, names.ready, head.inputs, head.outputs")
+        say("silent, spread = region.silent, region.spread")
+        if self.is_async:
+            say("start = region.start")
+        for number in range(len(self.entries)):
+            say(f"entry{number} = names.entries[{number}]")
+        pipelined = [number for number, edge in enumerate(self.entries) if self._is_pipelined(edge)]
+        if pipelined:
+            say(f"pipelined = ({', '.join(f'entry{number}' for number in pipelined)},)")
+        for k, worker in enumerate(self.order):
+            if k or not self.is_source:
+                say(f"f{k} = names.calls[{k}]")
+            if _speaks(worker):
+                say(f"w{k} = names.workers[{k}]")
+            elif not self.single[k]:
+                say(f"split{k} = names.splits[{k}]")
+            if self.measured:
+                say(f"took{k} = names.took[{k}]")
+            fed = {edge.position for edge in worker.live_inputs if edge.mandatory}
+            for at in range(len(worker.unset)):
+                if (at not in fed and not self.is_source) or (k and at not in fed):
+                    say(f"d{k}_{at} = names.unset[{k}][{at}]")
+            for number, (_, _, to) in enumerate(self.outs[k]):
+                if to is None:
+                    say(f"e{k}_{number} = names.edges[{k}][{number}]")
+        kinds = self._kinds()
+        if kinds:
+            say(" = ".join([*kinds, "None"]))  # the types of the last results
+
+    def _kinds(self) -> list[str]:
+        return [f"t{k}" for k in range(len(self.order)) if self.single[k] and self.order[k].out_names]
+
+    def _is_pipelined(self, edge: Any) -> bool:
+        return type(edge) is SyncEdge and not edge.sequential
+
+    def _entrance(self) -> None:
+        """May a wave run at all? Else the interpreted way."""
+        say = self.say
+        if self.is_async:
+            say("def step(worker):")
+        else:
+            say("def wave(worker):")
+        self.indent = 2
+        if not self.is_async:
+            self._nonlocal()
+        odd = ["worker.special", "worker.busy", "not worker.placed"]
+        odd += ["worker.active"] if self.carries else []
+        odd += ["worker.generator is None"] if self.is_source else ["inputs.missing"]
+        for number, edge in enumerate(self.entries):
+            if type(edge) is SyncEdge:
+                odd.append(f"entry{number}.token.activity")
+            else:
+                odd += [f"not entry{number}.live", f"entry{number}.queue[0].activity"]
+        say(f"if {' or '.join(odd)} or not (region.armed or region.arm()): return region.decline(worker)")
+        say("worker.queued = worker.placed = False")
+        say("region.running = True")
+        say("core.speaker = worker")
+        if self.is_async:
+            say("return start(waves(worker))")
+            self.indent = 1
+            say("async def waves(worker):")
+            self.indent = 2
+            self._nonlocal()
+        say("done = 0")
+        if self.is_source:
+            say("generator = worker.generator")
+            if self.loops:
+                say("until = core.until")
+
+    def _nonlocal(self) -> None:
+        if self._kinds():
+            self.say(f"nonlocal {', '.join(self._kinds())}")
+
+    def _head(self) -> None:
+        say = self.say
+        if self.is_source:
+            say("stamp = monotonic() + epoch" if self.real else "stamp = now()")
+            self._call(0, "next(generator)")
+            return
+        for number, edge in enumerate(self.entries):
+            if type(edge) is SyncEdge:
+                say(f"token{number} = entry{number}.token")
+                say(f"entry{number}.token = None")
+            else:
+                say(f"token{number} = take_queued(entry{number})")
+        synchronous = sum(type(edge) is SyncEdge for edge in self.entries)
+        if synchronous:
+            say(f"inputs.missing += {synchronous}")
+        if len(self.entries) == 1:
+            say("stamp = token0.stamp")
+        else:
+            say(f"stamp = max({', '.join(f'token{number}.stamp' for number in range(len(self.entries)))})")
+        if any(self._is_pipelined(edge) for edge in self.entries):
+            say("release(pipelined)")
+        given = {edge.position: f"token{number}.value" for number, edge in enumerate(self.entries)}
+        arguments = [given.get(at, f"d0_{at}") for at in range(len(self.head.unset))]
+        self._call(0, f"f0({', '.join(arguments)})")
+
+    def _member(self, k: int) -> None:
+        """One member: silent if what it needs is (F4), else a call."""
+        say = self.say
+        worker = self.order[k]
+        edges = {edge.position: edge for edge in worker.live_inputs}
+        arguments = [self._argument(k, at, edges.get(at)) for at in range(len(worker.unset))]
+        call = f"f{k}({', '.join(arguments)})"
+        needed = [self._value(edge) for edge in worker.live_inputs if edge.mandatory]
+        if needed:
+            tests = [f"{value} is None" for value in needed if self._may_be_silent(value)]
+            silence = " or ".join(dict.fromkeys(tests))
+        else:
+            silence = " and ".join(f"{self._value(edge)} is None" for edge in worker.live_inputs)
+        if not silence:
+            self._call(k, call)
+            return
+        say(f"if {silence}:")
+        self.indent += 1
+        outputs = [f"v{k}_{output}" for output in range(max(1, len(worker.out_names)))]
+        say(" = ".join([*outputs, "None"]))
+        say(f"silent[{k}] += 1")
+        self._put(k)
+        self.indent -= 1
+        say("else:")
+        self.indent += 1
+        self._call(k, call, within=True)
+        self.indent -= 1
+
+    def _value(self, edge: Any) -> str:
+        """The local that holds what the edge carries in this wave."""
+        source = self.position[edge.source]
+        output = next(output for one, output, _ in self.outs[source] if one is edge)
+        return f"v{source}_{output}"
+
+    def _argument(self, k: int, at: int, edge: Any) -> str:
+        """P6: an absent optional input takes its default."""
+        if edge is None:
+            return f"d{k}_{at}"
+        value = self._value(edge)
+        return value if edge.mandatory else f"(d{k}_{at} if {value} is None else {value})"
+
+    def _may_be_silent(self, value: str) -> bool:
+        """Whether the wave can go on with this value missing; else it has ended for all behind it."""
+        return not self._silences_all_behind(int(value[1:].partition("_")[0]))
+
+    def _silences_all_behind(self, k: int) -> bool:
+        """If it is silent, so is everybody behind it, and nothing of theirs or its own leaves the region."""
+        if not self.single[k]:
+            return False
+        silent = {k}
+        for t in range(k + 1, len(self.order)):
+            if any(edge.mandatory and self.position[edge.source] in silent for edge in self.order[t].live_inputs):
+                silent.add(t)
+        border = any(to is None for out in self.outs[k:] for _, _, to in out)
+        return len(silent) == len(self.order) - k and not border
+
+    def _call(self, k: int, call: str, *, within: bool = False) -> None:
+        """Call a member, look at what it gives back, and let that leave."""
+        worker = self.order[k]
+        if _speaks(worker):
+            self.say(f"core.speaker = w{k}; w{k}.busy = 'firing'; w{k}.stamp = stamp")
+        if self.measured:
+            self.say("began = monotonic()")
+        if worker.is_async:
+            call = f"await {call}"
+        self.say(f"{'v' if self.single[k] else 'r'}{k}{'_0' if self.single[k] else ''} = {call}", k)
+        if self.measured:
+            self.say("ended = monotonic()")
+            delay = "" if self.is_source and not k else ", ended + epoch - stamp" if self.real else ", now() - stamp"
+            if worker.is_async:  # while it waited others ran: that kept nobody busy
+                delay = f"{delay or ', None'}, None if region.detached is None else 0.0"
+            self.say(f"took{k}(ended - began{delay})")
+        if not self.single[k]:
+            self._spread_out(k)
+        elif worker.out_names:
+            self._guard(k, within)
+        else:
+            self.say(f"if v{k}_0 is not None or flags{self._detached(k)}: return region.leave({k}, locals())")
+        self._put(k)
+
+    def _detached(self, k: int) -> str:
+        return " or region.detached is not None" if self.order[k].is_async else ""
+
+    def _guard(self, k: int, within: bool) -> None:
+        say, value = self.say, f"v{k}_0"
+        say(f"if type({value}) is not t{k} or flags{self._detached(k)}:")
+        self.indent += 1
+        say(f"if flags or type({value}) in EXCEPTIONAL{self._detached(k)}: return region.leave({k}, locals())")
+        say(f"if {value} is not None: t{k} = type({value})")
+        if not within and self._silences_all_behind(k) and len(self.order) > k + 1:
+            say("else:")
+            self.indent += 1
+            say(f"spread[{k}] += 1")
+            if self.loops:
+                self._end_of_wave()
+                say("continue")
+            else:
+                say("return region.over(1)")
+            self.indent -= 1
+        self.indent -= 1
+
+    def _spread_out(self, k: int) -> None:
+        """Several outputs, or sent by the code itself."""
+        say, worker = self.say, self.order[k]
+        if _speaks(worker):
+            say(f"if flags or w{k}.right: return region.leave({k}, locals())")
+        else:
+            say(f"if flags: return region.leave({k}, locals())")
+        say(f"values = values_of(region, {k}, r{k})", k)
+        say(f"if values is None: return region.leave({k}, locals())")
+        if _speaks(worker):
+            say(f"w{k}.busy = ''; w{k}.stamp = None")
+        for output in range(len(worker.out_names)):
+            say(f"v{k}_{output} = values[{output}]")
+
+    def _put(self, k: int) -> None:
+        """Over the border of the region."""
+        for number, (_, output, to) in enumerate(self.outs[k]):
+            if to is None:
+                value = f"v{k}_{output}"
+                self.say(f"put(e{k}_{number}, NO_MESSAGE if {value} is None else {value}, 0, stamp)")
+
+    def _end_of_wave(self) -> None:
+        """Is there another wave at once? Only if nobody else waits for the group: waves are first in, first out."""
+        say = self.say
+        say("done += 1")
+        if not self.loops:
+            return
+        stop = ["queue", "ready", "flags", "worker.blocked"]
+        if self.is_source:
+            stop.insert(0, "stamp > until")
+        else:
+            stop += ["inputs.missing", "worker.special", "entry0.queue[0].activity", "now() > core.until"]
+        if self.has_border:
+            stop.append("outputs.missing")
+        say(f"if {' or '.join(stop)}: break")
+
+    def _exit(self) -> None:
+        say = self.say
+        self.indent = 2
+        say("except BaseException as error:")
+        say("    return region.caught(error, locals())")
+        say("return region.over(done)")
+        self.indent = 1
+        say("return (step, waves)" if self.is_async else "return (wave, wave)")
+
+
+def _speaks(worker: Worker) -> bool:
+    """Whether its code triggers or sends by itself, so that the worker has to say that it runs."""
+    kind = worker.type
+    return worker.speaks or (not worker.silent_code and (bool(kind.events) or kind.result == "fields"))
