@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["after_receipt", "leaving"]
+__all__ = ["after_receipt", "asked_for", "leaving"]
 
 
 def after_receipt(active: bool, modifiers: Iterable[int]) -> bool:
@@ -23,6 +23,18 @@ def after_receipt(active: bool, modifiers: Iterable[int]) -> bool:
         if modifier < 0:
             active = False
     return active
+
+
+def asked_for(given: int | None, passed_on: int) -> int | None:
+    """Return the modifier that a node's code asks for when it sends a token object, or None (A4).
+
+    A received 0 says nothing: whoever passes the token on sends its value, and A3 decides.
+
+    Args:
+      given: `activity=` of the sending; an explicit 0 holds the activity back.
+      passed_on: the token's own modifier.
+    """
+    return (passed_on or None) if given is None else given
 
 
 def leaving(may_carry: bool, edge_active: bool, explicit: int | None, is_no_message: bool) -> int:

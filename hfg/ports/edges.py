@@ -198,7 +198,8 @@ class EventEdge(_QueueEdge):
       full: a `wait` edge that holds `capacity` or more: its source starts nothing new (F8).
       grown: how often F8 made it longer.
       pipeline: feeds a token to the operators on the edge (P9), or None.
-      complete: tells the operators that no more comes, or None.
+      complete: tells the operators that no more comes; None: there are none, or they know.
+      renew: connects the operators afresh, for a node that starts afresh; or None.
       end_sent: END has been put on it (F13, once an edge); what comes later is dropped.
     """
 
@@ -211,6 +212,7 @@ class EventEdge(_QueueEdge):
         "grown",
         "overflow",
         "pipeline",
+        "renew",
     )
 
     def __init__(
@@ -232,6 +234,7 @@ class EventEdge(_QueueEdge):
         self.end_sent = False
         self.pipeline: Callable[[Token[Any]], None] | None = None
         self.complete: Callable[[], None] | None = None
+        self.renew: Callable[[], None] | None = None
 
     def overflows(self) -> bool:
         """Whether one more token is one too many for a policy that drops or refuses (P5)."""

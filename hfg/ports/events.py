@@ -50,7 +50,8 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         Args:
           value: an event may be triggered without a value (rule T2); a received token passed on keeps its modifier and
             its stamp.
-          activity: an explicit modifier (-1, 0, +1) for active edges (rule A4); without one, rule A3 decides.
+          activity: an explicit modifier (-1, 0, +1) for active edges (rule A4): 0 holds the activity back, +1 takes
+            that of an active sender; without one, rule A3 decides.
           stamp: in seconds; without one, rule T5 decides.
 
         Raises:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 from weakref import WeakSet
 
+from hfg.activity.rules import asked_for
 from hfg.clock import current_clock
 from hfg.errors import EndOfStream, UsageError
 from hfg.nodetype import Node
@@ -254,10 +255,9 @@ class _Firing:
 
 
 def _sent(name: str, value: Any, activity: int | None, stamp: float | None) -> Sent:
-    if isinstance(value, Token):  # A4: a token passed on keeps its modifier and stamp
-        return Sent(
-            name, value.value, value.activity if activity is None else activity, value.stamp if stamp is None else stamp
-        )
+    if isinstance(value, Token):  # A4: a token passed on keeps its modifier, unless that is 0, and its stamp
+        asked = asked_for(activity, value.activity)
+        return Sent(name, value.value, asked, value.stamp if stamp is None else stamp)
     return Sent(name, value, activity, stamp)
 
 

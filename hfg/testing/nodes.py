@@ -247,6 +247,7 @@ class Greeter(hfg.Node):
             self.sign.trigger(value)
         else:
             self.out.send(value, activity=0)
+            self.sign.trigger(value, activity=0)
 
 
 class Stateful(hfg.Node):

@@ -235,9 +235,9 @@ class Waits(hfg.Node):
 # --- A4 ---
 
 
-@pytest.mark.rule("A4")
+@pytest.mark.rule("A4", "A5")
 @pytest.mark.parametrize("modifier", [1, -1, 0])
-def test_an_explicit_modifier_is_kept_on_active_edges_and_does_not_take_the_senders_activity(
+def test_an_explicit_modifier_is_kept_on_active_edges_and_only_plus_one_takes_the_senders_activity(
     modifier: int, fast: bool
 ) -> None:
     graph = hfg.Graph()
@@ -253,7 +253,8 @@ def test_an_explicit_modifier_is_kept_on_active_edges_and_does_not_take_the_send
     assert ear.seen == [modifier]
     assert [token.activity for token in sink.tokens] == [modifier]
     assert [token.activity for token in plain.tokens] == [0]
-    assert modifiers(trace, "send_with_slot.out -> keep_tokens.value") == [modifier, 1]  # END takes what was kept
+    left_for_end = int(modifier != 1)
+    assert modifiers(trace, "send_with_slot.out -> keep_tokens.value") == [modifier, left_for_end]
 
 
 class SendWithSlot(Send):
@@ -262,6 +263,79 @@ class SendWithSlot(Send):
     @hfg.slot
     def begin(self) -> None:
         pass
+
+
+class PassesTokensOn(hfg.Node):
+    """A relay."""
+
+    said = hfg.Event(int)
+    other = hfg.Event(int)
+
+    @hfg.slot
+    def hear(self, token: hfg.Token[int]) -> None:
+        self.said.trigger(token)
+
+    @hfg.slot
+    def fork(self, token: hfg.Token[int]) -> None:
+        self.said.trigger(token)
+        self.other.trigger(token.value)
+
+    @hfg.slot
+    def hold_back(self, token: hfg.Token[int]) -> None:
+        self.said.trigger(token, activity=0)
+
+
+@pytest.mark.rule("A4", "A5")
+@pytest.mark.parametrize(
+    ("slot", "sent", "active_then"),
+    [("hear", [1], ["b"]), ("fork", [1, 1], ["b", "c"]), ("hold_back", [0], ["a"])],
+)
+def test_a_relay_hands_its_activity_on_or_keeps_it_and_never_doubles_it(
+    slot: str, sent: list[int], active_then: list[str], fast: bool
+) -> None:
+    graph = hfg.Graph()
+    a, b, c = (graph.add(PassesTokensOn(), name=name) for name in "abc")
+    graph.connect(a.said, b.hear, active=True)
+    graph.connect(a.other, c.hear, active=True)
+    trace: list[TraceEvent] = []
+
+    async def main() -> list[str]:
+        async with hfg.running(graph, fast=fast, trace=trace.append) as run:
+            await run.trigger(a.ports.slots[slot], 1, activity=+1)
+            await run.wait_quiet()
+            return run.active()
+
+    assert drive(main) == active_then
+    assert modifiers(trace, "a.said -> b.hear") + modifiers(trace, "a.other -> c.hear") == sent
+
+
+@pytest.mark.rule("A4", "A3")
+def test_a_token_without_activity_that_is_passed_on_counts_as_its_value(fast: bool) -> None:
+    graph = hfg.Graph()
+    a, b = graph.add(PassesTokensOn(), name="a"), graph.add(PassesTokensOn(), name="b")
+    graph.connect(a.said, b.hear, active=True)
+    graph.start.activates(a.ports.slots["activate"])
+
+    async def main() -> list[str]:
+        async with hfg.running(graph, fast=fast) as run:
+            await run.trigger(a.hear, hfg.Token(1, 0, 0.0))
+            await run.wait_quiet()
+            return run.active()
+
+    assert drive(main) == ["b"]
+
+
+@pytest.mark.rule("A4", "A3")
+def test_an_output_is_held_back_by_an_explicit_zero_alone(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, node = graph.add(numbers(count=1)), graph.add(SendWithSlot(modifier=0))
+    taker = graph.add(Ear())
+    graph.connect(source.out, node.value)
+    graph.start.activates(node.begin)
+    graph.connect(node.out, taker.hear, active=True)
+    trace: list[TraceEvent] = []
+    run(graph, fast, trace=trace.append)
+    assert modifiers(trace, "send_with_slot.out -> ear.hear") == [0, 1]  # END takes what was held back
 
 
 @pytest.mark.rule("A4")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from typing import Any
 
 import pytest
 import reactivex
@@ -95,6 +96,113 @@ def test_operators_complete_when_the_node_of_the_event_has_ended(fast: bool) -> 
     graph.connect(source.rang, sink.value, through=[operators.count()])
     run(graph, fast)
     assert sink.seen == [(2, 0)]
+
+
+@pytest.mark.rule("P9")
+@pytest.mark.parametrize("clock", ["virtual", "real"])
+@pytest.mark.parametrize(
+    ("operator", "comes_out"),
+    [
+        (operators.start_with(0), [0, 1, 2, 3]),
+        (operators.retry(2), [1, 2, 3]),
+        (operators.concat(reactivex.of(9)), [1, 2, 3, 9]),
+        (operators.map(lambda token: token.value), [1, 2, 3]),
+    ],
+)
+def test_operators_are_connected_before_the_first_signal(clock: Any, operator: Any, comes_out: list[int]) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Burst(count=3)), graph.add(Keep())
+    graph.connect(source.rang, sink.value, through=[operator])
+    report = hfg.run(graph, clock=clock)
+    assert sink.values == comes_out
+    assert report.edges["burst.rang -> keep.value"].dropped == 0
+
+
+@pytest.mark.rule("P9", "F8")
+def test_operators_that_begin_again_lose_nothing_in_between(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Burst(count=6)), graph.add(Keep())
+    pairs = [operators.take(2), operators.map(lambda token: token.value), operators.sum(), operators.repeat(3)]
+    graph.connect(source.rang, sink.value, through=pairs)
+    run(graph, fast)
+    assert sink.values == [3, 7, 11]
+
+
+class Goes(hfg.Node):
+    """Ends with its input; its slot goes on."""
+
+    value = hfg.Input(int)
+    rang = hfg.Event(int)
+
+    def process(self, value: int) -> None:
+        self.rang.trigger(value)
+
+    @hfg.slot
+    def ring(self, value: int) -> None:
+        self.rang.trigger(value)
+
+
+@pytest.mark.rule("P9", "F12", "F13")
+def test_what_is_triggered_behind_the_end_of_an_event_with_operators_is_dropped_and_counted(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, goes, sink = graph.add(numbers(count=2)), graph.add(Goes()), graph.add(Keep())
+    graph.connect(source.out, goes.value)
+    graph.connect(goes.rang, sink.value, through=[operators.count()])
+
+    async def main() -> tuple[list[int], int]:
+        async with hfg.running(graph, fast=fast) as run:
+            await run.wait_quiet()
+            assert sink.values == [2]  # given out as the node had ended, though it has a slot
+            await run.trigger(goes.ring, 7)
+            await run.wait_quiet()
+            return list(sink.values), run.report().edges["goes.rang -> keep.value"].dropped
+
+    assert drive(main) == ([2], 1)
+
+
+@pytest.mark.rule("P9", "A9")
+def test_operators_begin_afresh_with_the_node_of_the_event(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Burst(count=2)), graph.add(Keep())
+    graph.connect(source.rang, sink.value, through=[operators.count()])
+
+    async def main() -> list[int]:
+        async with hfg.running(graph, fast=fast) as run:
+            await run.wait_quiet()
+            await run.trigger(source.ports.slots["reset"])
+            await run.wait_quiet()
+            return list(sink.values)
+
+    assert drive(main) == [2, 2]
+
+
+class Echoes(hfg.Node):
+    """Passes on what it is told."""
+
+    said = hfg.Event(int)
+
+    @hfg.slot
+    def hit(self, value: int) -> None:
+        self.said.trigger(value)
+
+
+@pytest.mark.rule("F3")
+def test_a_signal_is_on_its_edges_before_a_subscriber_hears_of_it(fast: bool) -> None:
+    graph = hfg.Graph()
+    source, sink = graph.add(Echoes()), graph.add(Keep())
+    graph.connect(source.said, sink.value)
+    heard: list[int] = []
+
+    async def main() -> list[int]:
+        async with hfg.running(graph, fast=fast) as run:
+            source.said.subscribe(lambda token: source.said.trigger(token.value + 1) if token.value < 3 else None)
+            source.said.subscribe(lambda token: heard.append(token.value))
+            await run.trigger(source.hit, 0)
+            await run.wait_quiet()
+            return list(sink.values)
+
+    assert drive(main) == [0, 1, 2, 3]
+    assert heard == [0, 1, 2, 3]
 
 
 @pytest.mark.rule("P9")

@@ -69,7 +69,7 @@ def test_explicit_modifiers_are_drawn() -> None:
 
 
 def test_tokens_that_are_passed_on_keep_their_modifiers() -> None:
-    check(Passing(), value="1(+2)|", expected={"out": "1(+2)(+|)", "passed": "1(+2)", "activity": "-+~"})
+    check(Passing(), value="1(+2)|", expected={"out": "1(+2)|", "passed": "1(+2)", "activity": "-(+~)"})
 
 
 def test_waiting_nodes_answer_later() -> None:

@@ -12,6 +12,7 @@ from functools import partial
 from types import TracebackType
 from typing import Any
 
+from hfg.activity.rules import asked_for
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import enqueue, put_outputs
@@ -122,7 +123,7 @@ class Feed:
         if value is None:
             value = NO_MESSAGE
         if type(value) is Token:
-            activity = value.activity if activity is None else activity
+            activity = asked_for(activity, value.activity)
             stamp = value.stamp if stamp is None else stamp
             value = value.value
         put_outputs(self._worker, [(value, activity, stamp)])

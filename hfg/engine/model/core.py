@@ -8,6 +8,7 @@ are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asy
 from __future__ import annotations
 
 import itertools
+from collections import deque
 from collections.abc import Callable
 from types import FrameType
 from typing import Any, Protocol
@@ -16,6 +17,7 @@ from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import Worker
 from hfg.errors import HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
+from hfg.token import Token
 from hfg.trace import TraceEvent
 
 __all__ = ["PENDING", "Core", "Host", "Region", "Timer", "Upstairs"]
@@ -189,6 +191,7 @@ class Core:
         self.speaker: Worker | None = None  # whose short step runs: what it triggers may take a short way too
         self.started = False
         self.over = False
+        self.holding: Any = None  # what holds nodes for an edit (R4)
         self.errors: list[HfgError] = []
         self.lost_activity = 0
         self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
@@ -202,6 +205,8 @@ class Core:
         self.dirty_scopes: list[Scope] = []
         self.late: list[Worker] | None = None  # those whose automatic events are told behind the change under way
         self.returned: list[EventEdge] = []  # whose +1 of the sending under way goes back to the sender (F13, A8)
+        self.heard: deque[tuple[Any, Token[Any]]] = deque()  # signals of which subscribers are to hear (F3)
+        self.telling = False  # they are hearing
         self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
         self.sources: list[Worker] = []
         self.feeds: list[Worker] = []  # the graph's own inputs (P10)

@@ -11,6 +11,7 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
+from hfg.activity.rules import asked_for
 from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, UNREADY, Worker
 from hfg.engine.rules.agenda import SAME_MOMENT_S, cancel_limit, consider, freed, idle_again, note_start, unplace
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
@@ -330,7 +331,7 @@ def _add_parameters(worker: Worker, written: list[Any] | None) -> list[Any]:
 
 def _entry(value: Any) -> tuple[Any, int | None, float | None]:
     if type(value) is Token:
-        return (value.value, value.activity, value.stamp)
+        return (value.value, asked_for(None, value.activity), value.stamp)
     return (value, None, None)
 
 
@@ -355,7 +356,7 @@ def write(worker: Worker, position: int, value: Any, activity: int | None, stamp
             f'output "{path}" was written twice in one firing: it takes one token, merge the values or use an event'
         )
     if type(value) is Token:
-        activity = value.activity if activity is None else activity
+        activity = asked_for(activity, value.activity)
         stamp = value.stamp if stamp is None else stamp
         value = value.value
     worker.written[position] = (value, activity, stamp)

@@ -229,11 +229,14 @@ def _afresh(worker: Worker, then: Callable[[], None]) -> None:
 
 
 def not_ended(worker: Worker) -> None:
-    """The node starts afresh: it has not ended, nor have the inputs that it must have."""
+    """The node starts afresh: it has not ended, nor have the inputs that it must have, nor have its events."""
     worker.pending_end = worker.given_up = False
     worker.deferred = None
     for edge in worker.in_edges:
         edge.ended = edge.ended and not edge.mandatory  # who has said END to an optional input has said it (F4)
+    for edge in worker.event_edges():
+        if edge.renew is not None and edge.complete is None:
+            edge.renew()
 
 
 def reset(worker: Worker, then: Callable[[], None]) -> None:

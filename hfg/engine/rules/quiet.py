@@ -140,9 +140,8 @@ def end_events(core: Core) -> bool:
 def node_ended(worker: Worker) -> None:
     """A node is over: its operators complete (P9), and sources may feed nobody any more (R5)."""
     core = worker.core
-    if not worker.slot_edges:
-        for edge in worker.event_edges():
-            complete_edge(edge)
+    for edge in worker.event_edges():
+        complete_edge(edge)
     judge_sources(core)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from hfg.activity.rules import leaving
+from hfg.activity.rules import asked_for, leaving
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import AMID_NOTHING, ENDED, RunningEvent, Worker
 from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full, remove_call, unplace
@@ -58,7 +58,7 @@ def _put_outputs(worker: Worker, written: Written) -> None:
             own_stamp = stamp if given is None else given
         for edge in edges:
             modifier = leaving(may_carry, edge.active, explicit, value is NO_MESSAGE)
-            carried = carried or (modifier == 1 and explicit is None)
+            carried = carried or modifier == 1
             (for_slots if edge.target_kind == "slot" else for_inputs).append((edge, value, modifier, own_stamp))
     for edge, value, modifier, own_stamp in for_slots:
         put(edge, value, modifier, own_stamp)
@@ -75,10 +75,12 @@ def _activity_left(worker: Worker) -> None:
 
     The right of A3 stays until the firing or call is over.
     """
+    if not worker.active:
+        return  # what it gave was none of its own (A4), or left before (A3)
     if worker.scope is not None:  # by its events it leaves everything inside (G2)
         worker.active = worker.node._active = False
         worker.core.upstairs.deactivate_inside(worker.scope, "sent")
-    elif worker.active:
+    else:
         worker.right = worker.stamp is not None  # in a firing or call
         set_active(worker, False, "sent")
 
@@ -207,7 +209,7 @@ def trigger(
     if core.over:
         return  # code that was under way at the end speaks to nobody
     if type(value) is Token:
-        explicit = value.activity if explicit is None else explicit
+        explicit = asked_for(explicit, value.activity)
         stamp = value.stamp if stamp is None else stamp
         value = value.value
     if stamp is None:
@@ -227,7 +229,7 @@ def trigger(
     for edge in edges:
         if edge.live:
             modifier = leaving(may_carry, edge.active, explicit, False)
-            if modifier == 1 and explicit is None:
+            if modifier == 1:
                 carried = True
                 loudest = 1
             sends.append((edge, modifier))
@@ -235,7 +237,7 @@ def trigger(
     if core.trace is not None:
         core.trace(EventTriggered(core.now(), event.label, Token(value, loudest, stamp)))
     if port is not None and port._observers:
-        port._notify(Token(value, loudest, stamp))
+        core.heard.append((port, Token(value, loudest, stamp)))
     if event.tap:
         token = Token(value, loudest, stamp)
         for look in event.tap:
@@ -250,6 +252,21 @@ def trigger(
     _sent(core)
     if not core.pumping:
         core.host.kick()
+    if core.heard:
+        _tell_subscribers(core)
+
+
+def _tell_subscribers(core: Core) -> None:
+    """F3: they hear of signals that are on their edges, and in that order; what they trigger is heard of behind."""
+    if core.telling:
+        return
+    core.telling = True
+    try:
+        while core.heard:
+            port, token = core.heard.popleft()
+            port._notify(token)
+    finally:
+        core.telling = False
 
 
 def _into_operators(edge: EventEdge, token: Token[Any]) -> None:

@@ -63,6 +63,7 @@ class Lifetime:
         if core.trace is not None:
             core.trace(RunStarted(engine.now()))
         core.started = True
+        self._connect_operators(core)
         assert core.boundary is not None
         start = engine_ports.bind_start(core.boundary, engine.flat.graph.start)
         if start is not None:
@@ -97,9 +98,15 @@ class Lifetime:
             if worker.watched:
                 engine_ports.bind(worker)
             wiring.rewire(worker)
+        return True
+
+    def _connect_operators(self, core: Core) -> None:
+        """P9: before anything is triggered; what they give out by themselves is the first of all."""
         for edge, operators in core.piped:
             self.pipe(edge, operators)
-        return True
+        for worker in core.workers:
+            if worker.iteration is not None:
+                self._connect_operators(worker.iteration.core)
 
     def _open_sources(self, core: Core) -> None:
         """Sources may fire from now on, as far as their gates allow."""
@@ -133,7 +140,7 @@ class Lifetime:
 
     def pipe(self, edge: Any, operators: tuple[Any, ...]) -> None:
         """Put operators on an edge (P9)."""
-        self._disposables[edge] = rx.pipe_edge(edge, operators, self._engine.scheduler)
+        self._disposables[edge] = rx.pipe_edge(edge, operators, self._engine)
 
     def came(self, worker: Worker) -> None:
         """A node was set up while the run was under way (R4)."""

@@ -3,28 +3,34 @@
 (rule P9, ARCHITECTURE §3).
 
 `AsyncIOScheduler.now` is wall time, so in virtual time `delay` would never emit; and without a scheduler `debounce`
-runs on a thread. So the run brings its own. Stands on `sending`.
+runs on a thread. So the run brings its own. What operators on an edge want done now is done now, for a chain that is
+connected a pass of the loop later has lost what was triggered until then. Stands on `sending`.
 """
 
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
 from datetime import datetime
-from typing import Any
+from typing import Any, Final
 
 import reactivex
 from reactivex import abc, typing
-from reactivex.disposable import Disposable, SingleAssignmentDisposable
+from reactivex.disposable import Disposable, SerialDisposable, SingleAssignmentDisposable
 from reactivex.observer import Observer
 from reactivex.scheduler.periodicscheduler import PeriodicScheduler
 from reactivex.subject import Subject
+from typing_extensions import override
 
 from hfg.engine.model.core import Host
 from hfg.engine.rules.errors import operator_failed
+from hfg.engine.rules.modifiers import drop
 from hfg.engine.rules.sending import enqueue
 from hfg.ports.edges import EventEdge
 from hfg.token import Token
+
+_MOST_AT_ONCE: Final = 1000  # actions of operators before the loop has its turn
 
 __all__ = ["RunScheduler", "feed_from_observable", "kick", "pipe_edge"]
 
@@ -72,14 +78,64 @@ class RunScheduler(PeriodicScheduler):
         return Disposable(forget)
 
 
-def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], scheduler: RunScheduler) -> Callable[[], None]:
-    """Put operators on an event edge, in front of its queue; gives back what takes them off."""
-    subject: Subject[Any] = Subject()
-    newest = [0.0]
+class _EdgeScheduler(RunScheduler):
+    """For operators on one edge: what is to be done now is done at once, one after the other (P9).
 
-    def into(token: Token[Any]) -> None:
-        newest[0] = max(newest[0], token.stamp)
-        subject.on_next(token)
+    As reactivex does it where nobody names a scheduler. What never comes to an end lets the loop have its turn.
+    """
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._due: deque[Callable[[], None]] = deque()
+        self._at_work = False
+
+    @override
+    def schedule(self, action: abc.ScheduledAction[Any], state: Any = None) -> abc.DisposableBase:
+        """Run the action before this returns, or behind the one that is running."""
+        inner = SingleAssignmentDisposable()
+
+        def run() -> None:
+            if not inner.is_disposed:
+                inner.disposable = self.invoke_action(action, state=state)
+
+        self._due.append(run)
+        if not self._at_work:
+            self._work()
+        return inner
+
+    def _work(self) -> None:
+        self._at_work = True
+        try:
+            for _ in range(_MOST_AT_ONCE):
+                if not self._due:
+                    return
+                self._due.popleft()()
+            self._host.call_at(self._host.now(), self._work)
+        finally:
+            self._at_work = False
+
+
+def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callable[[], None]:
+    """Put operators on an event edge, in front of its queue; gives back what takes them off."""
+    newest = [0.0]
+    subscription = SerialDisposable()
+    scheduler = _EdgeScheduler(host)
+
+    def connect() -> None:
+        subject: Subject[Any] = Subject()
+
+        def into(token: Token[Any]) -> None:
+            if edge.complete is None:  # the event has completed, as an input has that was given END (F13)
+                drop(edge, token, "ended")
+                return
+            newest[0] = max(newest[0], token.stamp)
+            subject.on_next(token)
+
+        edge.pipeline = into
+        edge.complete = subject.on_completed
+        subscription.disposable = subject.pipe(*operators).subscribe(
+            Observer(out, failed, lambda: None), scheduler=scheduler
+        )
 
     def out(item: Any) -> None:
         if type(item) is Token:
@@ -88,11 +144,12 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], scheduler: RunSchedul
             enqueue(edge, item, 0, newest[0])
         kick(edge)
 
-    subscription: abc.DisposableBase = subject.pipe(*operators).subscribe(
-        Observer(out, lambda error: operator_failed(edge, error), lambda: None), scheduler=scheduler
-    )
-    edge.pipeline = into
-    edge.complete = subject.on_completed
+    def failed(error: Exception) -> None:
+        edge.complete = None  # nothing goes through them any more
+        operator_failed(edge, error)
+
+    edge.renew = connect
+    connect()
     return subscription.dispose
 
 

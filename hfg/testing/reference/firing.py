@@ -8,10 +8,11 @@ from typing import Any, Literal
 
 from hfg.errors import EndOfStream, FiringTimeout, NodeError, UsageError
 from hfg.testing.reference.running_code import RunningCode
+from hfg.testing.reference.sending import passed_on
 from hfg.testing.reference.state import Flight, Line, Lying, Station, newest
 from hfg.testing.reference.structure import boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
-from hfg.token import END, NO_MESSAGE, Token
+from hfg.token import END, NO_MESSAGE
 from hfg.trace import (
     ErrorRaised,
     FiringEnded,
@@ -292,7 +293,9 @@ class Firing(RunningCode):
         self.be_idle(station)
 
     def be_idle(self, station: Station) -> None:
-        """A firing or call is over; what a subgraph around the node wanted meanwhile is done then (F10, G2)."""
+        """A firing or call is over; what was wanted of the node meanwhile is done then (P8, F10, G2)."""
+        while station.to_set:
+            self.set_parameter(station, *station.to_set.pop(0))
         self.settle()
         if station.afterwards:
             station.afterwards = ""
@@ -315,11 +318,7 @@ class Firing(RunningCode):
             if source.kind == "parameter" and outcome == "done":
                 value = station.node._parameters[source.name]
             elif source.kind == "output" and outcome in ("done", "ended") and source.name in flight.writes:
-                value, activity, stamp = flight.writes[source.name]
-            if isinstance(value, Token):  # A4
-                activity = value.activity if activity is None else activity
-                stamp = value.stamp if stamp is None else stamp
-                value = value.value
+                value, activity, stamp = passed_on(*flight.writes[source.name])
             shipments.append(
                 (line, NO_MESSAGE if value is None else value, activity, flight.stamp if stamp is None else stamp)
             )

@@ -28,6 +28,7 @@ class _Clock(Scheduler):
         self.seconds = 0.0
         self._waiting: list[tuple[float, int, Any, Any, SingleAssignmentDisposable]] = []
         self._count = 0
+        self._at_once: list[tuple[Any, Any, SingleAssignmentDisposable]] = []
 
     @property
     def now(self) -> datetime:
@@ -35,8 +36,17 @@ class _Clock(Scheduler):
         return self.to_datetime(self.seconds)
 
     def schedule(self, action: Any, state: Any = None) -> Any:
-        """Do it at the next occasion."""
-        return self._at(self.seconds, action, state)
+        """Do it as soon as what goes on now is over."""
+        disposable = SingleAssignmentDisposable()
+        self._at_once.append((action, state, disposable))
+        return disposable
+
+    def catch_up(self) -> None:
+        """Do what is to be done at once: what comes until then would be lost on who subscribes in it (P9)."""
+        while self._at_once:
+            action, state, disposable = self._at_once.pop(0)
+            if not disposable.is_disposed:
+                disposable.disposable = action(self, state) or Disposable()
 
     def schedule_relative(self, duetime: Any, action: Any, state: Any = None) -> Any:
         """Do it later."""
@@ -64,6 +74,7 @@ class _Clock(Scheduler):
             self._waiting.remove(entry)
             self.seconds = max(self.seconds, entry[0])
             entry[4].disposable = entry[2](self, entry[3]) or Disposable()
+            self.catch_up()
         self.seconds = max(self.seconds, seconds)
 
 
@@ -76,16 +87,23 @@ class Operators:
         self._give = give
         self._newest: float | None = None
         self.error: Exception | None = None
-        self._subject.pipe(*operators).subscribe(self._out, on_error=self._failed, scheduler=self._clock)
+        self._operators = operators
+
+    def connect(self) -> None:
+        """Subscribe; some operators speak at once."""
+        self._subject.pipe(*self._operators).subscribe(self._out, on_error=self._failed, scheduler=self._clock)
+        self._clock.catch_up()
 
     def push(self, token: Token[Any]) -> None:
         """Put a signal in."""
         self._newest = token.stamp if self._newest is None else max(self._newest, token.stamp)
         self._subject.on_next(token)
+        self._clock.catch_up()
 
     def complete(self) -> None:
         """Let them give out what they hold."""
         self._subject.on_completed()
+        self._clock.catch_up()
 
     def due(self) -> float | None:
         """When something will happen by itself."""

@@ -28,7 +28,7 @@ from hfg.trace import (
     TraceEvent,
 )
 
-__all__ = ["Sending", "Shipment"]
+__all__ = ["Sending", "Shipment", "passed_on"]
 
 Shipment = tuple[Line, Any, int | None, float]
 """One token to be put: where, its value or marker, its explicit modifier if any, its stamp."""
@@ -65,10 +65,8 @@ class Sending(State):
                 continue
             modifier = 0
             if line.edge.active and value is not NO_MESSAGE:
-                if explicit is not None:
-                    modifier = explicit  # A4
-                elif gives:
-                    modifier, gave = 1, True  # A3
+                modifier = int(gives) if explicit is None else explicit  # A3, A4
+                gave |= gives and modifier == 1  # A5: by the one or the other
             self.put(line, Token(value, modifier, stamp), sender)
         if gave:
             self.take_activity(sender, flight)
@@ -141,10 +139,7 @@ class Sending(State):
         Raises:
           QueueOverflow: an edge with policy "error" is full; nothing was sent.
         """
-        if isinstance(value, Token):  # A4: a token passed on keeps its modifier and stamp
-            activity = value.activity if activity is None else activity
-            stamp = value.stamp if stamp is None else stamp
-            value = value.value
+        value, activity, stamp = passed_on(value, activity, stamp)
         if stamp is None:
             stamp = self.now if flight is None else flight.stamp
         lines = self.lines_from(owner, "event", name)
@@ -383,9 +378,19 @@ class Sending(State):
         for line in self.lines:
             if line.edge.through:
                 line.operators = Operators(line.edge.through, partial(self._out_of_operators, line))
+                line.operators.connect()
 
     def _out_of_operators(self, line: Line, token: Token[Any]) -> None:
         self.enqueue(line, token, line.edge.source.owner)
+
+
+def passed_on(value: Any, activity: int | None, stamp: float | None) -> tuple[Any, int | None, float | None]:
+    """A4: a token passed on keeps its stamp, and a modifier if it has one; one with a = 0 counts as its value."""
+    if isinstance(value, Token):
+        activity = (value.activity or None) if activity is None else activity
+        stamp = value.stamp if stamp is None else stamp
+        value = value.value
+    return value, activity, stamp
 
 
 def _with(token: Token[Any], *, activity: int | None = None, sequence: int | None = None) -> Token[Any]:

@@ -115,6 +115,7 @@ class Station:
     owed: list[Line] = field(default_factory=list)  # taken by the last firing, processed when the outputs are (F5)
     hold_until: float = float("-inf")  # F11
     grid: tuple[float, float] | None = None  # its beginning and its period (F11)
+    to_set: list[tuple[str, Any]] = field(default_factory=list)  # parameters, as soon as its firing is over (P8)
     last_function: float = float("-inf")  # for the idle rate of a gate
     afterwards: str = ""  # "enable" or "reset": what a subgraph around it wants as soon as its firing or call is over
     resting_until: float | None = None  # the back-off of a restart
