@@ -121,6 +121,11 @@ class NodeType:
         return self.process_kind != "none" and not self.inputs
 
     @property
+    def given_parameters_once(self) -> bool:
+        """Whether its code is given the parameters as it begins and sees no later value: a generator function."""
+        return self.is_function and self.process_kind in ("generator", "async generator")
+
+    @property
     def reference(self) -> str | None:
         """Where to find it, "module:qualname"; None for what has no name of its own.
 

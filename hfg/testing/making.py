@@ -108,6 +108,9 @@ FEEDS = ("red", "blue")
 _WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay"}
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear"}
+_TURNED = {"Scaled": "factor", "Pulse": "most", "Script": "count"}
+"""Parameters that edges set; a source with such an edge waits for it."""
+
 _DELICATE_SLOTS = ["activate", "deactivate", "reset", "disable", "enable"]
 
 
@@ -280,15 +283,15 @@ class _Making:
 
     def _make_parameter_edge(self) -> None:
         choose = self.choose
-        owners = [(index, node) for index, node in enumerate(self.nodes) if node.type == "Scaled"]
+        owners = [(index, node) for index, node in enumerate(self.nodes) if node.type in _TURNED]
         if not owners:
             return
         index, node = choose.one_of(owners)
         candidates = self.outputs(self.nodes[:index]) + (self.events(self.nodes[:index]) if self.allowed.events else [])
         if candidates:
-            self._edge(choose.one_of(candidates), (node.name, "parameter", "factor"))
+            self._edge(choose.one_of(candidates), (node.name, "parameter", _TURNED[node.type]))
         targets = [(one.name, "slot", "note") for one in self.nodes[index + 1 :] if one.type == "Tally"]
-        if targets:
+        if targets and node.type == "Scaled":
             self._edge((node.name, "parameter", "offset"), choose.one_of(targets))
 
     def _edge(self, source: End, target: End, *, initial: list[int] | None = None, active: bool | None = None) -> None:

@@ -164,6 +164,7 @@ def test_a_cancelled_edit_leaves_a_parameter_that_was_set_meanwhile() -> None:
         editing.cancel()
         await asyncio.wait({editing})
         assert editing.cancelled()
+        await asyncio.sleep(0.005)  # until the firing is over
         assert graph["slow"].pause_s == 0.004
 
     drive(graph, body)

@@ -19,6 +19,7 @@ import msgspec
 from hfg.engine.editing.holding import Held
 from hfg.engine.editing.reforming import reform
 from hfg.engine.editing.replanning import Replan, closes_a_ring, replan
+from hfg.engine.editing.setting import refuse_without_effect
 from hfg.engine.editing.turns import Turns
 from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
 from hfg.engine.rules import lifecycle, subgraphs
@@ -117,16 +118,18 @@ class Edits:
             if check:
                 self._refuse_errors(how)
             switched = self._switched(changes)
-            touched = _touched(how, switched)
-            self._turns.wait_for(touched)
             waiting = self._values_of_running_nodes(changes)
             undo_all(waiting)  # they work with the old ones until their firings are over
+            self._refuse_without_effect(waiting, how, switched)
+            touched = self._touched(how, switched, waiting)
+            self._turns.wait_for(touched)
             await self._set_up(how, come)
             self._turns.wait_for(touched)
             async with Held(engine, touched) as held:
                 self._turns.wait_for(())
                 await self._exchange_nodes(how)
                 fresh = self._to_start_afresh(switched)
+                self._refuse_without_effect(waiting, how, switched)
                 starting = {worker.node for worker in fresh}
                 for value in [value for value in waiting if value.node in starting]:
                     value.do()
@@ -156,8 +159,25 @@ class Edits:
 
     def _values_of_running_nodes(self, changes: Sequence[Change]) -> list[ParameterChange]:
         values = [change for change in changes if isinstance(change, ParameterChange)]
-        running = {worker.node for worker in self._engine.core.workers} if values else set()
+        running = {worker.node for worker in self._engine.all_workers()} if values else set()
         return [value for value in values if value.node in running]
+
+    def _refuse_without_effect(self, values: Sequence[ParameterChange], how: Replan, switched: _Switched) -> None:
+        """P8: what the code that runs cannot see is refused, unless the node begins afresh by this very edit."""
+        if not values:
+            return
+        afresh = {*how.gone, *(worker for worker, _ in how.swapped), *self._to_start_afresh(switched)}
+        refuse_without_effect(
+            [(value.node, value.name) for value in values],
+            [worker for worker in self._engine.all_workers() if worker not in afresh],
+        )
+
+    def _touched(self, how: Replan, switched: _Switched, values: Sequence[ParameterChange]) -> list[Worker]:
+        """Those who must rest: also all inside a subgraph that is enabled, and nodes inside what iterates."""
+        scopes = [worker.scope for worker, enabled in switched.items() if worker.scope is not None and enabled]
+        set_ = {value.node for value in values}
+        inside = [one for one in self._engine.all_workers() if one.node in set_ and one.core is not self._engine.core]
+        return list(dict.fromkeys([*how.touched, *(member for scope in scopes for member in scope.members), *inside]))
 
     def _refuse_errors(self, how: Replan) -> None:
         """A graph that runs has no errors, and gets none."""
@@ -350,12 +370,6 @@ class Edits:
             engine.lifetime.forget(worker)
             if worker.carrier is not None:
                 worker.carrier.drop()
-
-
-def _touched(how: Replan, switched: _Switched) -> list[Worker]:
-    """Those who must rest: also all inside a subgraph that is enabled."""
-    scopes = [worker.scope for worker, enabled in switched.items() if worker.scope is not None and enabled]
-    return list(dict.fromkeys([*how.touched, *(member for scope in scopes for member in scope.members)]))
 
 
 def _told(commands: Sequence[Command]) -> str:

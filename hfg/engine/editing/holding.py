@@ -1,5 +1,6 @@
 """Holds nodes for an edit: as they come to rest, until it has taken effect or is given up (rule R4).
 
+While the code of one of them waits until a queue has room, none is held: they may be the ones that make it.
 Stands on `lifecycle`.
 """
 
@@ -32,7 +33,9 @@ class Held:
     def __init__(self, engine: Engine, workers: Sequence[Worker]) -> None:
         self._engine = engine
         self._workers = workers
-        self._letting_go: list[Callable[[], None]] = []
+        self._held: dict[Worker, Callable[[], None]] = {}  # who rests, and what lets it go
+        self._free: list[Worker] = []  # who may go on until a queue has room
+        self._waiter: asyncio.Future[None] = engine.loop.create_future()
         self._given_up = False
         self.done = False
         self._said = False  # that it waits
@@ -41,35 +44,54 @@ class Held:
     async def __aenter__(self) -> Held:
         engine = self._engine
         core = engine.core
-        waiter: asyncio.Future[None] = engine.loop.create_future()
-        left = [len(self._workers)]
-
-        def rests(worker: Worker, over: Callable[[], None]) -> None:
-            if self._given_up:
-                over()
-                return
-            worker.busy = "edit"
-            worker.disturb()
-            self._letting_go.append(over)
-            left[0] -= 1
-            if not left[0]:
-                if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)
-                    core.in_flight += 1
-                    self._counts = True
-                answer(waiter, None)
-
+        core.holding = self
         for worker in self._workers:
-            lifecycle.when_idle(worker, rests, lifecycle.nothing)
-        if left[0]:
+            lifecycle.when_idle(worker, self._rests, lifecycle.nothing)
+        if len(self._held) < len(self._workers):
             self._said = True
             if core.trace is not None:
                 core.trace(EditWaits(core.now(), tuple(worker.path for worker in self._workers)))
             try:
-                await self._or_end(waiter)
+                await self._or_end(self._waiter)
             except BaseException:
                 self._let_go()
                 raise
         return self
+
+    def _rests(self, worker: Worker, over: Callable[[], None]) -> None:
+        """One of them has come to rest."""
+        if self._given_up:
+            over()
+            return
+        if self._is_room_awaited():
+            self._free.append(worker)
+            over()
+            return
+        worker.busy = "edit"
+        worker.disturb()
+        self._held[worker] = over
+        if len(self._held) == len(self._workers):
+            if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)
+                self._engine.core.in_flight += 1
+                self._counts = True
+            answer(self._waiter, None)
+
+    def _is_room_awaited(self) -> bool:
+        return any(worker.waiting_room for worker in self._workers)
+
+    def look_for_room(self) -> None:
+        """Somebody's code begins or ceases to wait until a queue has room (F8)."""
+        if self._given_up or self._waiter.done():
+            return
+        if self._is_room_awaited():
+            held, self._held = self._held, {}
+            self._free += held
+            for over in held.values():
+                over()
+        else:
+            free, self._free = self._free, []
+            for worker in free:
+                lifecycle.when_idle(worker, self._rests, lifecycle.nothing)
 
     async def _or_end(self, waiter: asyncio.Future[None]) -> None:
         """Wait until all rest, or the run is over."""
@@ -90,12 +112,13 @@ class Held:
     def _let_go(self) -> None:
         core = self._engine.core
         self._given_up = True
+        core.holding = None
         if not self.done and self._said and core.trace is not None and not core.over:
             core.trace(StructureChanged(core.now(), ""))
         for worker in self._workers if self.done else ():
             if not worker.blocked & REMOVED:
                 flush_automatic(worker)  # what activity that went back has raised (A8, A9)
-        letting_go, self._letting_go = self._letting_go, []
-        for over in letting_go:
+        held, self._held = self._held, {}
+        for over in held.values():
             over()
         self._engine.kick()

@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Mapping
 from functools import partial
 from typing import Any
 
+from hfg.engine.editing.setting import set_parameter
 from hfg.engine.face import outside
 from hfg.engine.face.editable import Editable
 from hfg.engine.face.steering import Steering
@@ -26,7 +27,6 @@ from hfg.graph import Graph
 from hfg.nodetype import Node
 from hfg.ports import EventPort, ParameterPort, SlotPort
 from hfg.token import Token
-from hfg.trace import ParameterSet
 from hfg.types import accepts, describe
 
 __all__ = ["Run"]
@@ -148,19 +148,20 @@ class Run(Steering, Editable):
         return self._engine.consumers.add(consumer, size)
 
     def set(self, parameter: Any, value: Any) -> None:
-        """Set a parameter of a node between its firings (P8).
+        """Set a parameter of a node between its firings: now, or when the one under way is over (P8).
+
+        That of a subgraph sets those inside that it stands for.
 
         Raises:
           ValueError: the value is out of the parameter's limits; nothing is changed.
+          UsageError: it would have no effect: a generator function has been given the old value.
+          NotRunning: the run is over.
         """
         if not isinstance(parameter, ParameterPort):
             raise UsageError(
                 f'run.set takes the port of a parameter, as in node.ports.parameters["name"], got {parameter!r}'
             )
-        parameter.node._set_parameter(parameter.name, value)
-        core = self._engine.core
-        if core.trace is not None:
-            core.trace(ParameterSet(core.now(), parameter.node.place.path, parameter.name, value))
+        set_parameter(self._engine, parameter, value)
 
     # --- waiting ----------------------------------------------------------------------------------------------------
 

@@ -81,6 +81,7 @@ def _lives_by_its_slots(worker: Worker) -> bool:
         and bool(worker.slot_edges)
         and not worker.in_edges
         and not worker.is_source
+        and not worker.type.parameters  # which are not set amid a call (P8), so it is to be seen that one is under way
         and not (worker.gates_over or worker.ready_hook is not None or worker.observed or worker.on_idle is not None)
         and not (worker.scopes or worker.watched or worker.options.max_rate_hz or worker.options.max_duration_s)
     )

@@ -273,12 +273,19 @@ class CodeRunner:
             worker.room_waiters.append(partial(answer, waiter, None))
             worker.waiting_room += own
             core.waiting_room += own
+            self._look_for_room()
             core.host.kick()
             try:
                 await waiter
             finally:
                 worker.waiting_room -= own
                 core.waiting_room -= own
+                self._look_for_room()
+
+    def _look_for_room(self) -> None:
+        """An edit that waits for this code must not hold those who could make room."""
+        if self.core.holding is not None:
+            self.core.holding.look_for_room()
 
     # --- from threads -----------------------------------------------------------------------------------------------
 

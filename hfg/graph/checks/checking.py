@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from hfg.graph.checks.edges import borders, joined_edges, promotions
+from hfg.graph.checks.edges import borders, joined_edges, promotions, unseen_parameters
 from hfg.graph.checks.flow import (
     endless_sources,
     filling_rings,
@@ -34,6 +34,7 @@ _OF_EACH_LEVEL: Final[list[Check]] = [
     unknown_groups,
     async_in_threads,
     joined_edges,
+    unseen_parameters,
     synchronous_rings,
     borders,
     unconnected_inputs,

@@ -15,7 +15,7 @@ from hfg.ports import ParameterPort
 from hfg.problem import Problem
 from hfg.types import describe, why_not
 
-__all__ = ["borders", "joined_edges", "promotions"]
+__all__ = ["borders", "joined_edges", "promotions", "unseen_parameters"]
 
 
 def joined_edges(flat: FlatGraph) -> Iterator[Problem]:
@@ -169,6 +169,22 @@ def promotions(whole: FlatGraph) -> list[Problem]:
                     )
                 )
     return problems
+
+
+def unseen_parameters(flat: FlatGraph) -> Iterator[Problem]:
+    """Edges that lead through a subgraph into a parameter whose new values nobody would see (rule P8)."""
+    for edge in flat.edges:
+        target = edge.target
+        if target.kind == "parameter" and target.port.node._type.given_parameters_once:
+            yield Problem(
+                path=edge.label,
+                severity="error",
+                what="what this edge brings has no effect",
+                why=f'"{target.port.path}" belongs to a generator function, which is given it once, when it begins '
+                "(rule P8)",
+                remedy=f"make it a class whose process() yields and reads self.{target.name}, or remove the edge",
+                check="parameter-without-effect",
+            )
 
 
 def _all_edges(whole: FlatGraph) -> Iterator[Edge]:

@@ -6,7 +6,7 @@ All of a transaction or nothing: what is refused leaves the graph as it was. Sta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import msgspec
@@ -40,8 +40,8 @@ from hfg.graph.structure.gating import refuse_gate
 from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import edge_options
-from hfg.graph.structure.promoting import refuse_standing
-from hfg.graph.structure.subgraph import inside, is_box
+from hfg.graph.structure.promoting import refuse_standing, stands_for
+from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
 from hfg.ports import ParameterPort, Port
 
@@ -244,7 +244,7 @@ class _Hand:
 
     def _setparameter(self, command: c.SetParameter) -> None:
         port = parameter_at(self.root, command.path)
-        reached = list(_stands_for(port))
+        reached = list(stands_for(port))
         before = [(one.node, one.name, one.value) for one in reached]
         try:
             port.value = fitting(port.spec, command.value)
@@ -374,14 +374,3 @@ def _promoted_by(around: Level, promoted: Promoted, old: Node, new: Node) -> Pro
 def _need_free(around: Level, name: str, path: str) -> None:
     if need_name("a node", name) in around.nodes:
         raise GraphError(f'"{path}": {around.title} has a node "{name}" already; choose another name')
-
-
-def _stands_for(port: ParameterPort[Any]) -> Iterator[ParameterPort[Any]]:
-    """A parameter and all those inside that it stands for."""
-    waiting = [port]
-    while waiting:
-        one = waiting.pop()
-        yield one
-        inner = inside(one.node)
-        if inner is not None:
-            waiting += inner.promotions.of(one.name)

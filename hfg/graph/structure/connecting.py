@@ -80,6 +80,12 @@ def refuse(level: Level, source: SourceEnd, target: TargetEnd, options: EdgeOpti
     _need_membership(level, target, source)
     if is_port(source):
         _need_types(source, target)
+    if target.kind == "parameter" and target.node._type.given_parameters_once:
+        raise errors.ConnectionError(
+            f'"{target.path}" belongs to a generator function, which is given it when it begins and sees no value '
+            f'that comes later, from "{end_path(source)}"; make it a class whose process() yields, or counts in an '
+            f"hfg.State, and reads self.{target.name} (rule P8)"
+        )
     if options.active or options.for_events:
         _need_right_options(source, target, options)
     if options.initial:

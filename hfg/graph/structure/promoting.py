@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from hfg.errors import GraphError
 from hfg.graph.structure.edge import end_path
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.refusals import Refusable
+from hfg.graph.structure.subgraph import inside
 from hfg.ports import ParameterPort
 from hfg.types import describe, why_not
 
-__all__ = ["promote", "refuse_standing"]
+__all__ = ["promote", "refuse_standing", "stands_for"]
 
 
 def promote(level: Level, outer: ParameterPort[Any], inner: ParameterPort[Any]) -> None:
@@ -70,3 +72,14 @@ def refuse_standing(outer: ParameterPort[Any], inner: ParameterPort[Any]) -> Non
     problem = inner.spec.check(outer.value)
     if problem is not None:
         raise GraphError(f'"{outer.path}" cannot stand for "{inner.path}": {problem}; change its value or the limits')
+
+
+def stands_for(port: ParameterPort[Any]) -> Iterator[ParameterPort[Any]]:
+    """Give a parameter and all those inside that it stands for."""
+    waiting = [port]
+    while waiting:
+        one = waiting.pop()
+        yield one
+        inner = inside(one.node)
+        if inner is not None:
+            waiting += inner.promotions.of(one.name)

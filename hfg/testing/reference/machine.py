@@ -12,7 +12,7 @@ from collections.abc import Collection, Set
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from hfg.errors import QueueLimit, Stalled
+from hfg.errors import QueueLimit, Stalled, UsageError
 from hfg.testing.reference.edits import Editing
 from hfg.testing.reference.state import Line, Station
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
@@ -594,8 +594,21 @@ class ReferenceMachine(Editing):
         self.settle()
 
     def set_from_outside(self, path: str, parameter: str, value: Any) -> None:
-        """Set a parameter between firings."""
-        self.set_parameter(self.stations[self.paths[path]], parameter, value)
+        """Set a parameter between firings (P8).
+
+        Raises:
+          UsageError: the code that runs could not see it any more.
+        """
+        station = self.stations[self.paths[path]]
+        if station.type.is_function and station.iterator is not None:
+            raise UsageError(
+                f'"{path}.{parameter}" is an argument of a generator function, which reads it only as it begins; '
+                "reset the node with the same edit, or make it a class and read self." + parameter
+            )
+        if station.flight is None:
+            self.set_parameter(station, parameter, value)
+        else:
+            station.to_set.append((parameter, value))
         self.settle()
 
     def trigger_from_outside(self, path: str, event: str, value: Any = None, activity: int | None = None) -> None:
