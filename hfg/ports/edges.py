@@ -22,7 +22,7 @@ class Edge:
     """What all edges of a run have.
 
     Attributes:
-      index: its place in the order of creation.
+      index: grows along the order of drawing; an edit puts numbers in between.
       label: "source -> target", as traces and reports name it.
       active: whether it carries activity, A(e) (rule A1).
       target_kind: what it leads into: "input", "slot", or "parameter".
@@ -38,6 +38,8 @@ class Edge:
         source; of no meaning for event edges.
       tap: sees every token that is put on it; None: nobody looks.
       via: the scopes (subgraphs) whose relays it passes; all must be enabled.
+      segments: the drawn edges that it consists of, from source to target; none if it comes from outside the graph.
+      source_port, target_port: the bound ports at its ends; for an observable itself.
     """
 
     __slots__ = (
@@ -53,16 +55,19 @@ class Edge:
         "mandatory",
         "port_name",
         "position",
+        "segments",
         "sent",
         "source",
+        "source_port",
         "tap",
         "target",
         "target_kind",
+        "target_port",
         "via",
         "waits",
     )
 
-    def __init__(self, index: int, label: str, active: bool) -> None:
+    def __init__(self, index: float, label: str, active: bool) -> None:
         self.index = index
         self.label = label
         self.active = active
@@ -80,6 +85,9 @@ class Edge:
         self.follows = False
         self.ended = False
         self.via: tuple[Any, ...] = ()
+        self.segments: tuple[Any, ...] = ()
+        self.source_port: Any = None
+        self.target_port: Any = None
         self.handler: Callable[[Any], Any] | None = None
         self.tap: Callable[[Token[Any]], None] | None = None
 
@@ -95,7 +103,7 @@ class SyncEdge(Edge):
 
     __slots__ = ("held", "sequential", "token")
 
-    def __init__(self, index: int, label: str, active: bool) -> None:
+    def __init__(self, index: float, label: str, active: bool) -> None:
         super().__init__(index, label, active)
         self.token: Token[Any] | None = None
         self.held = False
@@ -130,7 +138,7 @@ class _QueueEdge(Edge):
 
     __slots__ = ("deepest", "initial", "queue")
 
-    def __init__(self, index: int, label: str, active: bool, initial: tuple[Any, ...]) -> None:
+    def __init__(self, index: float, label: str, active: bool, initial: tuple[Any, ...]) -> None:
         super().__init__(index, label, active)
         self.queue: deque[Token[Any]] = deque()
         self.initial = initial
@@ -169,7 +177,7 @@ class BufferEdge(_QueueEdge):
 
     __slots__ = ("held", "room", "sequential", "working")
 
-    def __init__(self, index: int, label: str, active: bool, initial: tuple[Any, ...], buffer: int) -> None:
+    def __init__(self, index: float, label: str, active: bool, initial: tuple[Any, ...], buffer: int) -> None:
         super().__init__(index, label, active, initial)
         self.room = len(initial) + buffer
         self.sequential = False
@@ -217,7 +225,7 @@ class EventEdge(_QueueEdge):
 
     def __init__(
         self,
-        index: int,
+        index: float,
         label: str,
         active: bool,
         capacity: int = 16,

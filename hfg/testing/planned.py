@@ -13,7 +13,7 @@ __all__ = ["planned", "planned_afresh"]
 
 def planned_afresh(engine: Any) -> dict[str, Any]:
     """Give the plan that a new run of the same graph would have; inside a running loop."""
-    fresh = Engine(flatten(engine.flat.graph), Settings())
+    fresh = Engine(flatten(engine.graph), Settings())
     return planned(fresh)
 
 
@@ -26,13 +26,19 @@ def planned(engine: Any) -> dict[str, Any]:
             f"{worker.path}{worker.port_name} {number}": _worker(worker, core) for number, worker in enumerate(workers)
         },
         "edges": [_edge(edge) for edge in core.edges if edge not in core.outside.values()],
-        "flat": [
-            (edge.index, edge.label, edge.active, edge.via, [one.label for one in edge.segments])
-            for edge in engine.flat.edges
+        "in order": [
+            [one.index for one in listed] == sorted(one.index for one in listed) for listed in (core.edges, core.scopes)
         ],
-        "nodes": [(node.index, node.path, id(node.node), node.options, node.scopes) for node in engine.flat.nodes],
         "scopes": [
-            (scope.index, scope.path, scope.parent and scope.parent.path, [member.path for member in scope.members])
+            (
+                scope.path,
+                scope.parent and scope.parent.path,
+                [child.path for child in scope.children],
+                [member.path for member in scope.members],
+                scope.worker.path,
+                id(scope.worker.node),
+                [around.path for around in scope.worker.around],
+            )
             for scope in core.scopes
         ],
         "paths": sorted((path, id(worker.node)) for path, worker in core.by_path.items()),
@@ -70,8 +76,9 @@ def _worker(worker: Any, core: Any) -> dict[str, Any]:
 def _edge(edge: Any) -> tuple[Any, ...]:
     return (
         type(edge).__name__,
-        edge.index,
         edge.label,
+        [one.label for one in edge.segments],
+        (id(edge.source_port), id(edge.target_port)),
         edge.active,
         edge.target_kind,
         edge.port_name,

@@ -2,7 +2,7 @@
 
 One edit after the other: checked on the drawn graph, new nodes are set up while the others go on, then the touched
 nodes are held as they come to rest, the plan is changed at one moment, and all go on. What fails on the way leaves
-graph and run as they were. Stands on `reforming` and `lifecycle`.
+graph and run as they were. Stands on `plan_diff`, `applying` and `lifecycle`.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from hfg.engine.editing.applying import apply
 from hfg.engine.editing.holding import Held
-from hfg.engine.editing.reforming import reform
-from hfg.engine.editing.replanning import Replan, closes_a_ring, replan
+from hfg.engine.editing.plan_diff import PlanDiff, diff
+from hfg.engine.editing.plan_index import PlanIndex, node_place
 from hfg.engine.editing.setting import refuse_without_effect
 from hfg.engine.editing.turns import Turns
 from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
@@ -33,7 +34,7 @@ from hfg.graph.editing import Transaction, history_of, may_break, prepare, refus
 from hfg.graph.editing.changes import Change, NodeSwap, OptionsChange, ParameterChange, undo_all
 from hfg.graph.editing.commands import Command, encode
 from hfg.graph.editing.reloading import reloaded
-from hfg.graph.flat import flatten
+from hfg.graph.flat import FlatNode, flatten
 from hfg.trace import ParameterSet, StructureChanged
 
 if TYPE_CHECKING:
@@ -50,7 +51,8 @@ class Edits:
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._graph: Graph = engine.flat.graph
+        self._graph: Graph = engine.graph
+        self._index: PlanIndex | None = None  # from the first edit on
         self._turns = Turns()
         self.leaving: set[asyncio.Task[None]] = set()  # nodes that are gone are torn down
 
@@ -114,9 +116,11 @@ class Edits:
         took_effect = False
         engine.hold()
         try:
-            how = replan(engine.core, engine.flat, changes)
-            if check:
-                self._refuse_errors(how)
+            if self._index is None:
+                self._index = PlanIndex(engine.core)
+            how = diff(self._graph, self._index, changes)
+            if check and how.doubtful:
+                self._refuse_errors()
             switched = self._switched(changes)
             waiting = self._values_of_running_nodes(changes)
             undo_all(waiting)  # they work with the old ones until their firings are over
@@ -162,35 +166,34 @@ class Edits:
         running = {worker.node for worker in self._engine.all_workers()} if values else set()
         return [value for value in values if value.node in running]
 
-    def _refuse_without_effect(self, values: Sequence[ParameterChange], how: Replan, switched: _Switched) -> None:
+    def _refuse_without_effect(self, values: Sequence[ParameterChange], how: PlanDiff, switched: _Switched) -> None:
         """P8: what the code that runs cannot see is refused, unless the node begins afresh by this very edit."""
         if not values:
             return
-        afresh = {*how.gone, *(worker for worker, _ in how.swapped), *self._to_start_afresh(switched)}
+        afresh = {*how.gone, *(worker for worker, _, _ in how.swapped), *self._to_start_afresh(switched)}
         refuse_without_effect(
             [(value.node, value.name) for value in values],
             [worker for worker in self._engine.all_workers() if worker not in afresh],
         )
 
-    def _touched(self, how: Replan, switched: _Switched, values: Sequence[ParameterChange]) -> list[Worker]:
+    def _touched(self, how: PlanDiff, switched: _Switched, values: Sequence[ParameterChange]) -> list[Worker]:
         """Those who must rest: also all inside a subgraph that is enabled, and nodes inside what iterates."""
         scopes = [worker.scope for worker, enabled in switched.items() if worker.scope is not None and enabled]
         set_ = {value.node for value in values}
-        inside = [one for one in self._engine.all_workers() if one.node in set_ and one.core is not self._engine.core]
+        everybody = self._engine.all_workers() if set_ else ()
+        inside = [one for one in everybody if one.node in set_ and one.core is not self._engine.core]
         return list(dict.fromkeys([*how.touched, *(member for scope in scopes for member in scope.members), *inside]))
 
-    def _refuse_errors(self, how: Replan) -> None:
+    def _refuse_errors(self) -> None:
         """A graph that runs has no errors, and gets none."""
-        if how.whole:
-            refuse_new_errors((), [one for one in check_flat(how.flat) if one.severity == "error"])
-        elif closes_a_ring(self._engine.core, how.new):
-            refuse_new_errors((), [one for one in check_flat(flatten(self._graph)) if one.severity == "error"])
+        refuse_new_errors((), [one for one in check_flat(flatten(self._graph)) if one.severity == "error"])
 
-    async def _set_up(self, how: Replan, come: list[Worker]) -> None:
+    async def _set_up(self, how: PlanDiff, come: list[Worker]) -> None:
         """Make workers of the nodes that come and set them up, before anybody is held for them."""
         engine = self._engine
-        for node in how.come:
-            worker = plan.make_worker(engine.core, node, engine.groups)
+        for node in sorted(how.come, key=node_place):
+            said = FlatNode(0, node._place.path, node, how.come[node], ())
+            worker = plan.make_worker(engine.core, said, engine.groups)
             come.append(worker)
             engine.lifetime.carry(worker)
             worker.busy = "setup"
@@ -230,11 +233,11 @@ class Edits:
                 await asyncio.wait({task})
         task.result()
 
-    async def _exchange_nodes(self, how: Replan) -> None:
+    async def _exchange_nodes(self, how: PlanDiff) -> None:
         """Tear down the nodes that are replaced and set up the others in their place; back again if that fails."""
         begun: list[tuple[Worker, Any]] = []
         try:
-            for worker, node in how.swapped:
+            for worker, _, node in how.swapped:
                 begun.append((worker, worker.node))
                 await self._become(worker, node)
         except BaseException:
@@ -271,12 +274,13 @@ class Edits:
         self._engine.lifetime.carry(worker)
         await self._hook(worker, lifecycle.set_up)
 
-    def _take_effect(self, how: Replan, come: list[Worker], changes: Sequence[Change]) -> None:
+    def _take_effect(self, how: PlanDiff, come: list[Worker], changes: Sequence[Change]) -> None:
         """From one moment to the next the run is another."""
         engine = self._engine
         core = engine.core
-        engine.flat = how.flat
-        for edge, flat in reform(core, how, come, engine.groups):
+        assert self._index is not None
+        new, nodes = apply(core, self._index, self._graph, how, come, engine.groups)
+        for edge, flat in new:
             if flat.source.kind == "observable":
                 engine.lifetime.feed(flat.source.port, edge, flat.through)
             elif flat.through:
@@ -289,7 +293,7 @@ class Edits:
                 if here is not None and here.node is change.node:
                     core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
         swapped = {change.old: change.new for change in changes if isinstance(change, NodeSwap)}
-        engine.looked_at_anew([worker for worker, _ in how.swapped], swapped)
+        engine.looked_at_anew([worker for worker, _, _ in how.swapped], swapped, nodes)
         for worker in come:
             core.upstairs.idle_again(worker)
 
@@ -297,13 +301,17 @@ class Edits:
         """The nodes, then the subgraphs, that are enabled or disabled, and which of both in the end."""
         if not any(isinstance(change, OptionsChange) for change in changes):
             return {}
-        by_node = {worker.node: worker for worker in self._engine.core.workers}
+        assert self._index is not None
+        by_node = self._index.by_node
+        swapped: dict[Any, Worker] = {}
         found: _Switched = {}
         for change in changes:
-            if isinstance(change, NodeSwap) and change.old in by_node:
-                by_node[change.new] = by_node[change.old]
+            if isinstance(change, NodeSwap):
+                taken_over = swapped.get(change.old) or by_node.get(change.old)
+                if taken_over is not None:
+                    swapped[change.new] = taken_over
             elif isinstance(change, OptionsChange) and change.before.group == change.after.group:
-                worker = by_node.get(change.node)
+                worker = swapped.get(change.node) or by_node.get(change.node)
                 if worker is not None:
                     found[worker] = change.after.enabled
         return dict(sorted(found.items(), key=lambda one: one[0].scope is not None))
@@ -313,7 +321,10 @@ class Edits:
         on = {worker for worker, enabled in switched.items() if enabled}
         scopes = {worker.scope for worker in on}
         fresh = []
-        for worker in self._engine.core.workers if on else ():
+        inside = [member for worker in on if worker.scope is not None for member in worker.scope.members]
+        assert self._index is not None
+        there = {worker for worker in (*on, *inside) if worker.scope is None}
+        for worker in sorted(there, key=self._index.leaves.label):
             meant = worker in on or (worker.own_enabled and not scopes.isdisjoint(worker.around))
             if not meant or worker.scope is not None or not worker.blocked & DISABLED or worker.blocked & BACKOFF:
                 continue
@@ -335,13 +346,8 @@ class Edits:
                 lifecycle.disable(worker)
 
     def _note_options(self, worker: Worker, enabled: bool) -> None:
-        flat = self._engine.flat
-        for node in flat.nodes:
-            if node.node is worker.node:
-                worker.options = node.options = msgspec.structs.replace(node.options, enabled=enabled)
-        for scope in flat.scopes:
-            if scope.subgraph is worker.node:
-                scope.options = msgspec.structs.replace(scope.options, enabled=enabled)
+        if worker.options is not None:
+            worker.options = msgspec.structs.replace(worker.options, enabled=enabled)
 
     async def _leave(self, gone: list[Worker]) -> None:
         """Nodes that are gone are torn down, also if nobody waits for that any more."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ import msgspec
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
 from hfg.engine.rules import quiet
-from hfg.engine.runtime.places import behind, is_gone, labels_at
+from hfg.engine.runtime.places import behind, edges_at, is_gone, is_near
 from hfg.errors import UsageError
 from hfg.token import Token
 from hfg.trace import RunPaused, RunResumed, TokenSent, TraceEvent
@@ -286,7 +286,7 @@ class Pausing:
           UsageError: there is none.
         """
         labels = self._labels(place)
-        if not labels and labels_at(self._engine.flat, place):
+        if not labels and edges_at(self._engine, place):
             raise UsageError(
                 f"{place!r} is inside a subgraph that iterates, where tokens can be looked at by run.tap alone; "
                 "a breakpoint may be at a node there"
@@ -313,23 +313,24 @@ class Pausing:
         return point
 
     def _labels(self, place: Any) -> list[str]:
-        flat = self._engine.flat
-        labels = set(labels_at(flat, place))
-        return [edge.label for edge in flat.edges if edge.label in labels]
+        core = self._engine.core
+        return [edge.label for edge in edges_at(self._engine, place) if edge.target.core is core]
 
-    def find_again(self, swapped: Mapping[Any, Any]) -> None:
+    def find_again(self, swapped: Mapping[Any, Any], nodes: Set[Any]) -> None:
         """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4).
 
         Args:
           swapped: nodes that were replaced, and by what.
+          nodes: at which something is not as it was.
         """
-        for point in self.breakpoints:
+        near = {point for point in self.breakpoints if is_near(point.place, nodes)}
+        for point in near:
             point.place = behind(point.place, swapped)
             if is_gone(point.place):
                 self.remove(point)
         for worker, point in self._at_nodes.items():
             self._is_called(point, worker.path)
-        for point in self._at_edges:
+        for point in near.intersection(self._at_edges):
             labels = self._labels(point.place)
             self._labels_at[point] = frozenset(labels)
             self._is_called(point, _path(point.place, labels) or point.path)

@@ -91,7 +91,7 @@ class Steering:
         engine = self._engine
         if when is not None and not callable(when):
             raise UsageError(f"when= takes a function of the token, like lambda token: token.value > 3; got {when!r}")
-        place = place_of(engine.flat, place)
+        place = place_of(engine, place)
         if not hasattr(place, "_place"):
             return engine.pausing.at_edges(place, when)
         if when is not None:
@@ -100,7 +100,7 @@ class Steering:
 
     def _single(self, node: Any, what: str) -> Worker:
         if isinstance(node, str):
-            node = self._engine.flat.graph[node]
+            node = self._engine.graph[node]
         inside = (worker for worker in self._engine.all_workers() if worker.node is node and node is not None)
         worker = next(inside, None) or self._worker(node)
         if worker.scope is not None:

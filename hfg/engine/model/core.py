@@ -13,7 +13,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, Protocol
 
-from hfg.engine.model.scopes import Scope
+from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import Worker
 from hfg.errors import HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
@@ -177,12 +177,14 @@ class Core:
         self._numbers = itertools.count()
         self.edges: list[SyncEdge | BufferEdge | EventEdge] = []
         self.scopes: list[Scope] = []
+        self.gates: list[Gate] = []
         self.by_path: dict[str, Worker] = {}
         self.boundary: Worker | None = None
         self.trace: Callable[[TraceEvent], None] | None = None
         self.debug = False
         self.fast = True
         self.in_flight = 0
+        self.full_edges = 0  # queues that hold their sources back (F8)
         self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
         self.timers = 0
         self.pumping = False

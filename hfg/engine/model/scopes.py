@@ -20,6 +20,7 @@ class Scope:
     Attributes:
       worker: its automatic ports live on a worker of their own, which never fires.
       members: the running nodes inside, nested ones too.
+      children: the scopes directly inside.
       inner_edges: the edges with both ends inside.
       active: A(subgraph) as last derived.
       told: A(subgraph) as its events have told it last.
@@ -27,6 +28,7 @@ class Scope:
 
     __slots__ = (
         "active",
+        "children",
         "enabled",
         "gates",
         "index",
@@ -39,11 +41,14 @@ class Scope:
         "worker",
     )
 
-    def __init__(self, index: int, path: str, parent: Scope | None) -> None:
+    def __init__(self, index: float, path: str, parent: Scope | None) -> None:
         self.index = index
         self.path = path
         self.parent = parent
         self.members: list[Worker] = []
+        self.children: list[Scope] = []
+        if parent is not None:
+            parent.children.append(self)
         self.inner_edges: list[Any] = []
         self.worker: Worker | None = None
         self.active = False
@@ -59,14 +64,22 @@ class Scope:
     def inside(self) -> list[Worker]:
         """Give the workers of all nodes and subgraphs inside."""
         assert self.worker is not None
-        owners = [scope.worker for scope in self.worker.core.scopes if scope is not self]
-        return [*self.members, *(owner for owner in owners if owner is not None and self in owner.around)]
+        found = list(self.members)
+        waiting = list(reversed(self.children))
+        while waiting:
+            scope = waiting.pop()
+            if scope.worker is not None:
+                found.append(scope.worker)
+            waiting += reversed(scope.children)
+        return found
 
     def find_inner_edges(self) -> None:
         """Note the edges with both ends inside; left until somebody asks, since most subgraphs are just boxes."""
         assert self.worker is not None
         inside = set(self.inside())
-        self.inner_edges = [edge for edge in self.worker.core.edges if edge.source in inside and edge.target in inside]
+        self.inner_edges = [
+            edge for worker in inside for edge in (*worker.in_edges, *worker.slot_edges) if edge.source in inside
+        ]
 
     def derive(self) -> bool:
         """Whether an inner node is active, or a token with +1 lies untaken inside or was drained and has yet to act.

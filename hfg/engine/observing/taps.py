@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.runtime import ports, relays
-from hfg.engine.runtime.places import Ends, behind, labels_at, place_of
+from hfg.engine.runtime.places import Ends, behind, edges_at, is_near, place_of
 from hfg.errors import GraphError, UsageError
 from hfg.graph.structure.edge import Edge as DrawnEdge
 from hfg.graph.structure.level import level_of
@@ -146,7 +146,7 @@ class Taps:
             raise UsageError(f"size is how many tokens a tap keeps, 1 or more, got {size!r}")
         if max_rate_hz is not None and not (isinstance(max_rate_hz, int | float) and max_rate_hz > 0):
             raise UsageError(f"max_rate_hz is how many tokens a second a tap gives at most, got {max_rate_hz!r}")
-        what = self._outside(what) or place_of(self._engine.flat, what)
+        what = self._outside(what) or place_of(self._engine, what)
         places = self._places(what)
         buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1))
         self._attach(buffer, what, places)
@@ -154,13 +154,16 @@ class Taps:
             buffer.end()
         return Tap(buffer, max_rate_hz, partial(self._remove, buffer))
 
-    def find_again(self, swapped: Mapping[Any, Any]) -> None:
+    def find_again(self, swapped: Mapping[Any, Any], nodes: Set[Any]) -> None:
         """The graph was edited: what is looked at may be elsewhere, or nowhere for now (R4).
 
         Args:
           swapped: nodes that were replaced, and by what.
+          nodes: at which something is not as it was.
         """
         for buffer, (where, _) in list(self._buffers.items()):
+            if not is_near(where, nodes):
+                continue
             what = behind(where, swapped)
             self._remove(buffer)
             try:
@@ -241,20 +244,18 @@ class Taps:
         if not isinstance(what, Port | InnerSource | InnerTarget | DrawnEdge | Ends):
             raise UsageError(f"a tap looks at a port or an edge of this run, given itself or by path, got {what!r}")
         if isinstance(what, Port) and (
-            what.graph is None or level_of(what.graph).whole is not self._engine.flat.level.whole
+            what.graph is None or level_of(what.graph).whole is not level_of(self._engine.graph).whole
         ):
             raise UsageError(
                 f'"{what.path}" is in no graph that runs here, so no token passes there: '
-                f'this is a run of graph "{self._engine.flat.graph.name}"'
+                f'this is a run of graph "{self._engine.graph.name}"'
             )
         if isinstance(what, Port) and what.kind == "event":
             events = relays.events_behind(what) if relays.is_relay(what) else [what]
             return [(event, []) for event in map(self._running, events) if event is not None]
-        labels = set(labels_at(self._engine.flat, what))
         carrying: dict[str, list[Any]] = {}
-        for edge in self._edges():
-            if edge.label in labels:
-                carrying.setdefault(edge.label.partition(" -> ")[0], []).append(edge)
+        for edge in edges_at(self._engine, what):
+            carrying.setdefault(edge.label.partition(" -> ")[0], []).append(edge)
         places = [(edge, group if len(group) > 1 else []) for group in carrying.values() for edge in group]
         if isinstance(what, Port) and what.kind == "slot" and not relays.is_relay(what):
             worker = self._worker(what)
@@ -272,7 +273,7 @@ class Taps:
         return worker.events.get(event.name) if worker.node is None else ports.bind_event(worker, event.name)
 
     def _worker(self, port: Any) -> Worker:
-        if port.node is self._engine.flat.graph:
+        if port.node is self._engine.graph:
             boundary = self._engine.core.boundary
             assert boundary is not None
             return boundary

@@ -137,7 +137,7 @@ def _look_at(scope: Scope) -> None:
         gate_changed(scope.gates)
 
 
-def _index(scope: Scope) -> int:
+def _index(scope: Scope) -> float:
     return scope.index
 
 

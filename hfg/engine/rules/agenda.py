@@ -188,6 +188,7 @@ def note_full(edge: EventEdge) -> None:
         edge.full = True
         source: Worker = edge.source
         source.full_edges += 1
+        source.core.full_edges += 1
         block(source, FULL)
 
 
@@ -197,6 +198,7 @@ def freed(edge: EventEdge) -> None:
         edge.full = False
         source: Worker = edge.source
         source.full_edges -= 1
+        source.core.full_edges -= 1
         if not source.full_edges:
             if source.room_waiters is not None:
                 waiters, source.room_waiters = source.room_waiters, None

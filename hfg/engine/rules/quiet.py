@@ -48,6 +48,8 @@ __all__ = [
 
 def grow(core: Core) -> bool:
     """F8: if only full queues hold nodes back, the smallest of them gets one more place."""
+    if not core.full_edges:
+        return False
     if any(reader.inputs_ready() for reader in core.readers):
         return False  # somebody outside holds a node back: growing would not help, only fill memory
     if any([_rate_holds(worker) for worker in core.workers]):  # noqa: C419 - each sets its timer

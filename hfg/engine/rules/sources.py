@@ -19,6 +19,8 @@ __all__ = ["joins", "judge_sources"]
 
 def judge_sources(core: Core) -> None:
     """Sources are futile as long as all that are left work for nobody; one that rests keeps no run alive (A11)."""
+    if not core.futile and any(_works_for_somebody(one) for one in core.sources):
+        return  # as mostly, and seen at the first of them
     left = [one for one in core.sources if not one.blocked & (ENDED | DISABLED | RESTING)]
     core.futile = bool(left) and len(_for_nobody(left)) == len(left)
     for source in core.sources:
@@ -27,6 +29,13 @@ def judge_sources(core: Core) -> None:
                 block(source, FUTILE)
         else:
             unblock(source, FUTILE)
+
+
+def _works_for_somebody(source: Worker) -> bool:
+    """Whether it is left and works for one that has not ended and is no source itself."""
+    return not source.blocked & (ENDED | DISABLED | RESTING) and any(
+        not joins(edge) or not (edge.target.blocked & ENDED or edge.target.is_source) for edge in source.all_out_edges()
+    )
 
 
 def _for_nobody(sources: Collection[Worker]) -> set[Worker]:

@@ -12,7 +12,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from typing import Any
 
 from hfg.clock import current_clock
@@ -34,6 +34,7 @@ from hfg.engine.runtime.settings import Settings
 from hfg.engine.runtime.upstairs import Deciders
 from hfg.engine.runtime.virtual import VirtualTimeLoop
 from hfg.errors import EngineInternalError, HfgError, NodeError, RunError
+from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
 from hfg.trace import TraceEvent
 
@@ -115,7 +116,7 @@ class Engine:
         self.core.debug = settings.debug
         self.core.fast = settings.fast
         self.core.fuse_after = settings.fuse_after
-        self.flat: FlatGraph = flat
+        self.graph: Graph = flat.graph
         self.holds = 0
         self.readers: list[Worker] = []
         self.read_out: set[Worker] = set()
@@ -181,7 +182,7 @@ class Engine:
         groups: dict[str, Group] = {}
         settings = self.settings
         clock = self.now if self.virtual else time.perf_counter  # a run in virtual time is the same each time (R6)
-        for name, spec in self.flat.groups.items():
+        for name, spec in self.graph.groups.items():
             seed = settings.seed if spec.seed is None else spec.seed
             policy = make_policy(settings.policy or spec.policy, seed)
             if spec.threads:
@@ -516,12 +517,18 @@ class Engine:
                 self.measuring.end()
         return self.measuring
 
-    def looked_at_anew(self, workers: Sequence[Worker], swapped: Mapping[Any, Any]) -> None:
-        """The graph was edited: who looks at it finds its places again; these workers have another node (R4)."""
+    def looked_at_anew(self, workers: Sequence[Worker], swapped: Mapping[Any, Any], nodes: Set[Any]) -> None:
+        """The graph was edited: who looks at it finds its places again (R4).
+
+        Args:
+          workers: have another node.
+          swapped: nodes that were replaced, and by what.
+          nodes: at which something is not as it was, also those that are gone.
+        """
         if self.measuring is not None:
             self.measuring.refit(workers)
-        self.taps.find_again(swapped)
-        self.pausing.find_again(swapped)
+        self.taps.find_again(swapped, nodes)
+        self.pausing.find_again(swapped, nodes)
 
     def _listen(self, take: Callable[[TraceEvent], None] | None) -> None:
         """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""

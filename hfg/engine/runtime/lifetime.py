@@ -44,7 +44,7 @@ class Lifetime:
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._was_set_up: list[Worker] = []
+        self._was_set_up: dict[Worker, None] = {}
         self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
         self._watch: Watch | None = None
         # Around what the teardown waits for now. Made here, for the first of a process takes a while: not in a hurry.
@@ -65,7 +65,7 @@ class Lifetime:
         core.started = True
         self._connect_operators(core)
         assert core.boundary is not None
-        start = engine_ports.bind_start(core.boundary, engine.flat.graph.start)
+        start = engine_ports.bind_start(core.boundary, engine.graph.start)
         if start is not None:
             trigger(start, explicit=1)
         self._open_sources(core)
@@ -126,7 +126,7 @@ class Lifetime:
     async def _set_up_one(self, worker: Worker) -> None:
         engine = self._engine
         waiter: asyncio.Future[HfgError | None] = engine.loop.create_future()
-        self._was_set_up.append(worker)
+        self._was_set_up[worker] = None
         try:
             lifecycle.set_up(worker, partial(answer, waiter))
         except KeyboardInterrupt:
@@ -144,14 +144,14 @@ class Lifetime:
 
     def came(self, worker: Worker) -> None:
         """A node was set up while the run was under way (R4)."""
-        self._was_set_up.append(worker)
+        self._was_set_up[worker] = None
 
     def forget(self, one: Any) -> None:
         """An edge, or a node that was torn down, is no longer part of the run (R4)."""
         if one in self._disposables:
             self._disposables.pop(one)()
-        elif one in self._was_set_up:
-            self._was_set_up.remove(one)
+        else:
+            self._was_set_up.pop(one, None)
 
     def feed(self, source: Any, edge: Any, operators: tuple[Any, ...]) -> None:
         """An outside observable holds the run open until it completes (R5)."""

@@ -6,21 +6,23 @@ A node and its ports are the same whatever they are called; an edge is known by 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping, Set
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from hfg.engine.runtime import relays
 from hfg.errors import GraphError
-from hfg.graph.flat import FlatGraph
 from hfg.graph.structure.edge import Edge as DrawnEdge
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import Port
 
-__all__ = ["Ends", "behind", "is_gone", "labels_at", "place_of"]
+if TYPE_CHECKING:
+    from hfg.engine.runtime.engine import Engine
+
+__all__ = ["Ends", "behind", "edges_at", "is_gone", "is_near", "place_of"]
 
 
 class Ends(msgspec.Struct, frozen=True):
@@ -30,35 +32,43 @@ class Ends(msgspec.Struct, frozen=True):
     target: Any
 
 
-def place_of(flat: FlatGraph, what: Any) -> Any:
+def place_of(engine: Engine, what: Any) -> Any:
     """Give what is meant by a node, a port, an edge or a path of one of them.
 
     Raises:
       GraphError: the path leads nowhere.
     """
     if isinstance(what, DrawnEdge):
-        wholes = [edge for one in flat.walk() for edge in one.edges if what in edge.segments]
-        return Ends(wholes[0].source.port, wholes[0].target.port) if len(wholes) == 1 else what
+        wholes = [edge for edge in _edges(engine) if what in edge.segments]
+        return Ends(wholes[0].source_port, wholes[0].target_port) if len(wholes) == 1 else what
     if not isinstance(what, str):
         return what
     if " -> " not in what:
-        return flat.graph[what]
-    labels = {edge.label: edge for one in flat.walk() for edge in one.edges}
+        return engine.graph[what]
+    labels = {edge.label: edge for edge in _edges(engine)}
     if what not in labels:
         raise GraphError(f'there is no edge "{what}" in this run; {suggest(what, labels)}')
-    return Ends(labels[what].source.port, labels[what].target.port)
+    return Ends(labels[what].source_port, labels[what].target_port)
 
 
-def labels_at(flat: FlatGraph, place: Any) -> list[str]:
-    """The edges of the run that a place is about."""
+def edges_at(engine: Engine, place: Any) -> list[Any]:
+    """The edges of the run that a place is about; those between nodes."""
     if isinstance(place, Ends):
         return [
-            edge.label
-            for one in flat.walk()
-            for edge in one.edges
-            if edge.source.port is place.source and edge.target.port is place.target
+            edge for edge in _edges(engine) if edge.source_port is place.source and edge.target_port is place.target
         ]
-    return [label for one in flat.walk() for label in relays.labels_of(one, place)]
+    return [edge for edge in _edges(engine) if relays.is_at(edge.segments, place)]
+
+
+def _edges(engine: Engine) -> Iterator[Any]:
+    return (edge for core in engine.all_cores() for edge in core.edges if edge.segments)
+
+
+def is_near(place: Any, nodes: Set[Any]) -> bool:
+    """Whether a place is at one of some nodes and subgraphs."""
+    if isinstance(place, Ends | DrawnEdge):
+        return is_near(place.source, nodes) or is_near(place.target, nodes)
+    return place in nodes or getattr(place, "node", None) in nodes
 
 
 def behind(place: Any, swapped: Mapping[Any, Any]) -> Any:

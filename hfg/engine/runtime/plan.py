@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hfg.engine.model.core import Core
@@ -16,7 +16,7 @@ from hfg.engine.model.worker import DISABLED, STARTING, UNWIRED, RunningEvent, W
 from hfg.engine.rules.wiring import is_live, rewire
 from hfg.engine.runtime.groups import Group
 from hfg.errors import GraphError, UsageError
-from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode
+from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat import Scope as FlatScope
 from hfg.ports.edges import BufferEdge, Edge, EventEdge, SyncEdge
 
@@ -24,15 +24,19 @@ __all__ = [
     "Ends",
     "add_scope",
     "build",
+    "describe",
     "fit",
     "follows",
     "is_sequential",
     "lead_in",
     "make_edge",
     "make_worker",
+    "mark_scope",
     "mark_scopes",
     "prepare_slot",
+    "set_gate",
     "set_gates",
+    "slots_first",
     "unwire",
     "watch",
     "watch_scope",
@@ -95,14 +99,21 @@ def add_scope(core: Core, flat_scope: FlatScope, scope: Scope, loop: Group) -> W
 def set_gates(core: Core, flat: FlatGraph, workers: list[Worker]) -> None:
     """Couple the work of gated nodes to the activity of others (A11)."""
     for flat_gate in flat.gates:
-        state = core.scopes[-2 - flat_gate.by] if flat_gate.by < 0 else workers[flat_gate.by]
-        gate = Gate(state, flat_gate.idle_rate_hz)
-        target = flat_gate.target
-        gate.workers = list(core.scopes[-2 - target].members) if target < 0 else [workers[target]]
-        for worker in gate.workers:
-            worker.gates_over += (gate,)
-            worker.paced = worker.paced or worker.is_source
-        state.gates.append(gate)
+        by, target = flat_gate.by, flat_gate.target
+        state = core.scopes[scope_end(by)] if by < 0 else workers[by]
+        gated = core.scopes[scope_end(target)].members if target < 0 else [workers[target]]
+        set_gate(core, state, gated, flat_gate.idle_rate_hz)
+
+
+def set_gate(core: Core, state: Worker | Scope, gated: Iterable[Worker], idle_rate_hz: float | None) -> None:
+    """Let some nodes work only while a state is active."""
+    gate = Gate(state, idle_rate_hz)
+    gate.workers = list(gated)
+    for worker in gate.workers:
+        worker.gates_over += (gate,)
+        worker.paced = worker.paced or worker.is_source
+    state.gates.append(gate)
+    core.gates.append(gate)
 
 
 class Ends:
@@ -124,6 +135,13 @@ class Ends:
             owner = self.core.scopes[-2 - end.node].worker
             assert owner is not None
             return owner
+        return self._at_border(end)
+
+    def scopes_of(self, flat: FlatEdge) -> tuple[Scope, ...]:
+        """Give the scopes through whose ports an edge passes."""
+        return tuple(self.core.scopes[scope] for scope in flat.via)
+
+    def _at_border(self, end: End) -> Worker:
         if end.kind == "output":
             return self._outside(self.feeds, end.name, self.core.feeds)
         if end.kind == "input":
@@ -222,9 +240,16 @@ def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
     if type(edge) is not EventEdge:
         edge.sequential = is_sequential(edge)
         edge.follows = follows(edge)
-    edge.via = tuple(core.scopes[scope] for scope in flat.via)
+    edge.via = ends.scopes_of(flat)
     edge.port_name = flat.target.name
+    describe(edge, flat)
     return edge
+
+
+def describe(edge: Any, flat: FlatEdge) -> None:
+    """Note what a running edge stands for in the drawn graph."""
+    edge.segments = flat.segments
+    edge.source_port, edge.target_port = flat.source.port, flat.target.port
 
 
 def wire(edge: Any, flat: FlatEdge) -> None:
@@ -238,7 +263,7 @@ def wire(edge: Any, flat: FlatEdge) -> None:
         if event is None:
             port = flat.source.port if source.node is not None or flat.source.name == "start" else None
             event = source.events[flat.source.name] = RunningEvent(source, flat.source.name, port)
-        event.edges = tuple(sorted((*event.edges, edge), key=_slots_first))
+        event.edges = tuple(sorted((*event.edges, edge), key=slots_first))
     else:
         _out_of(edge, source, flat)
 
@@ -260,11 +285,12 @@ def unwire(edge: Any) -> None:
     source.wired_out, source.out_names = tuple(wired), tuple(names)
 
 
-def _slots_first(edge: Edge) -> tuple[bool, int]:
+def slots_first(edge: Edge) -> tuple[bool, float]:
+    """The order in which the signals of an event leave (F9)."""
     return (edge.target_kind == "input", edge.index)
 
 
-def _by_index(edge: Edge) -> int:
+def _by_index(edge: Edge) -> float:
     return edge.index
 
 
@@ -342,7 +368,8 @@ def lead_in(edge: Any) -> None:
 def prepare_slot(worker: Worker, name: str) -> EventEdge:
     """Make the edge by which signals come into a slot from outside the graph; it counts as active (P10, A4)."""
     core = worker.core
-    edge = EventEdge(len(core.edges), f"outside -> {worker.path}.{name}" if worker.path else f"outside -> {name}", True)
+    index = core.edges[-1].index + 1 if core.edges else 0
+    edge = EventEdge(index, f"outside -> {worker.path}.{name}" if worker.path else f"outside -> {name}", True)
     edge.source = Worker(core, core.number_workers(), "", None, None, worker.group)
     edge.source.blocked |= UNWIRED  # it never fires; only its queue may be full
     edge.target = worker
@@ -380,17 +407,22 @@ def _out_of(edge: Edge, source: Worker, flat: FlatEdge) -> None:
 def mark_scopes(core: Core) -> None:
     """Find out whose activity somebody cares about; the others cost nothing."""
     for scope in core.scopes:
-        owner = scope.worker
-        assert owner is not None
-        interesting = (
-            bool(scope.gates)
-            or owner.active_for_s is not None
-            or any(name in owner.events for name in ("activated", "deactivated", "timeout"))
-        )
-        if interesting:
-            watch_scope(scope)
+        mark_scope(scope)
     for worker in core.workers:
         watch(worker)
+
+
+def mark_scope(scope: Scope) -> None:
+    """Find out whether somebody cares about the activity of a subgraph."""
+    owner = scope.worker
+    assert owner is not None
+    interesting = (
+        bool(scope.gates)
+        or owner.active_for_s is not None
+        or any(name in owner.events for name in ("activated", "deactivated", "timeout"))
+    )
+    if interesting:
+        watch_scope(scope)
 
 
 def watch_scope(scope: Scope) -> None:

@@ -7,14 +7,13 @@ Looks at the graph as it was drawn. Stands on `graph`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from hfg.graph.flat import FlatGraph
 from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.ports import InnerSource, InnerTarget
 
-__all__ = ["events_behind", "is_relay", "labels_of", "slots_behind"]
+__all__ = ["events_behind", "is_at", "is_relay", "slots_behind"]
 
 
 def is_relay(port: Any) -> bool:
@@ -69,17 +68,12 @@ def _back(relay: Any) -> Iterator[Any]:
     return (edge for edge in relay.graph.edges if edge.target is relay)
 
 
-def labels_of(flat: FlatGraph, what: Any) -> list[str]:
-    """The edges of a run that an edge as drawn is part of, or that begin, end or pass at a port."""
-    return [
-        edge.label
-        for edge in flat.edges
-        if any(
-            what is segment
-            or what in (segment.source, segment.target, *_outer(segment.source), *_outer(segment.target))
-            for segment in edge.segments
-        )
-    ]
+def is_at(segments: Sequence[Any], what: Any) -> bool:
+    """Whether an edge of a run has an edge as drawn for a part, or begins, ends or passes at a port."""
+    return any(
+        what is segment or what in (segment.source, segment.target, *_outer(segment.source), *_outer(segment.target))
+        for segment in segments
+    )
 
 
 def _outer(end: Any) -> tuple[Any, ...]:

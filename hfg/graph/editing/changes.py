@@ -190,7 +190,7 @@ class EdgeChange(Change):
     @classmethod
     def of(cls, level: Level, edge: Edge, *, added: bool, for_good: bool = True) -> EdgeChange:
         """Describe an edge that is in a graph."""
-        return cls(level, edge, level.edges.index(edge), added, for_good)
+        return cls(level, edge, level.connections.position(edge), added, for_good)
 
     @override
     def do(self) -> None:

@@ -47,15 +47,16 @@ def enclose(do: Do, members: Sequence[Node], name: str) -> None:
         raise GraphError(f'the subgraph cannot be named "{name}": {around.title} has a node of this name already')
     _refuse_promoted(around, members)
     inner = set(members)
-    edges = [edge for edge in around.edges if not inner.isdisjoint((owner_of(edge.source), owner_of(edge.target)))]
+    near = around.connections.at(*members)
+    edges = [edge for edge in near if not inner.isdisjoint((owner_of(edge.source), owner_of(edge.target)))]
     crossing = [edge for edge in edges if not {owner_of(edge.source), owner_of(edge.target)} <= inner]
     ports = _Names(crossing, inner)
     kind = types.new_class("Enclosed", (Enclosed,), exec_body=lambda body: body.update(ports.declarations()))
     box: Enclosed = kind()
-    halves = [(edge, around.edges.index(edge), _outer_half(edge, box, ports, inner)) for edge in edges]
+    halves = [(edge, around.connections.position(edge), _outer_half(edge, box, ports, inner)) for edge in edges]
     for edge in reversed(edges):
         do(EdgeChange.of(around, edge, added=False, for_good=False))
-    within = _take_in(do, around, box, name, [node for node in around.nodes.values() if node in inner])
+    within = _take_in(do, around, box, name, sorted(inner, key=around.members.order.label))
     left = 0  # edges with both ends inside, which are no more in the way
     for _, spot, half in halves:
         if half is None:
@@ -179,9 +180,9 @@ def dissolve(do: Do, box: Node, levels: Sequence[Level]) -> None:
       GraphError: it is no subgraph, something is said about the subgraph itself, or a name inside is taken outside.
     """
     around, within = level_of(box.place.graph), _need_dissolvable(box, levels)
-    before = list(around.edges)
     border = _Border(box, around, within)
-    joined = {edge: border.through(edge) for edge in before if border.is_at(edge)}
+    joined = {edge: border.through(edge) for edge in around.connections.at(box) if border.is_at(edge)}
+    spots = [around.connections.position(edge) for edge in joined]
     own = [whole for edge in within.edges for whole in border.through(edge)]
     gates = list(within.gates)
     for edge in reversed(joined):
@@ -192,15 +193,12 @@ def dissolve(do: Do, box: Node, levels: Sequence[Level]) -> None:
         do(GateChange(within, gate, within.gates.listed.index(gate), added=False))
     _open_promotions(do, box, around, within)
     _let_out(do, box, around, within)
-    at = 0
-    for edge in before:
-        if edge not in joined:
-            at += 1
-            continue
-        for whole in joined[edge]:
+    more = 0  # than there were
+    for number, (spot, wholes) in enumerate(zip(spots, joined.values(), strict=True)):
+        for whole in wholes:
             refuse(around, whole.source, whole.target, whole.options)
-            do(EdgeChange(around, whole, at, added=True, for_good=False))
-            at += 1
+            do(EdgeChange(around, whole, spot - number + more, added=True, for_good=False))
+            more += 1
     for whole in own:
         refuse(around, whole.source, whole.target, whole.options)
         do(EdgeChange(around, whole, len(around.edges), added=True, for_good=False))
@@ -269,7 +267,7 @@ def _refuse_if_named(box: Node, levels: Sequence[Level]) -> None:
         for gate in level.gates:
             if box in (gate.target, gate.by):
                 raise GraphError(f'"{path}" cannot be dissolved: a gate names it; gate the nodes inside')
-    for edge in level_of(box.place.graph).edges:
+    for edge in level_of(box.place.graph).connections.at(box):
         for end in (edge.source, edge.target):
             if owner_of(end) is box and _relay(end, box) is None and not isinstance(end, ParameterPort):
                 raise GraphError(
@@ -293,7 +291,7 @@ class _Border:
 
     def __init__(self, box: Node, around: Level, within: Level) -> None:
         self.box = box
-        self.around = list(around.edges)
+        self.around = around.connections.at(box)
         self.within = list(within.edges)
         self.promotions = within.promotions
 

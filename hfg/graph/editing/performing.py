@@ -97,8 +97,12 @@ class _Hand:
           GraphError: one cannot be.
         """
         for around, edge in self.moved:
-            if edge in around.edges:
+            if edge in around.connections.order:
                 refuse(around, edge.source, edge.target, edge.options)
+
+    def _gated_levels(self) -> list[Level]:
+        """Those in which there are gates."""
+        return [level for level in self.root.walk() if level.gates.listed] if self.root.whole.gated else []
 
     def do(self, change: Change) -> None:
         """Take a step and note it."""
@@ -123,9 +127,9 @@ class _Hand:
         """Remove a node with all that refers to it."""
         around = level_of(node.place.graph)
         gone = set(nodes_within(node))
-        for edge in [edge for edge in around.edges if _touches(edge, node)]:
+        for edge in _edges_of(around, node):
             self.do(EdgeChange.of(around, edge, added=False))
-        for level in self.root.walk():
+        for level in self._gated_levels():
             for gate in [gate for gate in level.gates if gate.target in gone or gate.by in gone]:
                 self.do(GateChange(level, gate, level.gates.listed.index(gate), added=False))
         promoted = {
@@ -163,7 +167,7 @@ class _Hand:
             self._replace_box(old, new)
             return
         around = level_of(old.place.graph)
-        edges = [edge for edge in around.edges if _touches(edge, old)]
+        edges = _edges_of(around, old)
         for edge in edges:
             _counterpart(edge.source, old, new)
             _counterpart(edge.target, old, new)
@@ -179,11 +183,13 @@ class _Hand:
         around = level_of(old.place.graph)
         name, options = old.place.name, old._options
         position = around.members.position(name)
-        edges = [(around.edges.index(edge), edge) for edge in around.edges if _touches(edge, old)]
+        edges = [(around.connections.position(edge), edge) for edge in _edges_of(around, old)]
         for _, edge in edges:
             _counterpart(edge.source, old, new)
             _counterpart(edge.target, old, new)
-        gates = [(level, gate) for level in self.root.walk() for gate in level.gates if old in (gate.target, gate.by)]
+        gates = [
+            (level, gate) for level in self._gated_levels() for gate in level.gates if old in (gate.target, gate.by)
+        ]
         promoted = around.promotions.copied()
         self.take_out(old)
         around.face.add(new, name=name, **msgspec.structs.asdict(options))
@@ -202,7 +208,7 @@ class _Hand:
 
     def _hand_over(self, around: Level, old: Node, new: Node) -> None:
         """Gates and promotions go on with the new node."""
-        for level in self.root.walk():
+        for level in self._gated_levels():
             for gate in [gate for gate in level.gates if old in (gate.target, gate.by)]:
                 position = level.gates.listed.index(gate)
                 self.do(GateChange(level, gate, position, added=False))
@@ -235,7 +241,7 @@ class _Hand:
 
     def _ungate(self, command: c.Ungate) -> None:
         node = node_at(self.root, command.path)
-        for level in self.root.walk():
+        for level in self._gated_levels():
             for position, gate in enumerate(level.gates):
                 if gate.target is node:
                     self.do(GateChange(level, gate, position, added=False))
@@ -285,7 +291,7 @@ class _Hand:
     def _edge(self, source_path: str, target_path: str) -> tuple[Level, Edge]:
         source, target = source_at(self.root, source_path), target_at(self.root, target_path)
         for around in (_level_for(self.root, source, target), self.root):
-            for edge in around.edges:
+            for edge in around.connections.at(target.node):
                 if edge.source is source and edge.target is target:
                     return around, edge
         raise EdgeRefused(
@@ -299,7 +305,7 @@ class _Hand:
         enclose(self.do, members, command.name)
 
     def _dissolve(self, command: c.Dissolve) -> None:
-        dissolve(self.do, node_at(self.root, command.path), self.root.walk())
+        dissolve(self.do, node_at(self.root, command.path), self._gated_levels())
 
 
 def _refuse_malformed(command: c.Command) -> None:
@@ -322,6 +328,11 @@ def _refuse_malformed(command: c.Command) -> None:
 def _touches(edge: Edge, node: Node) -> bool:
     """Whether an edge begins or ends at a port of a node, as seen from outside."""
     return node in (owner_of(edge.source), owner_of(edge.target))
+
+
+def _edges_of(around: Level, node: Node) -> list[Edge]:
+    """The edges that begin or end at a port of a node, as seen from outside; in order."""
+    return [edge for edge in around.connections.at(node) if _touches(edge, node)]
 
 
 def _level_for(root: Level, source: SourceEnd, target: TargetEnd) -> Level:

@@ -8,7 +8,7 @@ there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from hfg.graph.flat.flat_graph import ROOT, End, EndKind, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
@@ -95,7 +95,7 @@ class EdgeFollower:
         self.ends: dict[Any, End] = {}  # by port: both ends of a port are the same, but for parameters as well
         self.labels: dict[str, int] = {}
         self.index_of = {node.node: node.index for node in flat.nodes}
-        self.scope_of = {scope.subgraph: scope.index for scope in flat.scopes}
+        self.scope_of: Mapping[Any, Any] = {scope.subgraph: scope.index for scope in flat.scopes}
         self.depth_of: dict[Edge, int] = {}
         # What goes on behind a port of a dissolved subgraph: inside behind inputs and slots, outside behind outputs and
         # events.
@@ -169,7 +169,7 @@ class EdgeFollower:
             if scope is None:
                 yield found, via
             else:
-                inner = inside(self.flat.scopes[scope].subgraph)
+                inner = inside(found.node)
                 behind = () if inner is None else inner.promotions.of(found.name)
                 stack += [(parameter, (*via, scope)) for parameter in reversed(behind)]
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from hfg import errors
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, end_path, is_single
+from hfg.graph.structure.sequence import Sequence
 
 __all__ = ["Connections"]
 
@@ -19,12 +20,14 @@ class Connections:
       pairs: the ends of all other edges.
     """
 
-    __slots__ = ("edges", "into", "pairs")
+    __slots__ = ("_at", "_order", "edges", "into", "pairs")
 
     def __init__(self) -> None:
         self.edges: list[Edge] = []
         self.into: dict[TargetEnd, Edge] = {}
         self.pairs: set[tuple[SourceEnd, TargetEnd]] = set()
+        self._order: Sequence[Edge] | None = None  # from the first edit on, which is to cost what it touches
+        self._at: dict[object, dict[Edge, None]] = {}  # by the nodes at their ends, once there is an order
 
     def refuse_second(self, source: SourceEnd, target: TargetEnd) -> None:
         """Refuse an edge that there is, and a second one into what takes one.
@@ -55,29 +58,74 @@ class Connections:
         """Add an edge behind all others."""
         self.edges.append(edge)
         self._note(edge)
+        if self._order is not None:
+            self._place(len(self.edges) - 1, edge)
 
     def insert(self, position: int, edge: Edge) -> None:
         """Add an edge at its place in the order."""
         self.edges.insert(position, edge)
         self._note(edge)
+        if self._order is not None:
+            self._place(position, edge)
 
     def remove(self, position: int) -> None:
         """Take the edge at a position out."""
-        self._forget(self.edges.pop(position))
+        edge = self.edges.pop(position)
+        self._forget(edge)
+        if self._order is not None:
+            self._displace(edge)
 
     def swap(self, old: Edge, new: Edge) -> None:
         """Put an edge in the place of another."""
-        self.edges[self.edges.index(old)] = new
+        position = self.position(old)
+        self.edges[position] = new
         self._forget(old)
         self._note(new)
+        self._displace(old)
+        self._place(position, new)
 
     def keep(self, fits: Callable[[Edge], bool]) -> None:
         """Take all others out."""
         self.edges[:] = [edge for edge in self.edges if fits(edge)]
         self.into.clear()
         self.pairs.clear()
+        self._order, self._at = None, {}
         for edge in self.edges:
             self._note(edge)
+
+    # --- finding without a search ---
+
+    @property
+    def order(self) -> Sequence[Edge]:
+        """The edges in order, so that places are found without counting."""
+        if self._order is None:
+            self._order = Sequence()
+            for position, edge in enumerate(self.edges):
+                self._place(position, edge)
+        return self._order
+
+    def position(self, edge: Edge) -> int:
+        """Give the place of an edge in the order."""
+        return self.order.position(edge)
+
+    def at(self, *nodes: object) -> list[Edge]:
+        """Give the edges that begin or end at ports of some nodes, or at inner sides of them; in order."""
+        order = self.order
+        return sorted({edge: None for node in nodes for edge in self._at.get(node, ())}, key=order.label)
+
+    def _place(self, position: int, edge: Edge) -> None:
+        self.order.insert(position, edge)
+        for end in (edge.source, edge.target):
+            self._at.setdefault(getattr(end, "node", None), {})[edge] = None
+
+    def _displace(self, edge: Edge) -> None:
+        self.order.remove(edge)
+        for end in (edge.source, edge.target):
+            node = getattr(end, "node", None)
+            there = self._at.get(node, {})
+            there.pop(edge, None)
+            if not there:
+                self._at.pop(node, None)
 
     def _note(self, edge: Edge) -> None:
         if is_single(edge.target):
@@ -94,3 +142,6 @@ class Connections:
         """Fail if the index is not that of the edges; for tests."""
         assert self.into == {edge.target: edge for edge in self.edges if is_single(edge.target)}
         assert self.pairs == {(edge.source, edge.target) for edge in self.edges if not is_single(edge.target)}
+        if self._order is not None:
+            assert self._order.items == self.edges
+            assert set().union(*self._at.values()) == set(self.edges)

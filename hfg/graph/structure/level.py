@@ -126,7 +126,7 @@ class Level:
         """Give this level and all inside it, the outer ones first."""
         found = [self]
         for level in found:  # grows while it is walked through, which is the point: no recursion at any depth
-            found += [one for node in level.nodes.values() if (one := inside(node)) is not None]
+            found += [one for node in level.members.boxes if (one := inside(node)) is not None]
         return found
 
     # --- by whom it is changed ---
@@ -150,6 +150,7 @@ class Level:
     def check_invariants(self) -> None:
         """Fail if the tables contradict each other; for tests."""
         self.connections.check_invariants()
+        self.members.check_invariants()
         for name, node in self.nodes.items():
             assert node._place is not None
             assert (node._place.graph, node._place.path) == (self.face, self.path_to(name))

@@ -1,0 +1,606 @@
+"""Applies the diff of a plan, between firings of the nodes that are touched (rule R4).
+
+Afterwards the plan is what it would be if it were made afresh, and the index of the plan is true again; what lay on
+edges that are gone is given back or counted. Costs what the diff holds. Nothing here waits. Stands on `plan_diff`.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from hfg.engine.editing.plan_diff import PlanDiff
+from hfg.engine.editing.plan_index import PlanIndex, edge_place, home_of, node_place
+from hfg.engine.fusion.specialise import specialise
+from hfg.engine.model.core import Core
+from hfg.engine.model.scopes import Scope
+from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
+from hfg.engine.rules import lifecycle, wiring
+from hfg.engine.rules.activity import rest
+from hfg.engine.rules.agenda import block, note_full
+from hfg.engine.rules.ending import drain_left
+from hfg.engine.rules.modifiers import discard, touch
+from hfg.engine.rules.releasing import release
+from hfg.engine.rules.sending import flush_automatic, telling_behind
+from hfg.engine.rules.sources import judge_sources
+from hfg.engine.runtime import plan, ports
+from hfg.engine.runtime.groups import Group
+from hfg.graph import Graph
+from hfg.graph.flat import End, FlatEdge
+from hfg.graph.flat import Scope as FlatScope
+from hfg.graph.structure.edge import is_feed
+from hfg.graph.structure.level import level_of
+from hfg.ports.automatic import AUTOMATIC_EVENTS
+from hfg.ports.edges import BufferEdge, EventEdge
+from hfg.token import Token
+from hfg.trace import ActivityLost
+
+__all__ = ["apply"]
+
+
+def apply(
+    core: Core, index: PlanIndex, graph: Graph, found: PlanDiff, come: list[Worker], groups: Mapping[str, Group]
+) -> tuple[list[tuple[Any, FlatEdge]], set[Any]]:
+    """Do it.
+
+    Args:
+      core: the run.
+      index: of its plan.
+      graph: as it was drawn.
+      found: what is to be done.
+      come: the workers of the nodes that come, set up already.
+      groups: by name.
+
+    Returns:
+      the new edges, and the nodes at which something is not as it was, for whoever looks at the run.
+    """
+    applying = _Applying(core, index, graph, found, come, groups)
+    applying.leave()
+    applying.swap()
+    applying.place()
+    new = applying.connect()
+    applying.set_gates()
+    applying.go_on(new)
+    return new, applying.changed_nodes()
+
+
+class _Ends(plan.Ends):
+    """Finds workers by the nodes of ports: numbers mean nothing in a diff."""
+
+    def __init__(self, core: Core, index: PlanIndex, loop: Group) -> None:
+        assert core.boundary is not None
+        super().__init__(core, [], core.boundary, loop)
+        self._index = index
+
+    def of(self, end: End) -> Worker:
+        worker = self._index.by_node.get(getattr(end.port, "node", None))
+        return self._at_border(end) if worker is None else worker
+
+    def scopes_of(self, flat: FlatEdge) -> tuple[Scope, ...]:
+        return tuple(_scope_of(self._index, box) for box in flat.via)
+
+
+def _scope_of(index: PlanIndex, box: Any) -> Scope:
+    scope = index.by_node[box].scope
+    assert scope is not None
+    return scope
+
+
+class _Applying:
+    def __init__(
+        self,
+        core: Core,
+        index: PlanIndex,
+        graph: Graph,
+        found: PlanDiff,
+        come: list[Worker],
+        groups: Mapping[str, Group],
+    ) -> None:
+        self.core = core
+        self.index = index
+        self.graph = graph
+        self.found = found
+        self.come = come
+        self.groups = groups
+        self.touched: dict[Worker, None] = {}  # whose wiring is to be derived anew
+        self.elsewhere: dict[Worker, None] = {}  # who lies in other subgraphs than before
+        self.refitted = {worker for worker, _, _ in found.swapped}
+        self.scopes: dict[Scope, None] = {}  # in which something is not as it was
+        self.named: list[Any] = []  # edges that are called otherwise now
+        self.new_edges: list[Any] = []
+
+    # --- what goes
+
+    def leave(self) -> None:
+        """Take what is lost out of the plan; what lies on it stays there for the moment."""
+        found = self.found
+        for key, edge in list(self.core.outside.items()) if found.gone or found.boxes_gone else ():
+            if edge.target in found.gone or edge.target in found.boxes_gone:
+                del self.core.outside[key]
+                self.core.edges.remove(edge)
+                found.lost.append(edge)
+        for edge in found.lost:
+            edge.live = False
+            plan.unwire(edge)
+            self.touched |= {edge.source: None, edge.target: None}
+        for worker in found.gone:
+            worker.blocked |= TORN_DOWN | REMOVED
+            worker.pending_end = False
+            block(worker, REMOVED)
+            if worker.queued:
+                worker.group.policy.remove(worker)
+                worker.queued = False
+            worker.step = _no_step
+
+    # --- nodes
+
+    def swap(self) -> None:
+        """Let workers run the nodes that take the place of theirs; their edges are led to them by `connect`."""
+        index = self.index
+        lost = set(self.found.lost)
+        for edge in (*self.found.old, *(self.core.outside.values() if self.refitted else ())):
+            if self._is_refitted(edge) and edge not in lost:
+                plan.unwire(edge)
+        for worker, old, node in self.found.swapped:
+            index.order.swap(old, node)
+            del index.by_node[old]
+            index.by_node[node] = worker
+            self._list_source(worker, False)
+            plan.fit(worker, node)
+            self._list_source(worker, worker.is_source)
+            worker.wired_out = ((),) * len(worker.out_names)
+            worker.handlers, worker.plain_handlers = {}, {}
+            known = (*worker.type.events, *AUTOMATIC_EVENTS)
+            worker.events = {name: event for name, event in worker.events.items() if name in known}
+            self.touched[worker] = None
+
+    def _is_refitted(self, edge: Any) -> bool:
+        return edge.source in self.refitted or edge.target in self.refitted
+
+    def place(self) -> None:
+        """Let everybody be where a plan made afresh would have him."""
+        core, index, found = self.core, self.index, self.found
+        for worker in found.boxes_gone:
+            scope = worker.scope
+            assert scope is not None
+            if not scope.enabled:  # without it they stay as disabled as they were (G1)
+                for member in scope.members:
+                    member.own_enabled = False
+        for worker in (*found.gone, *found.placed):
+            self._take_out(worker)
+        for worker in (*found.boxes_gone, *found.boxes_placed):
+            self._take_out_scope(worker)
+        for worker in (*found.gone, *found.boxes_gone):
+            del index.by_node[worker.node]
+            index.order.forget(worker.node)
+        for worker in (*found.gone, *found.boxes_gone, *found.renamed):
+            if core.by_path.get(worker.path) is worker:
+                del core.by_path[worker.path]
+        for worker in (*found.renamed, *found.placed, *found.boxes_placed):
+            worker.path = worker.node._place.path
+        boxes = {worker.node: worker for worker in found.boxes_placed} | dict.fromkeys(found.boxes_come)
+        for box in sorted(boxes, key=node_place):
+            self._put_in_scope(box, boxes[box])
+        for worker in sorted((*found.placed, *self.come), key=lambda worker: node_place(worker.node)):
+            self._put_in(worker)
+        for worker in found.renamed:
+            self._rename(worker)
+        for worker, options in found.options:
+            self._regroup(worker, options)
+        for worker in self.come:
+            if not worker.own_enabled or any(not scope.enabled for scope in worker.around):
+                worker.blocked |= DISABLED
+        self.touched |= self.elsewhere
+
+    def _take_out(self, worker: Worker) -> None:
+        core, index = self.core, self.index
+        label = index.leaves.label
+        for scope in worker.around:
+            del scope.members[bisect_left(scope.members, label(worker), key=label)]
+            self.scopes[scope] = None
+        self._list_source(worker, False)
+        del core.workers[index.leaves.remove(worker)]
+
+    def _put_in(self, worker: Worker) -> None:
+        core, index = self.core, self.index
+        place = node_place(worker.node)
+        position = bisect_left(index.leaves.items, place, key=lambda one: node_place(one.node))
+        index.leaves.insert(position, worker)
+        core.workers.insert(position, worker)
+        index.by_node[worker.node] = core.by_path[worker.path] = worker
+        around = self._around(worker.node)
+        label = index.leaves.label
+        for scope in around:
+            insort(scope.members, worker, key=label)
+            self.scopes[scope] = None
+        self._list_source(worker, worker.is_source)
+        worker.around = around
+        self.elsewhere[worker] = None
+
+    def _list_source(self, worker: Worker, is_one: bool) -> None:
+        """Let a worker be in the list of sources, or not."""
+        sources, label = self.core.sources, self.index.leaves.label
+        position = bisect_left(sources, label(worker), key=label)
+        listed = position < len(sources) and sources[position] is worker
+        if listed and not is_one:
+            del sources[position]
+        elif is_one and not listed:
+            sources.insert(position, worker)
+
+    def _around(self, node: Any) -> tuple[Scope, ...]:
+        owner = level_of(node._place.graph).owner
+        return () if owner is None else _scope_of(self.index, owner).and_around()
+
+    def _take_out_scope(self, worker: Worker) -> None:
+        core, index, scope = self.core, self.index, worker.scope
+        assert scope is not None
+        if scope.parent is not None:
+            scope.parent.children.remove(scope)
+            self.scopes[scope.parent] = None
+        position = index.scopes.remove(worker)
+        del core.scopes[position], core.workers[len(index.leaves.items) + position]
+
+    def _put_in_scope(self, box: Any, worker: Worker | None) -> None:
+        core, index = self.core, self.index
+        owner = level_of(box._place.graph).owner
+        parent = None if owner is None else _scope_of(index, owner)
+        if worker is None:
+            path = box._place.path
+            said = FlatScope(0, path, box, None, self.found.boxes_come[box], [])
+            scope = Scope(0, path, parent)
+            worker = plan.add_scope(core, said, scope, self.groups["loop"])
+            index.by_node[box] = worker
+        else:
+            assert worker.scope is not None
+            scope = worker.scope
+            scope.path, scope.parent = worker.path, parent
+            if parent is not None:
+                parent.children.append(scope)
+        core.by_path[worker.path] = worker
+        position = bisect_left(index.scopes.items, node_place(box), key=lambda one: node_place(one.node))
+        numbering = index.scopes.numbering
+        index.scopes.insert(position, worker)
+        for one in (worker,) if numbering == index.scopes.numbering else index.scopes.items:
+            assert one.scope is not None
+            one.scope.index = index.scopes.label(one)
+        core.scopes.insert(position, scope)
+        core.workers.insert(len(index.leaves.items) + position, worker)
+        if parent is not None:
+            parent.children.sort(key=lambda one: one.index)
+            self.scopes[parent] = None
+        worker.around = scope.and_around()
+        self.scopes[scope] = None
+        self.elsewhere[worker] = None
+
+    def _rename(self, worker: Worker) -> None:
+        """It has another path, and so has all inside it."""
+        self.core.by_path[worker.path] = worker
+        if worker.scope is not None:
+            worker.scope.path = worker.path
+        if worker.iteration is not None:
+            _rename_inside(worker.iteration.core)
+
+    def _regroup(self, worker: Worker, options: Any) -> None:
+        """It may run elsewhere from now on."""
+        worker.options = options
+        group = self.groups[options.group or "loop"]
+        if group is worker.group:
+            return
+        if worker.queued:
+            worker.group.policy.remove(worker)
+            worker.queued = False
+        worker.group, worker.push, worker.push_next = group, group.push, group.push_next
+        self.touched[worker] = None
+        for edge in (*worker.edges_in(), *worker.all_out_edges()):
+            self.touched |= {edge.source: None, edge.target: None}
+            self._derive_release(edge)
+
+    # --- edges
+
+    def connect(self) -> list[tuple[Any, FlatEdge]]:
+        """Lead new edges where they belong, and let those that stay be what is said about them now."""
+        core, index, found = self.core, self.index, self.found
+        relabelled = self._called_otherwise()
+        numbering = index.edges.numbering
+        for edge in found.old:
+            del core.edges[index.edges.remove(edge)]
+            index.forget(edge)
+        ends = _Ends(core, index, self.groups["loop"])
+        new: list[tuple[Any, FlatEdge]] = []
+        listed = []
+        begin, position = None, 0
+        for way, running in found.ways:
+            if running is None:
+                edge = plan.make_edge(core, way, ends)
+                new.append((edge, way))
+                self.new_edges.append(edge)
+            else:
+                edge = running
+                plan.describe(edge, way)
+                edge.via = ends.scopes_of(way)
+            if way.segments[0] is not begin:
+                begin = way.segments[0]
+                position = self._spot(begin)
+            index.edges.insert(position, edge)
+            core.edges.insert(position, edge)
+            index.note(edge)
+            position += 1
+            listed.append(edge)
+        for edge in listed if numbering == index.edges.numbering else index.edges.items:
+            edge.index = index.edges.label(edge)
+        for edge, (way, running) in zip(listed, found.ways, strict=True):
+            if running is None or self._is_refitted(edge):
+                plan.wire(edge, way)
+                self.touched |= {edge.source: None, edge.target: None}
+            if running is not None:
+                self._say(edge, way)
+        for edge in self.core.outside.values() if self.refitted or found.renamed else ():
+            if edge.target in self.refitted:
+                plan.lead_in(edge)
+            if edge.target.path:
+                edge.label = f"outside -> {edge.target.path}.{edge.port_name}"
+        self._label(relabelled, listed)
+        self._sort({edge.source: None for edge in listed})
+        return new
+
+    def _spot(self, begin: Any) -> int:
+        """Before which edge of the plan those come that begin with a drawn one."""
+        place = edge_place(home_of(begin, self.graph), begin)
+        return bisect_left(
+            self.index.edges.items,
+            place,
+            key=lambda edge: edge_place(home_of(edge.segments[0], self.graph), edge.segments[0]),
+        )
+
+    def _say(self, edge: Any, way: FlatEdge) -> None:
+        """What is said about an edge that stays."""
+        if edge.active != way.active:
+            edge.active = way.active
+            self.touched[edge.source] = None
+        self._derive_release(edge)
+
+    def _derive_release(self, edge: Any) -> None:
+        """Whether it is released in sequence, which depends on the groups at its ends (F5)."""
+        if type(edge) is EventEdge:
+            return
+        before, edge.sequential = edge.sequential, plan.is_sequential(edge)
+        edge.follows = plan.follows(edge)
+        target: Worker = edge.target
+        if not before or edge.sequential:
+            return
+        # what it has taken is processed by that (F5)
+        if edge in target.taken and (target.held or target.busy in ("firing", "ending")):
+            target.taken = tuple(one for one in target.taken if one is not edge)
+            release((edge,))
+        elif edge is target.call_edge and edge.token is None:
+            release((edge,))
+
+    def _sort(self, sources: Iterable[Worker]) -> None:
+        """Let the edges of each source be in order, and the outputs that its parameters have got (P8)."""
+        for worker in sources:
+            worker.wired_out = tuple(tuple(sorted(edges, key=_index)) for edges in worker.wired_out)
+            for event in worker.events.values():
+                event.edges = tuple(sorted(event.edges, key=plan.slots_first))
+            declared = len(worker.type.outputs) if worker.type is not None else len(worker.out_names)
+            if len(worker.out_names) > declared + 1:
+                made = sorted(
+                    zip(worker.out_names[declared:], worker.wired_out[declared:], strict=True),
+                    key=lambda one: one[1][0].index,
+                )
+                worker.out_names = (*worker.out_names[:declared], *(name for name, _ in made))
+                worker.wired_out = (*worker.wired_out[:declared], *(edges for _, edges in made))
+
+    # --- labels
+
+    def _called_otherwise(self) -> dict[Any, None]:
+        """Take the labels of all edges that may be called otherwise afterwards; gives the edges."""
+        found = self.found
+        bases = {_base(edge.label): None for edge in found.old}
+        bases |= {way.label: None for way, _ in found.ways}
+        for worker in found.renamed:
+            for edge in (*worker.edges_in(), *worker.all_out_edges()):
+                if edge.segments:
+                    bases |= {_base(edge.label): None, _name(edge): None}
+        taken: dict[Any, None] = {}
+        for base in bases:
+            label, number = base, 1
+            while label in self.index.labels:
+                taken[self.index.labels.pop(label)] = None
+                number += 1
+                label = f"{base} #{number}"
+        return taken
+
+    def _label(self, taken: dict[Any, None], listed: list[Any]) -> None:
+        """Name edges by their ends; those that lead the same way by different ports of subgraphs are numbered."""
+        labels = self.index.labels
+        for edge in sorted({**taken, **dict.fromkeys(listed)}, key=_index):
+            if edge not in self.index.edges:
+                continue
+            base = label = _name(edge)
+            number = 1
+            while label in labels:
+                number += 1
+                label = f"{base} #{number}"
+            labels[label] = edge
+            if edge.label != label:
+                edge.label = label
+                self.named.append(edge)
+                self.touched |= {edge.source: None, edge.target: None}  # fast paths know the label
+
+    # --- gates
+
+    def set_gates(self) -> None:
+        """Set gates anew if any may gate others than before (A11); costs by what they gate."""
+        core, found = self.core, self.found
+        some_moved = self.elsewhere or found.gone or found.boxes_gone or found.swapped
+        if not found.gates and not (core.gates and some_moved):
+            self._watch()
+            return
+        before = {worker: None for gate in core.gates for worker in gate.workers}
+        states = {gate.state: None for gate in core.gates}
+        for worker in before:
+            worker.gates_over = ()
+            worker.paced = bool(worker.options is not None and worker.options.max_rate_hz)
+        for state in states:
+            state.gates = []
+        core.gates = []
+        for gate in _gates_of(self.graph):
+            target, by = self.index.by_node[gate.target], self.index.by_node[gate.by]
+            gated = [target] if target.scope is None else target.scope.members
+            plan.set_gate(core, by.scope or by, gated, gate.idle_rate_hz)
+        for gate in core.gates:
+            states[gate.state] = None
+            for worker in gate.workers:
+                if worker not in before:
+                    worker.gate_next = float("-inf")  # an idle rate counts from the first firing behind the gate
+                    before[worker] = None
+        self.touched |= before
+        for state in states:
+            if isinstance(state, Scope):
+                self.scopes[state] = None
+            else:
+                self.touched[state] = None
+        self._watch()
+
+    def _watch(self) -> None:
+        """Whose activity somebody cares about, now that nodes are elsewhere, and edges lead from other ports (G2)."""
+        for worker in self.elsewhere:
+            worker.scopes = tuple(scope for scope in worker.around if scope.watched and scope is not worker.scope)
+        for edge in (*self.found.lost, *(edge for edge in self.new_edges)):
+            for worker in (edge.source, edge.target):
+                self.scopes |= dict.fromkeys(worker.around)
+        gone = {worker.scope for worker in self.found.boxes_gone}
+        self.scopes = {scope: None for scope in self.scopes if scope not in gone}
+        for scope in self.scopes:
+            if scope.watched:
+                scope.find_inner_edges()
+            else:
+                plan.mark_scope(scope)
+
+    # --- going on
+
+    def go_on(self, new: list[tuple[Any, FlatEdge]]) -> None:
+        """Derive what follows, then let go what lay on edges that are gone."""
+        core, found = self.core, self.found
+        for worker in self.come:
+            worker.blocked &= ~STARTING
+            ports.bind_automatic(worker)
+        for edge, _ in new:
+            edge.live = wiring.is_live(edge)
+            if isinstance(edge, BufferEdge | EventEdge) and edge.initial:
+                _lay(edge)
+                if edge.target.blocked & ENDED:
+                    drain_left((edge,))
+        self._derive_live()
+        touched = [worker for worker in self.touched if not worker.blocked & REMOVED]
+        for worker in touched:
+            self._bind(worker)
+            plan.watch(worker)
+            if worker.active_timer is not None:
+                worker.active_timer.recount(worker.timeout_leads_somewhere())
+        for worker in touched:
+            wiring.rewire(worker)
+            if worker.is_source and (worker.gates_over or worker.blocked & (RESTING | RATE)):
+                rest(worker)
+        with telling_behind(core):
+            for edge in found.lost:
+                discard(edge, "removed")
+                if not isinstance(edge, EventEdge):
+                    release((edge,))
+            for worker in found.gone:
+                if worker.active and worker.scope is None:
+                    core.lost_activity += 1
+                    if core.trace is not None:
+                        core.trace(ActivityLost(core.now(), worker.path))
+            touch(core, [scope for scope in self.scopes if scope.watched])
+        for worker in touched:
+            if not worker.busy:
+                flush_automatic(worker)
+        lifecycle.disable_around(worker for worker in touched if any(not scope.enabled for scope in worker.around))
+        judge_sources(core)
+
+    def _derive_live(self) -> None:
+        """Edges are live or not by the subgraphs around their ends and on their way."""
+        edges = [edge for edge in self.found.old if edge in self.index.edges]
+        for worker in self.elsewhere:
+            edges += [*worker.edges_in(), *worker.all_out_edges()]
+        for edge in edges:
+            live = wiring.is_live(edge)
+            if live != edge.live:
+                edge.live = live
+                self.touched |= {edge.source: None, edge.target: None}
+
+    def changed_nodes(self) -> set[Any]:
+        """The nodes and subgraphs at which something is not as it was."""
+        found = self.found
+        workers = [*self.touched, *found.gone, *found.boxes_gone, *found.renamed]
+        nodes = {worker.node for worker in workers} | {one for _, *both in found.swapped for one in both}
+        for edge in (*self.named, *found.old, *self.new_edges):
+            for segment in edge.segments:
+                nodes |= {getattr(segment.source, "node", None), segment.target.node}
+        return nodes
+
+    def _bind(self, worker: Worker) -> None:
+        """Let the events of a worker know where they lead now; one that leads nowhere and is automatic is none."""
+        for name, event in list(worker.events.items()):
+            watched = event.port is not None and event.port._observers
+            if not event.edges and name in AUTOMATIC_EVENTS and not watched and worker.node is not None:
+                del worker.events[name]
+            elif worker.node is not None:
+                ports.bind_event(worker, name)
+        if worker.node is not None and worker.scope is None:
+            self.core.upstairs.bind_ports(worker)
+        specialise(worker)
+
+
+def _lay(edge: Any) -> None:
+    """Initial tokens of an edge that begins now (P7)."""
+    now = edge.target.core.now()
+    edge.queue.extend(Token(value, 0, now, 0) for value in edge.initial)
+    if isinstance(edge, EventEdge):
+        note_full(edge)
+
+
+def _rename_inside(core: Core) -> None:
+    """A subgraph that iterates has another path, and so has all inside it."""
+    for worker in core.workers:
+        if worker.node is not None:
+            worker.path = worker.node._place.path
+        if worker.iteration is not None:
+            _rename_inside(worker.iteration.core)
+    for edge in core.edges:
+        if edge.segments:
+            edge.label = edge.label.replace(_base(edge.label), _name(edge))
+    core.by_path = {worker.path: worker for worker in core.workers if worker.path}
+
+
+def _index(edge: Any) -> float:
+    return float(edge.index)
+
+
+def _base(label: str) -> str:
+    """A label without its number among those that are the same."""
+    base, number_sign, number = label.rpartition(" #")
+    return base if number_sign and number.isdigit() else label
+
+
+def _name(edge: Any) -> str:
+    """What an edge is called by its ends."""
+    return f"{_path(edge.source_port)} -> {_path(edge.target_port)}"
+
+
+def _path(port: Any) -> str:
+    return "observable" if is_feed(port) else str(getattr(port, "outer", port).path)
+
+
+def _gates_of(graph: Graph) -> list[Any]:
+    """All gates of a whole graph, in the order of the plan."""
+    levels = [level for level in level_of(graph).walk() if level.gates.listed]
+    levels.sort(key=lambda level: () if level.owner is None else node_place(level.owner))
+    return [gate for level in levels for gate in level.gates]
+
+
+def _no_step(worker: Worker) -> None:
+    """It is gone."""
+    worker.queued = False

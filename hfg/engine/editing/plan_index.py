@@ -1,0 +1,231 @@
+"""Finds the parts of a plan that an edit touches without a look at the rest (rule R4).
+
+Made when a run is edited for the first time, which is the one moment that costs by the size of the graph; every edit
+then keeps it true. Stands on `graph.structure.sequence` and the model.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from hfg.engine.model.core import Core
+from hfg.engine.model.worker import Worker
+from hfg.graph import Graph
+from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.sequence import Sequence
+from hfg.ports.edges import EventEdge
+
+__all__ = ["PlanIndex", "TopologicalOrder", "edge_place", "home_of", "node_place"]
+
+_JOINED = ("input", "parameter")
+
+
+class PlanIndex:
+    """Where everything is in the plan of one run.
+
+    Attributes:
+      by_node: the worker of each node, and of each subgraph that is dissolved.
+      leaves: the workers of nodes in the order of the plan; the first part of `core.workers`.
+      scopes: the workers of subgraphs in that order; the part behind it.
+      edges: those between nodes; the first part of `core.edges`.
+      passing: the running edges that each drawn edge is part of.
+      labels: each edge by its label.
+      order: of nodes, along the synchronous edges.
+    """
+
+    def __init__(self, core: Core) -> None:
+        self.by_node: dict[Any, Worker] = {worker.node: worker for worker in core.workers if worker.node is not None}
+        self.leaves = Sequence(worker for worker in core.workers if worker.node is not None and worker.scope is None)
+        self.scopes = Sequence(scope.worker for scope in core.scopes if scope.worker is not None)
+        self.edges: Sequence[Any] = Sequence(edge for edge in core.edges if edge.segments)
+        self.passing: dict[Any, list[Any]] = {}
+        self.labels: dict[str, Any] = {}
+        for edge in self.edges.items:
+            self.note(edge)
+            self.labels[edge.label] = edge
+            edge.index = self.edges.label(edge)
+        self.order = TopologicalOrder(self)
+
+    def note(self, edge: Any) -> None:
+        """An edge consists of its segments."""
+        for segment in edge.segments:
+            self.passing.setdefault(segment, []).append(edge)
+
+    def forget(self, edge: Any) -> None:
+        """It does not any more."""
+        for segment in edge.segments:
+            passing = self.passing[segment]
+            passing.remove(edge)
+            if not passing:
+                del self.passing[segment]
+
+    def block(self, begin: Any) -> list[Any]:
+        """Give the running edges that begin with a drawn one, in order."""
+        return [edge for edge in self.passing.get(begin, ()) if edge.segments[0] is begin]
+
+
+def node_place(node: Any) -> tuple[float, ...]:
+    """Give what tells where a node or subgraph comes in depth-first order of adding."""
+    place: list[float] = []
+    while node is not None:
+        level = level_of(node._place.graph)
+        place.append(level.members.order.label(node))
+        node = level.owner
+    return tuple(reversed(place))
+
+
+def edge_place(level: Level, edge: Any) -> tuple[tuple[float, ...], float]:
+    """Give what tells where the edges that begin with a declared one come in the order of the plan."""
+    around = () if level.owner is None else node_place(level.owner)
+    return around, level.connections.order.label(edge)
+
+
+def home_of(edge: Any, graph: Graph) -> Level:
+    """Give the level at which an edge is declared; ports of the whole may be named anywhere."""
+    for end in (edge.target, edge.source):
+        around = getattr(end, "graph", None)
+        if isinstance(around, Graph) and edge in level_of(around).connections.order:
+            return level_of(around)
+    return level_of(graph)
+
+
+class TopologicalOrder:
+    """Keeps nodes in an order along the synchronous edges without a delay, so that a ring shows where it closes (P7).
+
+    A new edge against the order moves only those between its ends that must be moved: who is behind its target or
+    before its source, whichever are fewer (the two-way search of Alpern and others, 1990).
+    """
+
+    def __init__(self, index: PlanIndex) -> None:
+        self._index = index
+        self._nodes: Sequence[Any] | None = None  # until somebody asks
+        self._come: dict[Any, list[Any]] = {}  # of the edit under way: who waits for a node, and for whom one waits
+        self._waits: dict[Any, list[Any]] = {}
+        self._lost: set[Any] = set()
+
+    def closes_a_ring(self, new: Iterable[tuple[Any, Any]], lost: Iterable[Any]) -> bool:
+        """Take in new edges, as pairs of nodes, while others go; says whether they make a ring."""
+        pairs = list(new)
+        if not pairs:
+            return False
+        nodes = self._all()
+        self._come, self._waits, self._lost = {}, {}, set(lost)
+        try:
+            for source, target in pairs:
+                for node in (source, target):
+                    if node not in nodes:
+                        nodes.insert(len(nodes.items), node)
+                if not self._take_in(nodes, source, target):
+                    self._nodes = None
+                    return True
+                self._come.setdefault(source, []).append(target)
+                self._waits.setdefault(target, []).append(source)
+        finally:
+            self._come, self._waits, self._lost = {}, {}, set()
+        return False
+
+    def forget(self, node: Any) -> None:
+        """A node is gone."""
+        if self._nodes is not None and node in self._nodes:
+            self._nodes.remove(node)
+
+    def swap(self, old: Any, new: Any) -> None:
+        """A node has taken the place of another."""
+        if self._nodes is not None and old in self._nodes:
+            self.forget(new)
+            self._nodes.replace(old, new)
+
+    def _take_in(self, nodes: Sequence[Any], source: Any, target: Any) -> bool:
+        """Let a node come before another; whether that can be."""
+        if source is target:
+            return False
+        last, first = nodes.label(source), nodes.label(target)
+        if last < first:
+            return True
+        behind = _Search(target, self._behind, lambda node: nodes.label(node) <= last)
+        before = _Search(source, self._before, lambda node: nodes.label(node) >= first)
+        while behind.goes_on() and before.goes_on():
+            if behind.step(source) or before.step(target):
+                return False
+        if not behind.waiting:
+            self._move(nodes, behind.found, source, 1)
+        else:
+            self._move(nodes, before.found, target, 0)
+        return True
+
+    def _move(self, nodes: Sequence[Any], moved: set[Any], beside: Any, offset: int) -> None:
+        """Put nodes directly behind or in front of another, in the order they have."""
+        in_order = sorted(moved, key=nodes.label)
+        for node in in_order:
+            nodes.remove(node)
+        position = nodes.position(beside) + offset
+        for number, node in enumerate(in_order):
+            nodes.insert(position + number, node)
+
+    def _behind(self, node: Any) -> list[Any]:
+        worker = self._index.by_node.get(node)
+        found = [] if worker is None else [edge for edges in worker.wired_out for edge in edges]
+        return [edge.target.node for edge in self._joining(found)] + self._come.get(node, [])
+
+    def _before(self, node: Any) -> list[Any]:
+        worker = self._index.by_node.get(node)
+        return [edge.source.node for edge in self._joining(worker.in_edges if worker else ())] + self._waits.get(
+            node, []
+        )
+
+    def _joining(self, edges: Iterable[Any]) -> list[Any]:
+        return [
+            edge
+            for edge in edges
+            if type(edge) is not EventEdge
+            and not getattr(edge, "initial", ())
+            and edge.target_kind in _JOINED
+            and edge not in self._lost
+            and edge.source.node is not None
+            and edge.target.node is not None
+        ]
+
+    def _all(self) -> Sequence[Any]:
+        if self._nodes is None:
+            self._nodes = Sequence(self._sorted())
+        return self._nodes
+
+    def _sorted(self) -> list[Any]:
+        """All nodes, each behind those whose outputs it takes."""
+        left = {worker.node: len(self._before(worker.node)) for worker in self._index.leaves.items}
+        ready = deque(node for node, count in left.items() if not count)
+        found: list[Any] = []
+        while ready:
+            node = ready.popleft()
+            found.append(node)
+            for onward in self._behind(node):
+                left[onward] -= 1
+                if not left[onward]:
+                    ready.append(onward)
+        return found
+
+
+class _Search:
+    """Goes from node to node as far as it may."""
+
+    def __init__(self, begin: Any, onward: Callable[[Any], list[Any]], may: Callable[[Any], bool]) -> None:
+        self.found = {begin}
+        self.waiting = [begin]
+        self._onward = onward
+        self._may = may
+
+    def goes_on(self) -> bool:
+        """Whether there is more to look at."""
+        return bool(self.waiting)
+
+    def step(self, wanted: Any) -> bool:
+        """Look behind one node; whether what is wanted is there."""
+        for node in self._onward(self.waiting.pop()):
+            if node is wanted:
+                return True
+            if node not in self.found and self._may(node):
+                self.found.add(node)
+                self.waiting.append(node)
+        return False
