@@ -204,6 +204,11 @@ def _slot_spec(cls: type, slot: Slot[Any], where: str, is_subgraph: bool) -> Slo
             raise DeclarationError(
                 f'{where}: slot "{name}" has no handler; write `@hfg.slot` above `def {name}(self, value: int)`'
             )
+        if slot.while_active:
+            raise DeclarationError(
+                f'{where}: slot "{name}" of a subgraph only passes on, so while_active means nothing; say it at the '
+                "slots inside that it leads to"
+            )
         return SlotSpec(name, object if slot.type is UNSET else slot.type)
     arguments = list(inspect.signature(slot.handler).parameters.values())[1:]
     needed = [a for a in arguments if a.default is a.empty and a.kind not in (a.VAR_KEYWORD, a.VAR_POSITIONAL)]
@@ -216,7 +221,7 @@ def _slot_spec(cls: type, slot: Slot[Any], where: str, is_subgraph: bool) -> Slo
     positional = [a for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
     runs = "async" in kind_of(slot.handler)
     if not positional:
-        return SlotSpec(name, object if slot.type is UNSET else slot.type, name, False, False, runs)
+        return SlotSpec(name, object if slot.type is UNSET else slot.type, name, False, False, runs, slot.while_active)
     hint = hints_of(slot.handler, f'{where}, slot "{name}"').get(positional[0].name, MISSING)
     if hint is MISSING and slot.type is UNSET:
         raise DeclarationError(
@@ -224,7 +229,7 @@ def _slot_spec(cls: type, slot: Slot[Any], where: str, is_subgraph: bool) -> Slo
             f"write `{positional[0].name}: int` or `@hfg.slot(type=int)`"
         )
     type_, token = split_token(hint) if hint is not MISSING else (slot.type, False)
-    return SlotSpec(name, type_ if slot.type is UNSET else slot.type, name, True, token, runs)
+    return SlotSpec(name, type_ if slot.type is UNSET else slot.type, name, True, token, runs, slot.while_active)
 
 
 def _read_process(cls: type, process: Any, inputs: dict[str, InputSpec], where: str) -> Signature:

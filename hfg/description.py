@@ -65,6 +65,7 @@ class SlotSpec(msgspec.Struct, frozen=True):
       handler_name: the method, or "" if there is none: a trigger parameter's, which triggers the event of its name, and
         a subgraph's.
       takes_value: the handler has an argument for the value, or for the token if `token`.
+      while_active: it listens only while its node is active, or about to be (rule T4).
     """
 
     name: str
@@ -73,6 +74,7 @@ class SlotSpec(msgspec.Struct, frozen=True):
     takes_value: bool = False
     token: bool = False
     is_async: bool = False
+    while_active: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

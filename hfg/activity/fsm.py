@@ -157,7 +157,7 @@ class StateMachine:
 
         Args:
           graph: where to.
-          letters: an output or event that says the next letter; every state that has a slot `read` hears it. Without
+          letters: an output or event that says the next letter; the active state hears it, by its slot `read`. Without
             it, states leave by their own events alone.
           begin: whose signal makes the initial state active; by default the graph's `start`.
           nodes: nodes of your own for some of the states, in the graph already or not. The letters they answer are

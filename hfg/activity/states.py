@@ -31,7 +31,7 @@ class StateNode(Node):
 
     Attributes:
       enter: activity comes in here.
-      read: takes every letter; only an active state answers.
+      read: takes the letters that come while it is active.
       missing: answers letters that the state has no event for.
       final: whether a word that ends here is accepted; for whoever reads the machine out of the graph.
     """
@@ -43,14 +43,12 @@ class StateNode(Node):
     def enter(self) -> None:
         """Become active: the edge does that."""
 
-    @slot
+    @slot(while_active=True)
     def read(self, letter: str) -> None:
         """Answer a letter."""
-        if not self.active:
-            return
         name = event_name(letter)
         if name in self._type.events:
-            self.ports.events[name].trigger()
+            self._port("event", name).trigger()
         else:
             self.missing.trigger(letter)
 
@@ -64,6 +62,7 @@ def one_by_one(letter: str) -> str:
     return letter
 
 
+@functools.lru_cache(maxsize=1024)
 def event_name(letter: str) -> str:
     """Give the name of the event that answers a letter: itself, unless no event can be called that."""
     can_be = letter.isidentifier() and not letter.startswith(("_", _MANGLED))

@@ -119,7 +119,10 @@ def _described(kind: NodeType) -> dict[str, Any]:
         ],
         "outputs": [{"name": one.name, "type": describe(one.type)} for one in kind.outputs.values()],
         "events": [{"name": one.name, "type": describe(one.type)} for one in kind.events.values()],
-        "slots": [{"name": one.name, "type": describe(one.type)} for one in kind.slots.values()],
+        "slots": [
+            {"name": one.name, "type": describe(one.type), "while_active": one.while_active}
+            for one in kind.slots.values()
+        ],
         "parameters": [
             {
                 "name": one.name,

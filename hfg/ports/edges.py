@@ -31,8 +31,9 @@ class Edge:
       sent, dropped, drained: counts for the report; `sent` is also the number of the newest token.
       live: whether both ends are enabled (SEMANTICS, "live edge").
       follows: what it enables goes before all else of the group (R2): sequential, within one group, first in first out.
+      while_active: the slot it leads into listens only while its node is active (T4).
       ended: the consumer has taken END from it and waits for it no more (F4).
-      handler: of the slot an event edge leads into, taking the value, where that is all there is to a call; None:
+      handler: of the slot it leads into, taking the value, where that is all there is to a call; None:
         the general way.
       waits: at whose output barrier an unprocessed token of it counts: the source, or the head of the region of the
         source; of no meaning for event edges.
@@ -65,6 +66,7 @@ class Edge:
         "target_port",
         "via",
         "waits",
+        "while_active",
     )
 
     def __init__(self, index: float, label: str, active: bool) -> None:
@@ -75,6 +77,7 @@ class Edge:
         self.waits: Any = None
         self.target: Any = None
         self.target_kind = "input"
+        self.while_active = False
         self.port_name = ""
         self.position = 0
         self.mandatory = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Generic, Self, TypeVar, overload
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, overload
 
 from typing_extensions import TypeForm
 
@@ -68,9 +68,15 @@ class Slot(Generic[T]):
 
     kind: ClassVar[Kind] = "slot"
 
-    def __init__(self, handler: Callable[..., Any] | None = None, type: Any = UNSET) -> None:  # noqa: A002
+    def __init__(
+        self,
+        handler: Callable[..., Any] | None = None,
+        type: Any = UNSET,  # noqa: A002
+        while_active: bool = False,
+    ) -> None:
         self.handler = handler
         self.type = type
+        self.while_active = while_active
         self.name = ""
         self.__doc__ = getattr(handler, "__doc__", None)
 
@@ -79,7 +85,7 @@ class Slot(Generic[T]):
 
     def __call__(self, handler: Callable[..., Any]) -> Slot[T]:
         """Decorate the handler, for `@hfg.slot(type=...)`."""
-        return Slot(handler, self.type)
+        return Slot(handler, self.type, self.while_active)
 
     @overload
     def __get__(self, node: None, owner: Any) -> Self: ...
@@ -98,6 +104,17 @@ class Slot(Generic[T]):
         return f"<Slot {self.name}>"
 
 
+class _WhileActive(Protocol):
+    """What `@hfg.slot(while_active=True)` does to a method."""
+
+    @overload
+    def __call__(self, handler: Callable[[Self_], Any], /) -> Slot[object]: ...
+    @overload
+    def __call__(self, handler: Callable[[Self_, Token[T]], Any], /) -> Slot[T]: ...
+    @overload
+    def __call__(self, handler: Callable[[Self_, T], Any], /) -> Slot[T]: ...
+
+
 @overload
 def slot(handler: Callable[[Self_], Any], /) -> Slot[object]: ...
 @overload
@@ -105,13 +122,27 @@ def slot(handler: Callable[[Self_, Token[T]], Any], /) -> Slot[T]: ...
 @overload
 def slot(handler: Callable[[Self_, T], Any], /) -> Slot[T]: ...
 @overload
-def slot(*, type: TypeForm[T]) -> Slot[T]: ...
-def slot(handler: Callable[..., Any] | None = None, /, *, type: Any = UNSET) -> Any:  # noqa: A002
+def slot(*, type: TypeForm[T], while_active: bool = False) -> Slot[T]: ...
+@overload
+def slot(*, while_active: bool) -> _WhileActive: ...
+def slot(
+    handler: Callable[..., Any] | None = None,
+    /,
+    *,
+    type: Any = UNSET,  # noqa: A002
+    while_active: bool = False,
+) -> Any:
     """Make a method the handler of a slot of the same name.
 
     The annotation of its argument is the slot's type; annotated `hfg.Token[int]` it gets the token; without an argument
     it takes any signal. `@hfg.slot(type=...)` says the type itself.
+
+    Args:
+      handler: the method.
+      type: of the values.
+      while_active: it listens only while its node is active, or about to be: what comes else is processed at once,
+        and the handler is not called (rule T4). So a signal to many nodes costs what those cost that are active.
     """
     if handler is not None and not callable(handler):
         raise DeclarationError(f"hfg.slot is for a method, got {handler!r:.80}; write @hfg.slot or hfg.slot(type=int)")
-    return Slot(handler, type)
+    return Slot(handler, type, while_active)

@@ -16,9 +16,11 @@ from hfg.engine.model.worker import CALLS_BLOCKED, RunningEvent, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, note_full
 from hfg.engine.rules.calls import await_call
+from hfg.engine.rules.listening import may_listen
 from hfg.engine.rules.modifiers import derive_scopes, touch
+from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import trigger
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import Token
 
 __all__ = ["calls_step", "emitter"]
@@ -43,10 +45,14 @@ def calls_step(worker: Worker) -> Step:
     return step
 
 
-def _call_step(worker: Worker, edge: EventEdge) -> Step:
+def _call_step(worker: Worker, edge: Any) -> Step:
     """One edge into one slot, whose handler takes the value."""
     handler: Any = edge.handler
-    if handler is None or type(edge) is not EventEdge:
+    if handler is None:
+        return firing.step
+    if type(edge) is SyncEdge:
+        return _call_of_output_step(worker, edge, handler)
+    if type(edge) is not EventEdge or edge.while_active:
         return firing.step
     core = worker.core
     node = worker.node
@@ -90,7 +96,52 @@ def _call_step(worker: Worker, edge: EventEdge) -> Step:
     return step
 
 
-def _call_taken(worker: Worker, edge: EventEdge) -> None:
+def _call_of_output_step(worker: Worker, edge: SyncEdge, handler: Any) -> Step:
+    """The same for an edge from an output: its token is processed when the call is over (F6)."""
+    core = worker.core
+    node = worker.node
+    general = firing.step
+    calls: Any = worker.calls
+    gives = any(one.active for one in worker.event_edges())
+    while_active = edge.while_active
+    only = (edge,)
+
+    def step(worker: Worker) -> None:
+        if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
+            general(worker)
+            return
+        calls.popleft()
+        token: Any = edge.token
+        edge.token = None
+        worker.call_number += 1
+        if token.activity:
+            worker.active = node._active = token.activity > 0
+        if worker.active or not while_active:
+            core.speaker = worker
+            worker.stamp = token.stamp
+            try:
+                result = handler(token.value)
+            except Exception as error:
+                _call_taken(worker, edge)
+                errors.fail_call(worker, edge.port_name, error)
+                return
+            if result is not None and type(result) is CoroutineType:
+                _call_taken(worker, edge)
+                await_call(worker, edge.port_name, result)
+                return
+            worker.stamp = None
+        release(only)
+        if gives:
+            worker.right = False
+        if calls and not worker.blocked & CALLS_BLOCKED:
+            worker.push(worker)
+        else:
+            worker.queued = False
+
+    return step
+
+
+def _call_taken(worker: Worker, edge: EventEdge | SyncEdge) -> None:
     """A short call goes on as one like any other."""
     worker.queued = False
     worker.busy = "call"
@@ -119,7 +170,13 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
     edge = edges[0]
     target: Worker = edge.target
     node = worker.node
-    if edge.target_kind != "slot" or edge.overflow != "wait" or edge.pipeline is not None or worker.watched:
+    if (
+        edge.while_active
+        or edge.target_kind != "slot"
+        or edge.overflow != "wait"
+        or edge.pipeline is not None
+        or worker.watched
+    ):
         return emit_general
     port = event.port
     watched = port._observers is not None
@@ -148,6 +205,8 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
         if not carries:
             queue.append(Token(value, 0, stamp, number))
         elif worker.active or worker.right:
+            if target.listened is not None:
+                may_listen(target)
             queue.append(Token(value, 1, stamp, number))
             if worker.active:
                 worker.active = node._active = False

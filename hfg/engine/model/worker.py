@@ -146,6 +146,8 @@ class Worker:
         "iteration",
         "job",
         "limit_timer",
+        "listened",
+        "listeners",
         "live_inputs",
         "mandatory_ports",
         "meter",
@@ -233,6 +235,8 @@ class Worker:
         self.events: dict[str, RunningEvent] = {}
         self.mandatory_ports: tuple[str, ...] = ()
         self.wired_out: tuple[tuple[Any, ...], ...] = ()  # the same, live or not
+        self.listeners: tuple[Any, ...] = ()  # per output: its slots that listen only while they are active; or ()
+        self.listened: list[Any] | None = None  # what tells those who send to such slots of its own that it may listen
         self.unset: tuple[Any, ...] = ()  # per declared input what an absent one gives (P6)
         self.wants_token: tuple[bool, ...] = ()
         self.handlers: dict[str, Any] = NOTHING  # slot -> callable(token)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.rules.listening import find_listeners
 from hfg.engine.runtime import ports, relays
 from hfg.engine.runtime.places import Ends, behind, edges_at, is_near, place_of
 from hfg.errors import GraphError, UsageError
@@ -208,6 +209,7 @@ class Taps:
         elif not isinstance(place, tuple):
             place.tap = looks[0] if len(looks) == 1 else partial(_all_of, looks) if looks else None
             source: Worker = place.source
+            find_listeners(source)
             if source.core.started and not self._engine.core.over:
                 specialise(source)
             for event in source.events.values():

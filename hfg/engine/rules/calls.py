@@ -55,6 +55,9 @@ def call(worker: Worker) -> None:
         set_parameter(worker, name, token.value)
         finish_call(worker, "done")
         return
+    if edge.while_active and not worker.active:  # T4: it was about to be active, or it was when the token came
+        finish_call(worker, "done")
+        return
     handler = worker.handlers.get(name)
     if handler is None:
         builtin_slots.run(worker, name, token, lambda: finish_call(worker, "done"))

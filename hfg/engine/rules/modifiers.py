@@ -13,6 +13,7 @@ from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import REMOVED, Worker
 from hfg.engine.rules.agenda import freed, remove_call, unplace
+from hfg.engine.rules.listening import may_listen
 from hfg.ports.edges import Edge, EventEdge
 from hfg.token import Token
 from hfg.trace import ActivityChanged, ActivityLost, ErrorRaised, TokenDropped
@@ -45,6 +46,8 @@ def set_active(worker: Worker, active: bool, cause: Any) -> None:
         return
     worker.active = active
     worker.disturb()
+    if active and worker.listened is not None:
+        may_listen(worker)
     core = worker.core
     node = worker.node
     # under the virtual clock code in a thread sees what was when it began, or chance would say what it sees (R6)

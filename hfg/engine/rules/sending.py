@@ -13,6 +13,7 @@ from hfg.activity.rules import asked_for, leaving
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import AMID_NOTHING, ENDED, RunningEvent, Worker
 from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full, remove_call, unplace
+from hfg.engine.rules.listening import listens, may_listen
 from hfg.engine.rules.modifiers import count_dropped, derive_scopes, drop, give_back, receive, set_active, touch
 from hfg.errors import EngineInternalError, QueueOverflow
 from hfg.ports.edges import Edge, EventEdge, SyncEdge
@@ -56,6 +57,9 @@ def _put_outputs(worker: Worker, written: Written) -> None:
         else:
             value, explicit, given = entry
             own_stamp = stamp if given is None else given
+        listeners = worker.listeners[position] if worker.listeners else None
+        if listeners is not None:
+            edges = listeners.who_hear()
         for edge in edges:
             modifier = leaving(may_carry, edge.active, explicit, value is NO_MESSAGE)
             carried = carried or modifier == 1
@@ -96,9 +100,11 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
     if edge.tap is not None:
         edge.tap(token)
     if edge.target_kind == "slot":
-        if type(value) is Marker:  # T4: processed at once, the handler is not called
-            _drain(edge, token)
+        if type(value) is Marker or (edge.while_active and modifier <= 0 and not listens(target)):
+            _drain(edge, token)  # T4: processed at once, the handler is not called
             return
+        if modifier > 0 and target.listened is not None:
+            may_listen(target)
         edge.token = token
         edge.held = True
         edge.waits.outputs.missing += 1
@@ -303,6 +309,11 @@ def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
     if into_input and target.blocked & ENDED:
         _drain(edge, token)
         return
+    if edge.while_active and modifier <= 0 and not listens(target):  # T4
+        _drain(edge, token)
+        return
+    if modifier > 0 and target.listened is not None:
+        may_listen(target)
     if edge.overflows():
         if edge.overflow == "drop_newest":
             drop(edge, token, "overflow")

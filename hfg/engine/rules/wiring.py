@@ -11,6 +11,7 @@ from typing import Any
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import DISABLED, UNWIRED, Worker
 from hfg.engine.rules.agenda import block, consider, note_full, unplace
+from hfg.engine.rules.listening import find_listeners
 from hfg.ports.edges import EventEdge
 
 __all__ = ["is_live", "refresh", "refresh_via", "rewire"]
@@ -58,6 +59,7 @@ def refresh_via(scope: Scope) -> None:
 def rewire(worker: Worker) -> None:
     """Derive what a worker waits for and sends on from the liveness of its edges; its step is chosen anew."""
     worker.out_edges = tuple(tuple(edge for edge in edges if edge.live) for edges in worker.wired_out)
+    find_listeners(worker)
     live = []
     for edge in worker.in_edges:
         if edge.ended and not edge.untaken:

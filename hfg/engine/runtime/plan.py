@@ -323,13 +323,14 @@ def _into(edge: Edge, target: Worker, flat: FlatEdge) -> None:
     if kind == "slot":
         edge.target_kind = "slot"
         _handler(target, flat.target.name)
+        edge.while_active = _listens_while_active(target, flat.target.name)
     elif kind == "parameter":
         edge.target_kind = "parameter"
     if kind == "slot":
         target.slot_edges += (edge,)
         if target.calls is None:
             target.calls = deque()
-        if type(edge) is EventEdge:
+        if type(edge) is not DelayEdge:
             edge.handler = target.plain_handlers.get(flat.target.name)
         return
     if kind == "input" and target.type is not None:
@@ -340,6 +341,11 @@ def _into(edge: Edge, target: Worker, flat: FlatEdge) -> None:
     else:
         edge.position = len(target.type.inputs) + list(target.type.parameters).index(flat.target.name)
     target.in_edges = tuple(sorted((*target.in_edges, edge), key=lambda one: one.position))
+
+
+def _listens_while_active(target: Worker, name: str) -> bool:
+    spec = target.type.slots.get(name) if target.type is not None and target.scope is None else None
+    return spec is not None and spec.while_active
 
 
 def _handler(target: Worker, name: str) -> None:
@@ -362,6 +368,7 @@ def lead_in(edge: Any) -> None:
     if worker.calls is None:
         worker.calls = deque()
     _handler(worker, edge.port_name)
+    edge.while_active = _listens_while_active(worker, edge.port_name)
     edge.handler = worker.plain_handlers.get(edge.port_name)
 
 
@@ -379,6 +386,7 @@ def prepare_slot(worker: Worker, name: str) -> EventEdge:
     if worker.calls is None:
         worker.calls = deque()
     _handler(worker, name)
+    edge.while_active = _listens_while_active(worker, name)
     edge.handler = worker.plain_handlers.get(name)
     if worker.meter is not None:
         worker.meter.measure_slots()

@@ -69,6 +69,8 @@ class Calling(Firing):
         if name in station.type.parameters and name not in station.type.slots:
             return lambda: self.set_parameter(station, name, token.value)
         if name in station.type.slots:
+            if station.type.slots[name].while_active and not station.active:  # T4: not any more, or not yet
+                return lambda: None
             call = station.node._slot_call(name)
             return lambda: call(token)
         actions: dict[str, Callable[[], None]] = {

@@ -112,6 +112,10 @@ class Sending(State):
             if token.activity == 1:
                 self.returning.append((line, sender))
             return
+        if token.activity != 1 and self.is_deaf(line):  # T4
+            self.observe(TokenSent(self.now, line.edge.label, token))
+            line.queue.append(Lying(token, self.next_tick(), sender, self.now, unheard=True))
+            return
         full = line.edge.is_event and len(line.queue) >= line.capacity
         if full and policy in ("drop_oldest", "latest"):
             self.observe(TokenDropped(self.now, line.edge.label, line.queue.pop(0).token, "overflow"))
@@ -246,6 +250,12 @@ class Sending(State):
             target = line.edge.target
             if not line.queue or self.is_outside(target.owner):
                 continue
+            unheard = next((lying for lying in line.queue if lying.unheard), None)
+            if unheard is not None:
+                line.queue.remove(unheard)
+                self.observe(TokenDrained(self.now, line.edge.label, unheard.token))
+                self.receive_activity(target.owner, [unheard.token.activity])
+                return True
             marker = self.is_called(line) and line.queue[0].token.is_marker
             ended = target.owner >= 0 and self.stations[target.owner].ending and line in self.lines_joined(target.owner)
             if not marker and not ended:

@@ -28,6 +28,7 @@ class Lying:
     place: int
     sender: int
     since: float = 0.0
+    unheard: bool = False  # came to a slot that listens only while its node is active, which it was not (T4)
 
 
 @dataclass
@@ -192,6 +193,22 @@ class State:
     def lines_called(self, owner: int) -> list[Line]:
         """Edges whose tokens are worked on one by one."""
         return [line for line in self.lines if line.edge.target.owner == owner and self.is_called(line)]
+
+    def is_deaf(self, line: Line) -> bool:
+        """Whether it leads to a slot that listens only while its node is active, and that does not now (T4)."""
+        target = line.edge.target
+        if target.kind != "slot" or target.owner < 0:
+            return False
+        station = self.stations[target.owner]
+        spec = station.type.slots.get(target.name)
+        if spec is None or not spec.while_active or station.active:
+            return False
+        return not any(
+            lying.token.activity == 1
+            for other in self.lines
+            if other.edge.target.owner == target.owner and self.is_called(other)
+            for lying in other.queue
+        )
 
     def is_called(self, line: Line) -> bool:
         """Whether the edge leads into a slot, or a signal into a parameter."""
