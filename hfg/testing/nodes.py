@@ -14,6 +14,7 @@ import hfg
 
 __all__ = [
     "AsyncRelay",
+    "Attentive",
     "Counter",
     "Doubter",
     "Failing",
@@ -191,6 +192,30 @@ class Relay(hfg.Node):
 
     @hfg.slot
     def hand_on(self, token: hfg.Token[int]) -> None:
+        """Pass the token on."""
+        self.calls += 1
+        if self.calls <= 12:
+            self.said.trigger(token)
+
+
+class Attentive(hfg.Node):
+    """A relay that listens only while it is active; every answer may take the activity along."""
+
+    said = hfg.Event(int)
+    gave_up = hfg.Event()
+    calls = hfg.State(0)
+
+    @hfg.slot(while_active=True)
+    def say(self, value: int) -> None:
+        """Pass the value on, a few hundred times at most, so that rings end."""
+        self.calls += 1
+        if self.calls > 12:
+            self.gave_up.trigger()
+        else:
+            self.said.trigger(value)
+
+    @hfg.slot(while_active=True)
+    async def hand_on(self, token: hfg.Token[int]) -> None:
         """Pass the token on."""
         self.calls += 1
         if self.calls <= 12:

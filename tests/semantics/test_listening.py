@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -11,6 +13,8 @@ import pytest
 import hfg
 from hfg.activity import StateMachine
 from hfg.errors import DeclarationError
+from hfg.testing import recorder, reference_run, replay
+from hfg.testing.making import Allowed, random_plan
 from hfg.trace import ActivityChanged, TokenDrained, TokenSent
 
 HEARD: list[tuple[str, Any]] = []
@@ -187,6 +191,25 @@ def test_a_machine_does_the_same_whether_somebody_looks_or_not(states: int) -> N
     plain = asyncio.run(go())
     assert plain[0] == [machine.after(word)]
     assert asyncio.run(go(trace=lambda _: None)) == plain
+
+
+@pytest.mark.rule("T4", "A3", "A6", "P5", "F6")
+@pytest.mark.parametrize("block", range(10))
+def test_random_graphs_of_listening_nodes_do_what_the_oracle_permits(block: int) -> None:
+    for seed in range(block * 30, (block + 1) * 30):
+        plan = random_plan(seed, Allowed(max_nodes=6))
+        nodes = [
+            replace(node, type="Attentive") if node.type in ("Relay", "AsyncRelay") else node for node in plan.nodes
+        ]
+        plan = replace(plan, nodes=tuple(nodes))
+        try:
+            reference_run(plan.build(), seed=seed, max_moves=1500)
+        except RuntimeError:
+            continue  # it goes round and round
+        trace = recorder()
+        with contextlib.suppress(hfg.errors.RunError):
+            hfg.run(plan.build(), clock="virtual", policy="random", seed=seed, trace=trace)
+        replay(plan, trace)
 
 
 def test_a_subgraph_only_passes_on() -> None:
