@@ -198,9 +198,7 @@ class Core:
         self.lost_activity = 0
         self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
         self.held = False  # the run is paused: nodes move one by one
-        self.listeners: dict[
-            Any, None
-        ] = {}  # outputs to slots that listen only while active, ahead of the edges' counts
+        self.listeners: dict[Any, None] = {}  # outputs to slots, perhaps ahead of the edges' counts
         self.regions: set[Region] = set()  # fused, and perhaps ahead of the counts of their members
         self.flags: list[str] = []  # why the pump is to look round; not empty: a wave ends behind the call under way
         self.slices = 0  # of the pump, for the watchdog
