@@ -124,7 +124,7 @@ def test_a_modifier_that_came_to_deaf_ears_acts_and_activity_is_heard() -> None:
 @pytest.mark.parametrize("watched", [False, True])
 def test_of_many_nodes_behind_an_output_only_the_active_one_is_called(watched: bool) -> None:
     graph = hfg.Graph()
-    source = graph.add(numbers(count=20), name="source")
+    source = graph.add(numbers(count=400), name="source")  # so often that it would be fused
     nodes = [graph.add(Listening(), name=f"l{number}") for number in range(30)]
     for node in nodes:
         graph.connect(source.out, node.hear)
@@ -132,11 +132,11 @@ def test_of_many_nodes_behind_an_output_only_the_active_one_is_called(watched: b
     trace: list[Any] = []
     report = hfg.run(graph, **({"trace": trace.append} if watched else {}))
     assert [("l7", number) for number in range(20)] == HEARD
-    assert {edge.sent for label, edge in report.edges.items() if label.startswith("source.out")} == {21}  # with END
-    assert [report.nodes[f"l{number}"].calls for number in (6, 7)] == [0, 21]  # l7: with `enter`
+    assert {edge.sent for label, edge in report.edges.items() if label.startswith("source.out")} == {401}  # with END
+    assert [report.nodes[f"l{number}"].calls for number in (6, 7)] == [0, 401]  # l7: with `enter`
     if watched:
         sent = [event for event in trace if isinstance(event, TokenSent) and event.edge == "source.out -> l3.hear"]
-        assert [event.token.sequence for event in sent] == list(range(1, 22))
+        assert [event.token.sequence for event in sent] == list(range(1, 402))
 
 
 @pytest.mark.rule("T4", "T5")
