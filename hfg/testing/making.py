@@ -73,6 +73,7 @@ class Allowed:
     threads: bool = False
     feeds: bool = False
     failing_calls: bool = True
+    plain: bool = False  # mostly functions close to each other: the shapes of which regions are fused
 
 
 SYNCHRONOUS = Allowed(
@@ -102,10 +103,14 @@ _INNER = [
     "Sieve",
     "Tally",
 ]
+_PLAIN = ["double", "add", "add", "some", "some", "sink", "either", "with_default", "parted", "Sends", "mood", "calm"]
+_PLAIN_WHERE_CODE_WAITS = ["restless", "calling"]
+_PLAIN_WHERE_CODE_FAILS = ["picky", "picky", "gives_up"]
+_PLAIN_WHERE_ACTIVITY_MOVES = ["handing"]
 FEEDS = ("red", "blue")
 """The inputs of graphs that are fed from outside."""
 
-_WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay"}
+_WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay", "calm", "restless", "calling"}
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear"}
 _TURNED = {"Scaled": "factor", "Pulse": "most", "Script": "count"}
@@ -136,24 +141,41 @@ class _Making:
         if not allowed.events:
             inner = [name for name in inner if name != "AsyncRelay"]
         count = choose.number(2, allowed.max_nodes)
+        plain = self._plain_kinds()
         for number in range(count):
-            kind = choose.one_of(sources) if number == 0 or choose.chance(20) else choose.one_of(inner)
+            if number == 0 or choose.chance(self._seldom(20)):
+                kind = choose.one_of(sources)
+            else:
+                kind = choose.one_of(plain if allowed.plain and not choose.chance(15) else inner)
             self.nodes.append(NodePlan(f"n{number}", kind, self._parameters(kind), self._options(kind)))
+
+    def _plain_kinds(self) -> list[str]:
+        allowed = self.allowed
+        kinds = list(_PLAIN)
+        kinds += _PLAIN_WHERE_CODE_WAITS if allowed.waiting else []
+        kinds += _PLAIN_WHERE_CODE_FAILS if allowed.failures else []
+        kinds += _PLAIN_WHERE_ACTIVITY_MOVES if allowed.activity else []
+        return kinds
+
+    def _seldom(self, percent: int) -> int:
+        """What keeps a node out of a region, or splits one, is to be rare where regions are wanted."""
+        return percent // 3 if self.allowed.plain else percent
 
     def _parameters(self, kind: str) -> dict[str, Any]:
         choose = self.choose
         match kind:
             case "script" | "ascript":
-                values = [choose.one_of([1, 2, 0, 3, 4, 6, None]) for _ in range(choose.number(0, 5))]
+                most = 12 if self.allowed.plain else 5
+                values = [choose.one_of([1, 2, 0, 3, 4, 6, None]) for _ in range(choose.number(0, most))]
                 given: dict[str, Any] = {"values": tuple(values)}
                 if kind == "ascript":
                     given["pause_s"] = choose.one_of([0.0, 0.004, 0.01])
                 return given
             case "Script":
-                return {"count": choose.number(0, 5)}
+                return {"count": choose.number(0, 12 if self.allowed.plain else 5)}
             case "some":
                 return {"modulus": choose.number(2, 3)}
-            case "Failing":
+            case "Failing" | "picky" | "gives_up":
                 return {"at": choose.number(2, 3)}
             case "slow_double" | "Waiting":
                 return {"pause_s": choose.one_of([0.0, 0.003, 0.01])}
@@ -162,19 +184,19 @@ class _Making:
     def _options(self, kind: str) -> dict[str, Any]:
         choose, allowed = self.choose, self.allowed
         options: dict[str, Any] = {}
-        if choose.chance(40 if allowed.threads else 25):
+        if choose.chance(self._seldom(40 if allowed.threads else 25)):
             options["release"] = choose.one_of(["sequential", "pipelined"])
-        if allowed.rates and choose.chance(15):
+        if allowed.rates and choose.chance(self._seldom(15)):
             options["max_rate_hz"] = choose.one_of([100.0, 30.0, 70.0])
-        if kind == "Failing" or (allowed.failures and choose.chance(5)):
+        if kind in ("Failing", "picky", "gives_up") or (allowed.failures and choose.chance(5)):
             options["on_error"] = choose.one_of(
                 ["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"]
             )
-        if allowed.activity and choose.chance(10):
+        if allowed.activity and choose.chance(self._seldom(10)):
             options["active_for_s"] = choose.one_of([0.02, 0.005])
         if allowed.disabling and choose.chance(4):
             options["enabled"] = False
-        if allowed.threads and kind not in _WAITING and choose.chance(50):
+        if allowed.threads and kind not in _WAITING and choose.chance(self._seldom(50)):
             options["group"] = choose.one_of(["left", "right"])
         return options
 
@@ -226,9 +248,11 @@ class _Making:
         if allowed.feeds and choose.chance(40):
             self._edge(("", "output", choose.one_of(FEEDS)), target)
             return
-        if allowed.events and choose.chance(30):
+        if allowed.plain and choose.chance(70):
+            candidates = candidates[-4:]
+        if allowed.events and choose.chance(self._seldom(30)):
             candidates = self.events(before) or candidates
-        if allowed.cycles and self._has_other_input(target) and choose.chance(30):
+        if allowed.cycles and self._has_other_input(target) and choose.chance(self._seldom(30)):
             candidates = self.outputs(self.nodes[index:])
             if allowed.events and choose.chance(30):
                 candidates = self.events(self.nodes[index:]) or candidates
@@ -251,7 +275,7 @@ class _Making:
         choose, allowed = self.choose, self.allowed
         slots = [(node, port) for node in self.nodes for port in self.type_of(node.name).slots]
         slots = [(node, port) for node, port in slots if port != "poke" or allowed.failing_calls]
-        for _ in range(choose.number(0, 2 * len(self.nodes))):
+        for _ in range(choose.number(0, (len(self.nodes) // 2) if allowed.plain else 2 * len(self.nodes))):
             if not slots or choose.chance(12):
                 self._delicate_edge()
                 continue
@@ -301,7 +325,7 @@ class _Making:
         ):
             return
         options: dict[str, Any] = {}
-        active = (allowed.activity and choose.chance(35)) if active is None else active
+        active = (allowed.activity and choose.chance(self._seldom(35))) if active is None else active
         if active:
             options["active"] = True
         if source[1] == "event" and target[1] != "parameter":

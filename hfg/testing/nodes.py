@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import hfg
 
@@ -27,17 +27,28 @@ __all__ = [
     "Relay",
     "Scaled",
     "Script",
+    "Sends",
     "Sieve",
     "Stateful",
     "Tally",
     "Waiting",
     "add",
     "ascript",
+    "calling",
+    "calm",
     "double",
+    "either",
+    "gives_up",
+    "handing",
+    "mood",
+    "parted",
+    "picky",
+    "restless",
     "script",
     "sink",
     "slow_double",
     "some",
+    "with_default",
 ]
 
 
@@ -83,6 +94,102 @@ def some(value: int, *, modulus: int = 2) -> int | None:
 @hfg.node
 def sink(value: int) -> None:
     """Take the value."""
+
+
+@hfg.node
+def with_default(value: int, other: int = 5) -> int:
+    """Give the sum; what is absent counts five."""
+    return value + other
+
+
+@hfg.node
+def either(first: int | None = None, second: int | None = None) -> int | None:
+    """Give the first that is there; all inputs are optional."""
+    return second if first is None else first
+
+
+class Parts(NamedTuple):
+    """What `parted` gives: even and odd values by different outputs."""
+
+    even: int | None
+    odd: int | None
+
+
+@hfg.node(outputs=Parts)
+def parted(value: int) -> Parts | None:
+    """Split a stream; zero is silence on both."""
+    if value == 0:
+        return None
+    return Parts(None, value) if value % 2 else Parts(value, value if value % 4 == 0 else None)
+
+
+@hfg.node
+def mood(value: int) -> int:
+    """Give a number of one type or another."""
+    return value > 3 if value % 3 == 0 else value
+
+
+@hfg.node
+def picky(value: int, *, at: int = 3) -> int:
+    """Fail at every value that `at` divides."""
+    if value % at == 0:
+        raise ValueError(f"cannot do {value}")
+    return value
+
+
+@hfg.node
+def gives_up(value: int, *, at: int = 3) -> int:
+    """Speak as a source does, which is an error of any other node."""
+    if value % at == 0:
+        raise (StopIteration if value % 2 else hfg.EndOfStream)
+    return value
+
+
+@hfg.node
+def handing(value: int) -> Any:
+    """Give a token now and then, with a modifier or without."""
+    return value if value % 3 else hfg.Token(value, value % 2)
+
+
+@hfg.node
+async def calm(value: int) -> int:
+    """Give the value at once."""
+    return value
+
+
+@hfg.node
+async def restless(value: int) -> int:
+    """Wait now and then."""
+    if value % 3 == 0:
+        await asyncio.sleep(0.003)
+    return value
+
+
+async def _later(value: int) -> int:
+    if value % 4 == 0:
+        await asyncio.sleep(0.002)
+    return value + 1
+
+
+@hfg.node
+def calling(value: int) -> Any:
+    """Give the call of an async function now and then."""
+    return _later(value) if value % 2 == 0 else value
+
+
+class Sends(hfg.Node):
+    """Sends by itself, gives back, or keeps silent."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    rest = hfg.Output(int)
+
+    def process(self, value: int) -> None:
+        """Send on one or both ways."""
+        if value % 3 == 0:
+            self.out.send(value)
+        if value % 2 == 0:
+            self.rest.send(value)
 
 
 class Script(hfg.Node):

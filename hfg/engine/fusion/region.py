@@ -161,6 +161,8 @@ class Region:
             head.held = True
             head.taken = self.held_entries
         elif self.held_entries:
+            if len(self.order) > 1:  # then those behind it free its outputs, and by that it lets go of what it took
+                agenda.consider(head)
             release(self.held_entries)
         if self.doomed:
             self.dissolve()

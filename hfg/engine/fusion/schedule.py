@@ -45,14 +45,15 @@ class Schedule:
         return self.position.get(edge.target) if edge.follows and edge.target_kind == "input" else None
 
 
-def schedule(head: Worker) -> Schedule:
-    """Find the members of the region that begins with the head, and their order."""
+def schedule(head: Worker) -> Schedule | None:
+    """Find the members of the region that begins with the head, and their order; None if there is no such order."""
     inside = _closure(head)
-    while True:
+    while inside:
         found = _simulate(head, inside)
         if len(found.order) == len(inside):
             return found
         inside = set(found.order)  # who was fed by one that has dropped out drops out as well
+    return None
 
 
 def _sending(worker: Worker) -> list[tuple[Any, int]]:
@@ -90,10 +91,11 @@ def _simulate(head: Worker, inside: set[Worker]) -> Schedule:
     left = _edges_left(inside)
     order: list[Worker] = []
     behind: list[tuple[Worker, ...]] = []
+    reached: dict[Worker, bool] = {}  # those outside to whom something was sent: whether that was a call
     stack = [head]
     while stack:
         worker = stack.pop()
-        if worker not in inside:
+        if worker not in inside or _depends_on_values(worker, inside, reached):
             return Schedule(order, behind, (worker, *reversed(stack)))
         order.append(worker)
         behind.append(tuple(reversed(stack)))
@@ -102,15 +104,25 @@ def _simulate(head: Worker, inside: set[Worker]) -> Schedule:
             target: Worker = edge.target
             if not edge.follows:
                 continue
-            if edge.target_kind == "slot":  # each of its tokens is a call of its own
-                if target not in enabled and target not in stack:
-                    enabled.append(target)
+            if edge.target_kind == "slot":
+                enabled.append(target)
                 continue
             left[target] -= 1
             if not left[target]:
                 enabled.append(target)
         stack.extend(reversed(enabled))
     return Schedule(order, behind, ())
+
+
+def _depends_on_values(worker: Worker, inside: set[Worker], reached: dict[Worker, bool]) -> bool:
+    """Whether the place of somebody behind it does: a call by silence never comes, another token may."""
+    for edge, _ in _sending(worker):
+        if edge.follows and edge.target not in inside:
+            calls = edge.target_kind == "slot"
+            if reached.get(edge.target, False) or (calls and edge.target in reached):
+                return True
+            reached[edge.target] = calls or reached.get(edge.target, False)
+    return False
 
 
 def _edges_left(inside: Sequence[Worker] | set[Worker]) -> dict[Worker, int]:

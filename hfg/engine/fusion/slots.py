@@ -14,7 +14,7 @@ from typing import Any
 
 from hfg.engine.model.worker import CALLS_BLOCKED, RunningEvent, Worker
 from hfg.engine.rules import errors, firing
-from hfg.engine.rules.agenda import add_call, freed, note_full
+from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
 from hfg.engine.rules.calls import await_call
 from hfg.engine.rules.listening import may_listen
 from hfg.engine.rules.modifiers import derive_scopes, touch
@@ -88,7 +88,10 @@ def _call_step(worker: Worker, edge: Any) -> Step:
         worker.stamp = None
         if gives:
             worker.right = False
-        if calls and not worker.blocked & CALLS_BLOCKED:
+        if worker.follows:  # a wave has brought the next call meanwhile, and that goes on with it (R2)
+            worker.queued = False
+            idle_again(worker)
+        elif calls and not worker.blocked & CALLS_BLOCKED:
             worker.push(worker)
         else:
             worker.queued = False

@@ -60,8 +60,8 @@ def _until_warm(worker: Worker) -> Step:
             and not core.held
             and worker.region is None
         ):
-            region = Region(schedule(worker), specialise)
-            worker.step = region.step
+            found = schedule(worker)
+            worker.step = firing.step if found is None else Region(found, specialise).step
             worker.step(worker)
         else:
             firing.step(worker)

@@ -165,6 +165,7 @@ class _Writer:
         self.real = host.epoch is not None  # time goes on while code runs
         self.loops = self.real and not self.head.paced and (self.is_source or self._one_queue())
         self.single = [self._is_single(worker) for worker in self.order]
+        self.over_if_silent: set[int] = set()  # behind whose silence no code of the wave runs
         self.lines: list[str] = []
         self.calls: dict[int, int] = {}
         self.indent = 0
@@ -345,7 +346,7 @@ class _Writer:
 
     def _may_be_silent(self, value: str) -> bool:
         """Whether the wave can go on with this value missing; else it has ended for all behind it."""
-        return not self._silences_all_behind(int(value[1:].partition("_")[0]))
+        return int(value[1:].partition("_")[0]) not in self.over_if_silent
 
     def _silences_all_behind(self, k: int) -> bool:
         """If it is silent, so is everybody behind it, and nothing of theirs or its own leaves the region."""
@@ -392,6 +393,7 @@ class _Writer:
         say(f"if flags or type({value}) in EXCEPTIONAL{self._detached(k)}: return region.leave({k}, locals())")
         say(f"if {value} is not None: t{k} = type({value})")
         if not within and self._silences_all_behind(k) and len(self.order) > k + 1:
+            self.over_if_silent.add(k)
             say("else:")
             self.indent += 1
             say(f"spread[{k}] += 1")

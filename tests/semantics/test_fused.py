@@ -1,0 +1,195 @@
+"""Fused regions do what nodes do one by one: the same values, in the same order of all calls, whoever looks (R2, R7).
+
+Regions are fused from the first firing on here. `test_soak_fused.py` compares many more graphs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+import hfg
+from hfg.engine.runtime import settings
+from hfg.testing import Divergence, nodes, recorder, reference_run, replay
+from hfg.testing.making import Allowed, random_plan
+from hfg.testing.plans import GraphPlan
+from hfg.testing.recording import Recorder
+from hfg.testing.shrinking import shrink
+
+MOST_MOVES = 1500
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settings, "FUSE_AFTER", 0)
+
+
+Calls = list[tuple[str, str]]
+"""Each call of a node's code, in order: the node's path, and what it was given."""
+
+
+def plain_shapes(seed: int) -> Allowed:
+    """What is fused, and now and then what splits it."""
+    return Allowed(plain=True, max_nodes=4 + seed % 9)
+
+
+def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
+    """Have every call of the code of every node noted from now on."""
+    calls: Calls = []
+    process_call, handler = hfg.Node._process_call, hfg.Node._handler
+
+    def noted_process(self: Any) -> Callable[..., Any]:
+        call = process_call(self)
+        if self._type.process_kind == "generator":
+
+            def draw(*arguments: Any) -> Iterator[Any]:
+                values = iter(call(*arguments))
+                while True:
+                    calls.append((str(self.place.path), "next"))
+                    try:
+                        value = next(values)
+                    except StopIteration:
+                        return
+                    yield value
+
+            return draw
+
+        def process(*arguments: Any) -> Any:
+            calls.append((str(self.place.path), repr(arguments)))
+            return call(*arguments)
+
+        return process
+
+    def noted_handler(self: Any, name: str) -> Callable[..., Any] | None:
+        call = handler(self, name)
+        if call is None:
+            return None
+
+        def handle(*arguments: Any) -> Any:
+            calls.append((str(self.place.path), name + repr(arguments)))
+            return call(*arguments)
+
+        return handle
+
+    monkeypatch.setattr(hfg.Node, "_process_call", noted_process)
+    monkeypatch.setattr(hfg.Node, "_handler", noted_handler)
+    return calls
+
+
+def noted_run(calls: Calls, plan: GraphPlan, *, fast: bool, trace: Recorder | None = None) -> tuple[Any, str, Calls]:
+    """Run it; give its report, what it failed with, and its calls."""
+    calls.clear()
+    error = ""
+    try:
+        report = hfg.run(plan.build(), clock="virtual", fast=fast, trace=trace, until_s=30.0)
+    except hfg.errors.RunError as problem:
+        report, error = problem.report, str(problem)  # type: ignore[attr-defined]
+    return report, error, list(calls)
+
+
+def ends(plan: GraphPlan, seed: int) -> bool:
+    """Whether it comes to an end by itself."""
+    try:
+        reference_run(plan.build(), seed=seed, max_moves=MOST_MOVES)
+    except RuntimeError:
+        return False
+    return True
+
+
+def fusing_differs(calls: Calls, plan: GraphPlan) -> str | None:
+    """Interpreted, fused and watched a graph does the same, and what the oracle permits."""
+    interpreted = noted_run(calls, plan, fast=False)
+    fused = noted_run(calls, plan, fast=True)
+    if fused != interpreted:
+        return f"interpreted: {interpreted}\n  fused: {fused}"
+    trace = recorder()
+    watched = noted_run(calls, plan, fast=True, trace=trace)
+    if watched != interpreted:
+        return f"not watched: {interpreted}\n  watched: {watched}"
+    try:
+        replay(plan, trace, until_s=30.0)
+    except Divergence as divergence:
+        return str(divergence)
+    return None
+
+
+def check(calls: Calls, seed: int, allowed: Allowed) -> None:
+    plan = random_plan(seed, allowed)
+    if not ends(plan, seed) or fusing_differs(calls, plan) is None:
+        return
+    small = shrink(plan, lambda smaller: ends(smaller, seed) and fusing_differs(calls, smaller) is not None)
+    pytest.fail(f"seed {seed}\n{small}\n\n{fusing_differs(calls, small)}", pytrace=False)
+
+
+@pytest.mark.rule("R2", "R7", "F3", "F4", "F5", "T5", "X1")
+@pytest.mark.parametrize("block", range(8))
+def test_fused_interpreted_and_watched_runs_are_one(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = note_calls(monkeypatch)
+    for seed in range(15 * block, 15 * block + 15):
+        check(calls, seed, plain_shapes(seed))
+
+
+@pytest.mark.rule("R1", "F7")
+@pytest.mark.parametrize("seed", range(30))
+def test_threads_beside_a_region_change_nothing_of_it(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    check(note_calls(monkeypatch), seed, Allowed(plain=True, threads=True, lossy=False, gates=False))
+
+
+def fused_order(graph: hfg.Graph, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """In which order nodes were called, which is the same interpreted."""
+    calls = note_calls(monkeypatch)
+    orders = []
+    for fast in (True, False):
+        calls.clear()
+        hfg.run(graph, clock="virtual", fast=fast)
+        orders.append(list(calls))
+    assert orders[0] == orders[1]
+    return [path for path, _ in orders[0]]
+
+
+@pytest.mark.rule("F4")
+def test_silence_behind_a_node_that_may_be_silent_itself_stays_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = hfg.Graph()
+    source = graph.add(nodes.script(values=(1, 0, None, 2)), name="s")
+    some, behind, beside = graph.add(nodes.some(), name="f"), graph.add(nodes.double(), name="b"), nodes.sink()
+    source.out >> some.value
+    some.out >> behind.value
+    graph.connect(source.out, graph.add(beside, name="o", release="pipelined").value)
+    assert fused_order(graph, monkeypatch).count("b") == 2
+
+
+@pytest.mark.rule("R2", "F5")
+def test_a_head_with_a_buffer_before_it_goes_on_before_who_fills_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = hfg.Graph()
+    source, head = graph.add(nodes.Script(count=8), name="s"), nodes.picky(at=2)
+    graph.add(head, name="h", on_error="restart")
+    behind = graph.add(nodes.double(), name="b")
+    graph.connect(source.out, head.value, buffer=2)
+    head.out >> behind.value
+    fused_order(graph, monkeypatch)
+
+
+@pytest.mark.rule("R2", "F6")
+def test_a_call_that_a_wave_brings_while_another_is_under_way_goes_on_with_the_wave(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    graph = hfg.Graph()
+    source, relay = graph.add(nodes.script(values=(None, 6, 6)), name="s"), graph.add(nodes.Relay(), name="r")
+    graph.connect(relay.said, relay.say)
+    graph.connect(source.out, relay.say)
+    assert fused_order(graph, monkeypatch).count("r") > 6
+
+
+@pytest.mark.rule("R2", "F9", "T4")
+def test_whose_turn_depends_on_silence_is_not_scheduled_before_it_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = hfg.Graph()
+    source = graph.add(nodes.script(values=(2, 3)), name="s")
+    parted, first = graph.add(nodes.parted(), name="p"), graph.add(nodes.Sieve(), name="a")
+    tally = graph.add(nodes.Tally(), name="t")
+    source.out >> parted.value
+    parted.odd >> first.value
+    parted.odd >> tally.value
+    graph.connect(parted.even, tally.note)
+    assert fused_order(graph, monkeypatch) == ["s", "p", "t", "s", "p", "a", "t", "s"]
