@@ -269,15 +269,19 @@ def test_an_edge_into_a_parameter_may_have_a_buffer(fast: bool) -> None:
 @pytest.mark.rule("P4", "F10")
 def test_disabling_discards_what_lies_in_a_buffer_and_frees_the_producer() -> None:
     graph = hfg.Graph()
-    source, slow = graph.add(numbers(count=9)), graph.add(forward_later())
+    source, slow = graph.add(numbers(count=9)), graph.add(Keep(), name="slow", max_rate_hz=1)
     other = graph.add(KeepTokens())
     edge = graph.connect(source.out, slow.value, buffer=2)
     graph.connect(source.out, other.value)
     graph.connect(graph.add(slow_numbers(count=1, pause_s=0.5)).out, slow.ports.slots["disable"])
     report = run(graph)
-    assert [token.value for token in other.tokens] == [1, 2, 3, 4, 5, 6, 7, 8, 9]
+    assert [(token.value, token.stamp) for token in other.tokens] == [
+        *((number, 0) for number in (1, 2, 3, 4)),
+        *((number, 0.5) for number in (5, 6, 7, 8, 9)),
+    ]
     found = report.edges[edge.label]
-    assert (found.sent, found.dropped) == (5, 3)  # two were taken before the call had its turn
+    assert (found.sent, found.dropped) == (4, 3)
+    assert slow.values == [1]
 
 
 @pytest.mark.rule("P4")
