@@ -49,18 +49,30 @@ FLOORS = {
 FIRST_FLOOR_THAT_WAITS = 5
 SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and what a node type is
 SAME_FLOOR_PAIRS = {("hfg.cli", "hfg.studio"), ("hfg.__main__", "hfg.cli"), ("hfg.testing", "hfg")}
-# The wings of the graph floor, in the same way: a module imports what lies in its own wing or in a lower one.
-GRAPH_WINGS = {
-    "hfg.graph.structure": 0,
-    "hfg.graph.flat": 1,
-    "hfg.graph.drawing": 1,  # draws what was said, so it needs no flat graph
-    "hfg.graph.checks": 2,
-    "hfg.graph.editing": 3,
-    "hfg.graph.graph": 4,  # the face, which composes the wings
-    "hfg.graph": 5,
+# The wings of a floor, in the same way: a module imports what lies in its own wing or in a lower one.
+WINGS = {
+    "hfg.graph": {
+        "hfg.graph.structure": 0,
+        "hfg.graph.flat": 1,
+        "hfg.graph.drawing": 1,  # draws what was said, so it needs no flat graph
+        "hfg.graph.checks": 2,
+        "hfg.graph.editing": 3,
+        "hfg.graph.graph": 4,  # the face, which composes the wings
+        "hfg.graph": 5,
+    },
+    "hfg.engine": {
+        "hfg.engine.model": 0,
+        "hfg.engine.rules": 1,
+        "hfg.engine.fusion": 2,
+        "hfg.engine.runtime": 3,
+        "hfg.engine.observing": 4,  # who looks at a run and who changes it know nothing of each other
+        "hfg.engine.editing": 4,
+        "hfg.engine.face": 5,
+        "hfg.engine": 6,
+    },
 }
 NAMED_FROM_BELOW = "hfg.graph.graph"  # nodes and edges give users their graph, so its name stands in annotations
-WITHOUT_CIRCLES = ("hfg.graph", "hfg.activity")
+WITHOUT_CIRCLES = ("hfg.graph", "hfg.activity", "hfg.engine")
 WAITING = {"asyncio", "anyio", "trio"}
 ORACLE_MUST_NOT_SHARE = ("hfg.ports", "hfg.activity", "hfg.engine")
 
@@ -150,16 +162,21 @@ def test_imports_go_down_only(module: str) -> None:
     assert not found, "\n".join(found)
 
 
-@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.graph")])
-def test_imports_between_the_wings_of_the_graph_go_one_way(module: str) -> None:
-    wing = home(module, GRAPH_WINGS)
+IN_WINGS = [(floor, name) for floor in WINGS for name in HFG if name == floor or name.startswith(f"{floor}.")]
+
+
+@pytest.mark.parametrize(("floor", "module"), IN_WINGS)
+def test_imports_between_the_wings_of_a_floor_go_one_way(floor: str, module: str) -> None:
+    """Also those in functions and for type checkers, so each wing can be read without those that stand on it."""
+    wings = WINGS[floor]
+    wing = home(module, wings)
     assert wing is not None
     imports = set(imported(module, HFG[module], named=False))
     for name, line in imported(module, HFG[module]):
-        other = home(name, GRAPH_WINGS)
+        other = home(name, wings)
         if other is None or other == wing:
             continue
-        is_below = GRAPH_WINGS[other] < GRAPH_WINGS[wing]
+        is_below = wings[other] < wings[wing]
         only_names = name == NAMED_FROM_BELOW and (name, line) not in imports
         assert is_below or only_names, f"{module}:{line} imports {name}: {other} stands on {wing} or beside it"
 
@@ -212,7 +229,7 @@ def test_the_oracle_shares_no_code_with_the_accused(module: str) -> None:
 
 def test_the_table_names_only_what_exists_or_is_planned() -> None:
     planned = {"hfg.transport", "hfg.nodes", "hfg.files", "hfg.studio"}
-    missing = {name for name in (*FLOORS, *GRAPH_WINGS) if name not in HFG} - planned
+    missing = {name for name in (*FLOORS, *WINGS["hfg.graph"], *WINGS["hfg.engine"]) if name not in HFG} - planned
     assert not missing, f"FLOORS names modules that are gone: {sorted(missing)}"
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 from hfg.cli.table import View
 from hfg.cli.terminal import Foot, is_terminal
-from hfg.engine import Run, glance
+from hfg.engine import Run
 
 __all__ = ["EVERY_S", "Live", "live_table"]
 
@@ -34,13 +34,13 @@ class Live:
         if self._foot is not None:
             self._run = run
             self._view = View()
-            self._view.look(glance(run))  # measuring begins, and rates have something to begin with
+            self._view.look(run.glance())  # measuring begins, and rates have something to begin with
             self._again()
 
     def refresh(self) -> None:
         """Look and draw, unless the terminal takes nothing at the moment."""
         if self._run is not None and self._foot is not None and self._foot.is_ready():
-            self._view.look(glance(self._run))
+            self._view.look(self._run.glance())
             columns, height = self._foot.size()
             self._foot.draw(self._view.lines(columns, height, coloured=self._foot.coloured))
 

@@ -22,7 +22,7 @@ from typing import Final, Literal
 import msgspec
 
 from hfg.cli.encoding import encode
-from hfg.engine import Glance, Run, glance
+from hfg.engine import Glance, Run
 from hfg.errors import TargetError
 
 __all__ = ["Answer", "Door", "Line", "Question", "folder", "open_door", "runs"]
@@ -183,7 +183,7 @@ class Door:
             return self._name
         if self.run is None:
             return Answer(error="the run has not begun")
-        return msgspec.structs.replace(self._name, glance=glance(self.run))
+        return msgspec.structs.replace(self._name, glance=self.run.glance())
 
 
 @asynccontextmanager

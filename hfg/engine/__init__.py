@@ -13,7 +13,7 @@ The wings, each of which knows those above it in this list, never those below:
 
 from hfg.engine.face.run import Run
 from hfg.engine.face.running import run, run_async, running
-from hfg.engine.observing.glance import Glance, NodeGlance, glance
+from hfg.engine.observing.glance import Glance, NodeGlance
 from hfg.engine.observing.report import EdgeReport, NodeReport, Report
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
 from hfg.engine.runtime.virtual import VirtualTimeLoop
@@ -31,7 +31,6 @@ __all__ = [
     "Statistics",
     "Times",
     "VirtualTimeLoop",
-    "glance",
     "run",
     "run_async",
     "running",

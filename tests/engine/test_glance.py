@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 import hfg
-from hfg.engine import Glance, glance
+from hfg.engine import Glance
 from hfg.trace import RunStarted, TraceEvent
 
 
@@ -44,10 +44,10 @@ def build() -> hfg.Graph:
 def test_a_glance_has_the_numbers_of_the_statistics() -> None:
     async def main() -> tuple[Glance, hfg.Statistics]:
         async with hfg.running(build(), clock="virtual") as run:
-            first = glance(run)
+            first = run.glance()
             assert (first.outcome, first.duration_s, [node.failed for node in first.nodes]) == ("running", 0.0, [0, 0])
             await run.wait_finished()
-            return glance(run), run.statistics()
+            return run.glance(), run.statistics()
 
     with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
         seen, statistics = runner.run(main())
@@ -63,7 +63,7 @@ def test_a_paused_run_says_so() -> None:
     async def main() -> None:
         async with hfg.running(build(), clock="virtual") as run:
             run.pause()
-            assert glance(run).outcome == "paused"
+            assert run.glance().outcome == "paused"
 
     with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
         runner.run(main())
@@ -73,7 +73,7 @@ def test_begin_is_called_before_anything_happens_and_the_rest_is_as_without() ->
     events: list[TraceEvent] = []
 
     def begin(run: hfg.Run) -> None:
-        assert glance(run).duration_s == 0.0
+        assert run.glance().duration_s == 0.0
         run.trace(events)
 
     report = hfg.run(build(), clock="virtual", begin=begin)

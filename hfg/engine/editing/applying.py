@@ -14,6 +14,7 @@ from hfg.engine.editing.plan_diff import PlanDiff
 from hfg.engine.editing.plan_index import PlanIndex, edge_place, home_of, node_place
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.core import Core
+from hfg.engine.model.groups import Group
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
 from hfg.engine.rules import lifecycle, wiring
@@ -25,7 +26,6 @@ from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import flush_automatic, telling_behind
 from hfg.engine.rules.sources import judge_sources
 from hfg.engine.runtime import plan, ports
-from hfg.engine.runtime.groups import Group
 from hfg.graph import Graph
 from hfg.graph.flat import End, FlatEdge
 from hfg.graph.flat import Scope as FlatScope

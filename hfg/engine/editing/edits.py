@@ -12,7 +12,7 @@ import contextlib
 from collections.abc import Callable, Collection, Coroutine, Iterable, Sequence
 from functools import partial
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
@@ -26,7 +26,10 @@ from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
 from hfg.engine.rules import lifecycle, subgraphs
 from hfg.engine.runtime import plan
 from hfg.engine.runtime import ports as engine_ports
+from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.code import answer
+from hfg.engine.runtime.engine import Engine
+from hfg.engine.runtime.lifetime import Lifetime
 from hfg.errors import GraphError, HfgError, NodeError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.checks import check_flat
@@ -37,9 +40,6 @@ from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat import FlatNode, flatten
 from hfg.trace import ParameterSet, StructureChanged
 
-if TYPE_CHECKING:
-    from hfg.engine.runtime.engine import Engine
-
 __all__ = ["Edits"]
 
 _Switched = dict[Worker, bool]
@@ -49,12 +49,12 @@ _Switched = dict[Worker, bool]
 class Edits:
     """Edits the graph of one engine."""
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Engine, lifetime: Lifetime) -> None:
         self._engine = engine
+        self._lifetime = lifetime
         self._graph: Graph = engine.graph
         self._index: PlanIndex | None = None  # from the first edit on
         self._turns = Turns()
-        self.leaving: set[asyncio.Task[None]] = set()  # nodes that are gone are torn down
 
     async def edit(self, commands: Sequence[Command]) -> None:
         """See `Run.edit`."""
@@ -195,11 +195,11 @@ class Edits:
             said = FlatNode(0, node._place.path, node, how.come[node], ())
             worker = plan.make_worker(engine.core, said, engine.groups)
             come.append(worker)
-            engine.lifetime.carry(worker)
+            self._lifetime.carry(worker)
             worker.busy = "setup"
             self._turns.wait_for((worker,))
             await self._hook(worker, lifecycle.set_up)
-            engine.lifetime.came(worker)
+            self._lifetime.came(worker)
 
     async def _hook(self, worker: Worker, hook: Callable[[Worker, lifecycle.Then], None]) -> None:
         """Run a hook of a node to its end; if the edit is cancelled meanwhile, so is the hook, and waited for.
@@ -271,7 +271,7 @@ class Edits:
         worker.silent_code = worker.type.is_function
         worker.is_async = worker.type.process_kind.startswith("async")
         node._active = worker.active
-        self._engine.lifetime.carry(worker)
+        self._lifetime.carry(worker)
         await self._hook(worker, lifecycle.set_up)
 
     def _take_effect(self, how: PlanDiff, come: list[Worker], changes: Sequence[Change]) -> None:
@@ -282,18 +282,20 @@ class Edits:
         new, nodes = apply(core, self._index, self._graph, how, come, engine.groups)
         for edge, flat in new:
             if flat.source.kind == "observable":
-                engine.lifetime.feed(flat.source.port, edge, flat.through)
+                self._lifetime.feed(flat.source.port, edge, flat.through)
             elif flat.through:
-                engine.lifetime.pipe(edge, flat.through)
+                self._lifetime.pipe(edge, flat.through)
         for edge in how.lost:
-            engine.lifetime.forget(edge)
+            self._lifetime.forget(edge)
         for change in changes:
             if isinstance(change, ParameterChange) and core.trace is not None and change.node._place is not None:
                 here = core.by_path.get(change.node._place.path)
                 if here is not None and here.node is change.node:
                     core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
         swapped = {change.old: change.new for change in changes if isinstance(change, NodeSwap)}
-        engine.looked_at_anew([worker for worker, _, _ in how.swapped], swapped, nodes)
+        edited = Edited([worker for worker, _, _ in how.swapped], swapped, nodes)
+        for find_again in engine.callbacks.edited:
+            find_again(edited)
         for worker in come:
             core.upstairs.idle_again(worker)
 
@@ -354,8 +356,8 @@ class Edits:
         if not gone:
             return
         task = asyncio.create_task(self._tear_down(gone), name="hfg edit")
-        self.leaving.add(task)
-        task.add_done_callback(self.leaving.discard)
+        self._lifetime.leaving.add(task)
+        task.add_done_callback(self._lifetime.leaving.discard)
         await asyncio.shield(task)
 
     async def _tear_down(self, workers: Iterable[Worker]) -> None:
@@ -373,7 +375,7 @@ class Edits:
             except HfgError as error:
                 engine.core.errors.append(error)
             engine_ports.release_ports(worker)
-            engine.lifetime.forget(worker)
+            self._lifetime.forget(worker)
             if worker.carrier is not None:
                 worker.carrier.drop()
 

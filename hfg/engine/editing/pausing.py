@@ -8,26 +8,32 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import msgspec
 
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
 from hfg.engine.rules import quiet
-from hfg.engine.runtime.places import behind, edges_at, is_gone, is_near
+from hfg.engine.runtime.callbacks import Edited
+from hfg.engine.runtime.engine import Engine
+from hfg.engine.runtime.places import behind, edges_at, is_gone, is_near, place_of
 from hfg.errors import UsageError
 from hfg.token import Token
 from hfg.trace import RunPaused, RunResumed, TokenSent, TraceEvent
 
-if TYPE_CHECKING:
-    from hfg.engine.runtime.engine import Engine
-
 __all__ = ["Breakpoint", "Pausing", "Step"]
 
 _LOGGER = logging.getLogger("hfg.engine")
+
+
+class _Trace(Protocol):
+    """Where a breakpoint on an edge looks at tokens: the consumers of the run's trace."""
+
+    def add(self, consumer: Callable[[TraceEvent], None]) -> Callable[[], None]:
+        """Let a function see every event from now on; gives back what removes it."""
 
 
 class Step(msgspec.Struct, frozen=True):
@@ -75,8 +81,9 @@ class Pausing:
       why: what paused the run: "pause", or the path of the breakpoint that was hit.
     """
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Engine, consumers: _Trace) -> None:
         self._engine = engine
+        self._consumers = consumers
         self.paused = False
         self.why = ""
         self._stepping = False
@@ -85,6 +92,9 @@ class Pausing:
         self._at_edges: dict[Breakpoint, Callable[[], None]] = {}
         self._labels_at: dict[Breakpoint, frozenset[str]] = {}
         self._waived: set[Worker] = set()  # stopped here already: goes on when the run does
+        engine.callbacks.rested.append(self._rest)
+        engine.callbacks.finished.append(self._rest)
+        engine.callbacks.edited.append(self._find_again)
 
     # --- pause and resume -------------------------------------------------------------------------------------------
 
@@ -98,7 +108,7 @@ class Pausing:
         engine.core.flags.append("paused")
         if engine.core.trace is not None:
             engine.core.trace(RunPaused(engine.now(), why))
-        self.rest()
+        self._rest()
 
     def resume(self) -> None:
         """Go on. Does nothing if the run is not paused.
@@ -123,7 +133,7 @@ class Pausing:
         for group in self._engine.groups.values():
             group.held = held
 
-    def rest(self) -> None:
+    def _rest(self) -> None:
         """The pump would go on now: tell those who wait for the pause, or for the end of what is under way."""
         waiters, self._waiters = self._waiters, []
         for waiter in waiters:
@@ -143,22 +153,16 @@ class Pausing:
         """
         engine = self._engine
         while not engine.core.over:
-            if self.paused and not self.is_under_way() and not self._stepping:
+            if self.paused and not self._engine.is_under_way() and not self._stepping:
                 return self.why
             await self._change()
         raise UsageError("the run has ended: nothing can pause it any more")
 
-    def is_under_way(self) -> bool:
-        """Whether something comes to its end by itself; what iterates does not, for its inside is held (G4)."""
-        return any(
-            core.in_flight > sum(worker.in_flight for worker in core.workers if worker.iteration is not None)
-            for core in self._engine.all_cores()
-        )
-
     # --- steps ------------------------------------------------------------------------------------------------------
 
-    async def step(self, worker: Worker) -> Step:
+    async def step(self, node: Any) -> Step:
         """Let one node make one firing or one slot call, and wait until that is over."""
+        worker = self._single(node, "step")
         self._begin(worker.path)
         try:
             await self._settled()
@@ -270,7 +274,27 @@ class Pausing:
         """All that are set."""
         return [*self._at_nodes.values(), *self._at_edges]
 
-    def at_node(self, worker: Worker) -> Breakpoint:
+    def break_at(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
+        """See `Run.break_at`."""
+        if when is not None and not callable(when):
+            raise UsageError(f"when= takes a function of the token, like lambda token: token.value > 3; got {when!r}")
+        place = place_of(self._engine, place)
+        if not hasattr(place, "_place"):
+            return self._at_edges_of(place, when)
+        if when is not None:
+            raise UsageError("when= looks at a token: give an edge or a port of the node, not the node")
+        return self._at_node(self._single(place, "stop at"))
+
+    def _single(self, node: Any, what: str) -> Worker:
+        if isinstance(node, str):
+            node = self._engine.graph[node]
+        inside = (worker for worker in self._engine.all_workers() if worker.node is node and node is not None)
+        worker = next(inside, None) or self._engine.worker_of(node)
+        if worker.scope is not None:
+            raise UsageError(f'"{worker.path}" is a subgraph: {what} a node inside (G1)')
+        return worker
+
+    def _at_node(self, worker: Worker) -> Breakpoint:
         """Pause before each firing and call of a node."""
         found = self._at_nodes.get(worker)
         if found is None:
@@ -279,7 +303,7 @@ class Pausing:
             specialise(worker)
         return found
 
-    def at_edges(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
+    def _at_edges_of(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
         """Pause when a token is put on one of the edges, before anybody takes it.
 
         Raises:
@@ -309,23 +333,18 @@ class Pausing:
                 point.token = event.token
                 self._hit(point)
 
-        self._at_edges[point] = self._engine.consumers.add(look, None)
+        self._at_edges[point] = self._consumers.add(look)
         return point
 
     def _labels(self, place: Any) -> list[str]:
         core = self._engine.core
         return [edge.label for edge in edges_at(self._engine, place) if edge.target.core is core]
 
-    def find_again(self, swapped: Mapping[Any, Any], nodes: Set[Any]) -> None:
-        """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4).
-
-        Args:
-          swapped: nodes that were replaced, and by what.
-          nodes: at which something is not as it was.
-        """
-        near = {point for point in self.breakpoints if is_near(point.place, nodes)}
+    def _find_again(self, edited: Edited) -> None:
+        """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4)."""
+        near = {point for point in self.breakpoints if is_near(point.place, edited.nodes)}
         for point in near:
-            point.place = behind(point.place, swapped)
+            point.place = behind(point.place, edited.swapped)
             if is_gone(point.place):
                 self.remove(point)
         for worker, point in self._at_nodes.items():

@@ -230,7 +230,8 @@ async def signal(
     edge = worker.core.outside.get((worker.index, slot))
     if edge is None:
         edge = prepare_slot(worker, slot)
-        engine.taps.adopt(edge)
+        for adopt in engine.callbacks.joined:
+            adopt(edge)
     while len(edge.queue) >= edge.capacity:
         waiter: asyncio.Future[None] = engine.loop.create_future()
         outside = edge.source

@@ -1,29 +1,35 @@
 """What one can do with a run from outside (ARCHITECTURE §1, rules R1, R7, P10).
 
-Stands on `engine` and `outside`.
+A thin face: what is asked for is done by the parts of `composition`.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from functools import partial
+from types import ModuleType
 from typing import Any
 
+from hfg.engine.editing.pausing import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
 from hfg.engine.face import outside
-from hfg.engine.face.editable import Editable
-from hfg.engine.face.steering import Steering
-from hfg.engine.model.worker import Worker
+from hfg.engine.face.composition import Composition
+from hfg.engine.fusion.specialise import specialise
+from hfg.engine.model.worker import UNREADY
 from hfg.engine.observing.consumers import Listener
+from hfg.engine.observing.glance import Glance, glance_at
 from hfg.engine.observing.report import Report, edge_reports, node_reports
 from hfg.engine.observing.statistics import Statistics
 from hfg.engine.observing.taps import Tap
+from hfg.engine.rules.activity import reset_activity
+from hfg.engine.rules.agenda import unblock
 from hfg.engine.runtime import relays
 from hfg.engine.runtime.code import answer
-from hfg.engine.runtime.engine import Engine
+from hfg.engine.runtime.ports import bind_event, bind_start
 from hfg.errors import HfgError, NotRunning, RunError, UsageError
 from hfg.graph import Graph
+from hfg.graph.editing.commands import Command
 from hfg.nodetype import Node
 from hfg.ports import EventPort, ParameterPort, SlotPort
 from hfg.token import Token
@@ -32,12 +38,15 @@ from hfg.types import accepts, describe
 __all__ = ["Run"]
 
 
-class Run(Steering, Editable):
+class Run:
     """A graph that runs; made by `running`."""
 
-    def __init__(self, graph: Graph, engine: Engine) -> None:
+    def __init__(self, graph: Graph, parts: Composition) -> None:
         self.graph = graph
-        self._engine = engine
+        self._parts = parts
+        self._engine = parts.engine
+        self._edits = parts.edits
+        self._pausing = parts.pausing
         self._outputs: dict[str, list[Any]] = {}
         self._held = False
         self._done: asyncio.Future[None] | None = None
@@ -71,13 +80,11 @@ class Run(Steering, Editable):
             await self._trigger_inside(port, value, activity, stamp)
             return
         if port.kind == "slot":
-            worker = self._worker(port.node)
+            worker = self._engine.worker_of(port.node)
             await outside.signal(self._engine, worker, port.name, value, activity, stamp)
             return
-        from hfg.engine.runtime.ports import bind_event
-
-        event = bind_event(self._worker(port.node), port.name)
-        await self._engine.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
+        event = bind_event(self._engine.worker_of(port.node), port.name)
+        await self._engine.code.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
 
     async def _trigger_inside(self, port: Any, value: Any, activity: int | None, stamp: float | None) -> None:
         """The slot of a subgraph stands for those inside that it leads to (G1)."""
@@ -88,7 +95,7 @@ class Run(Steering, Editable):
             )
         for slot, active in behind:
             explicit = activity if active else 0
-            await outside.signal(self._engine, self._worker(slot.node), slot.name, value, explicit, stamp)
+            await outside.signal(self._engine, self._engine.worker_of(slot.node), slot.name, value, explicit, stamp)
 
     def feed(self, port: Any, *, end: bool = True) -> outside.Feed:
         """Open a feed into a graph input; use it with `async with`.
@@ -131,7 +138,7 @@ class Run(Steering, Editable):
           UsageError: it is in no run or has no edge.
           GraphError: there is no such path.
         """
-        return self._engine.taps.add(what, size, max_rate_hz)
+        return self._parts.taps.add(what, size, max_rate_hz)
 
     def trace(self, consumer: Any, *, size: int | None = None) -> Listener:
         """Let a consumer see every event of the run from now on (R7); gives back what removes it.
@@ -145,7 +152,7 @@ class Run(Steering, Editable):
         Raises:
           UsageError: it cannot take events.
         """
-        return self._engine.consumers.add(consumer, size)
+        return self._parts.consumers.add(consumer, size)
 
     def set(self, parameter: Any, value: Any) -> None:
         """Set a parameter of a node between its firings: now, or when the one under way is over (P8).
@@ -162,6 +169,115 @@ class Run(Steering, Editable):
                 f'run.set takes the port of a parameter, as in node.ports.parameters["name"], got {parameter!r}'
             )
         set_parameter(self._engine, parameter, value)
+
+    # --- changing it (R4): one edit after the other, in the order they were asked for ---------------------------------
+
+    async def edit(self, *commands: Command) -> None:
+        """Change the graph while it runs: all of it, or when a command is refused, nothing.
+
+        New nodes are set up first. The change takes effect at one moment, between firings of the nodes it touches, and
+        then this returns; other nodes go on meanwhile. What lies on an edge that is removed is dropped and counts as
+        processed; a new edge starts empty. Cancelled before it takes effect, it changes nothing.
+
+        Raises:
+          GraphError: a command cannot be carried out; the message says which and why.
+          NodeError: the `setup()` of a node that comes failed; one that it was to replace is set up again.
+          UsageError: it is an edit that only a graph at rest allows, or was asked for by code whose end it waits for.
+          NotRunning: the run is over.
+        """
+        await self._edits.edit(commands)
+
+    async def undo(self) -> None:
+        """Take the last edit back, be it of this run or from before; nodes that come back start afresh.
+
+        Raises:
+          UsageError: there is none, or the graph was changed by hand since.
+        """
+        await self._edits.undo()
+
+    async def redo(self) -> None:
+        """Carry the edit out again that was undone last.
+
+        Raises:
+          UsageError: there is none.
+        """
+        await self._edits.redo()
+
+    async def reload(self, module: str | ModuleType) -> None:
+        """Run a changed module again; its node types replace those of its nodes.
+
+        Parameters, edges, what lies on them and activity stay; the nodes are torn down and set up.
+
+        Raises:
+          GraphError: the module fails, or a type does not fit; the graph goes on with what it has.
+        """
+        await self._edits.reload(module)
+
+    # --- holding it still (R3) ----------------------------------------------------------------------------------------
+
+    @property
+    def paused(self) -> bool:
+        """Whether no new firing or slot call starts at the moment."""
+        return self._pausing.paused
+
+    @property
+    def breakpoints(self) -> list[Breakpoint]:
+        """The breakpoints that are set."""
+        return self._pausing.breakpoints
+
+    def pause(self) -> None:
+        """Let no new firing and no new slot call start (R3).
+
+        What is under way goes on to its end, tokens stay where they are, signals from outside are still taken in. Time
+        goes on too, also virtual time.
+        """
+        self._pausing.pause()
+
+    def resume(self) -> None:
+        """Go on after a pause, past the breakpoints that caused it. Does nothing if the run is not paused.
+
+        Raises:
+          UsageError: a step is under way.
+        """
+        self._pausing.resume()
+
+    async def wait_paused(self) -> str:
+        """Wait until the run is paused, by `pause` or a breakpoint, and nothing is under way any more.
+
+        Returns:
+          The path of the breakpoint that was hit, or "pause".
+
+        Raises:
+          UsageError: the run has ended.
+        """
+        return await self._pausing.wait_paused()
+
+    async def step(self, node: Any = None) -> Step:
+        """Let a paused run make one step, and wait until it is over (R3).
+
+        Args:
+          node: makes one firing or one slot call, whichever is next in its order (F9); one that cannot move does not,
+            and the step says why. Without a node: a wave, in which each node makes at most one firing and one call,
+            those included that become able to by it.
+
+        Raises:
+          UsageError: the run is not paused or has ended, another step is under way, or the node is a subgraph.
+        """
+        return await (self._pausing.wave() if node is None else self._pausing.step(node))
+
+    def break_at(self, place: Any, *, when: Callable[[Token[Any]], object] | None = None) -> Breakpoint:
+        """Pause the run at a place from now on; `wait_paused` tells when.
+
+        Args:
+          place: a node, before each of whose firings and calls the run pauses; an edge, port, or path of one, on which
+            the run pauses as soon as a token lies there.
+          when: for edges and ports: pause only if this holds for the token. If it raises, it is logged and the
+            breakpoint removed.
+
+        Raises:
+          UsageError: there is no such place in the run, or `when` was given for a node or cannot be called.
+        """
+        return self._pausing.break_at(place, when)
 
     # --- waiting ----------------------------------------------------------------------------------------------------
 
@@ -180,9 +296,7 @@ class Run(Steering, Editable):
                 "write `await run.wait_quiet()` to wait for what it began"
             )
         waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
-        from hfg.engine.runtime.ports import bind_event
-
-        bind_event(self._worker(event.node), event.name)
+        bind_event(self._engine.worker_of(event.node), event.name)
         subscription = event.subscribe(partial(answer, waiter))
         ending = asyncio.ensure_future(self._engine.ending.wait())
         try:
@@ -209,9 +323,7 @@ class Run(Steering, Editable):
         await self._barrier(node, "outputs")
 
     async def _barrier(self, node: Node, which: str) -> None:
-        from hfg.engine.fusion.specialise import specialise
-
-        worker = self._worker(node)
+        worker = self._engine.worker_of(node)
         if worker.scope is not None:
             raise UsageError(f'"{worker.path}" is a subgraph, in which each node waits for itself: name a node inside')
         neighbours = [edge.source for edge in worker.in_edges] + [edge.target for edge in worker.all_out_edges()]
@@ -248,7 +360,15 @@ class Run(Steering, Editable):
         Counts are kept anyway. Times are measured from the first call on, so make it at the start of the block if they
         are to cover the whole run; it costs some 0.2 us a firing.
         """
-        return self._engine.measure().snapshot()
+        return self._parts.measuring.snapshot()
+
+    def glance(self) -> Glance:
+        """Take the few counts that a live table shows, cheap enough for many times a second; on the run's loop.
+
+        The first glance begins to measure, as `statistics` does.
+        """
+        _ = self._parts.measuring
+        return glance_at(self._engine)
 
     def now(self) -> float:
         """Seconds on the run's clock."""
@@ -256,10 +376,7 @@ class Run(Steering, Editable):
 
     def wake(self, node: Node) -> None:
         """Ask a node's `ready()` again (F1)."""
-        from hfg.engine.model.worker import UNREADY
-        from hfg.engine.rules.agenda import unblock
-
-        unblock(self._worker(node), UNREADY)
+        unblock(self._engine.worker_of(node), UNREADY)
         self._engine.kick()
 
     def stop(self) -> None:
@@ -268,8 +385,6 @@ class Run(Steering, Editable):
 
     def reset_activity(self) -> None:
         """Take all activity away and trigger `start` again (A14)."""
-        from hfg.engine.rules.activity import reset_activity
-
         reset_activity(self._engine.core)
         self._engine.kick()
 
@@ -299,18 +414,6 @@ class Run(Steering, Editable):
 
     # --- inside -----------------------------------------------------------------------------------------------------
 
-    def _worker(self, node: Any) -> Worker:
-        place = getattr(node, "_place", None)
-        if node is self.graph:
-            worker = self._engine.core.boundary
-        else:
-            worker = None if place is None else self._engine.core.by_path.get(place.path)
-            if worker is not None and worker.node is not node:
-                worker = None
-        if worker is None:
-            raise UsageError(f"{node!r} is no node of this run: its graph is another one, or it was never added")
-        return worker
-
     def _boundary(self, port: Any, ports: Mapping[str, Any]) -> str:
         """Find one of the graph's own ports, given itself or by name."""
         name = str(getattr(port, "name", port))
@@ -325,12 +428,10 @@ class Run(Steering, Editable):
 
     def _adopt(self, event: Any) -> None:
         """Somebody has subscribed to an automatic event, or to `start`; asked by the event."""
-        from hfg.engine.runtime.ports import bind_event, bind_start
-
         if event is self.graph.start:
-            bind_start(self._worker(self.graph), event)
+            bind_start(self._engine.worker_of(self.graph), event)
         else:
-            bind_event(self._worker(event.node), event.name)
+            bind_event(self._engine.worker_of(event.node), event.name)
 
     def _hold(self) -> None:
         self._held = True
@@ -345,7 +446,7 @@ class Run(Steering, Editable):
         if self._done is None:
             self._done = self._engine.loop.create_future()
             try:
-                await self._engine.close()
+                await self._parts.lifetime.close()
             finally:
                 self._done.set_result(None)
         elif not self._done.done():

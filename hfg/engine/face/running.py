@@ -12,9 +12,9 @@ from contextlib import asynccontextmanager
 from typing import Any, Literal
 
 from hfg.engine.face import outside
+from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.observing.report import Report
-from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.interrupt import CtrlC
 from hfg.engine.runtime.settings import Settings
 from hfg.engine.runtime.virtual import VirtualTimeLoop
@@ -58,8 +58,7 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
         raise CheckFailed(problems)
     if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
         _refuse_endless(flat)
-    engine = Engine(flat, settings)
-    run = Run(graph, engine)
+    run = Run(graph, Composition(flat, settings))
     level.whole.begin_run(run)
     return run
 
@@ -80,9 +79,10 @@ async def _run_to_end(
     graph: Graph, clock: Clock, settings: Settings, begin: Callable[[Run], object] | None, ctrl_c: CtrlC | None = None
 ) -> Report:
     run = _prepare(graph, clock, settings)
-    engine = run._engine
+    engine, lifetime = run._engine, run._parts.lifetime
     if ctrl_c is not None:
-        ctrl_c.task, ctrl_c.engine = asyncio.current_task(), engine
+        ctrl_c.task, ctrl_c.lifetime = asyncio.current_task(), lifetime
+        ctrl_c.error = lambda: engine.error
     try:
         for worker in engine.core.readers:
             outside.collect(engine, worker, run._outputs.setdefault(worker.port_name, []))
@@ -90,11 +90,11 @@ async def _run_to_end(
             begin(run)
         if settings.allow_idle:
             engine.hold()
-        await engine.start()
+        await lifetime.start()
         await engine.ending.wait()
     finally:
         try:
-            await run._engine.close()
+            await lifetime.close()
         finally:
             level_of(graph).whole.end_run()
     run._raise_failure()
@@ -224,7 +224,7 @@ async def running(
         debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, block_warning_s=block_warning_s
     )
     run = _prepare(graph, clock or "real", settings)
-    engine = run._engine
+    engine, lifetime = run._engine, run._parts.lifetime
     body = asyncio.current_task()
     assert body is not None
     cancelled_by_us = False
@@ -239,14 +239,14 @@ async def running(
     watcher: asyncio.Task[None] | None = None
     try:
         run._hold()
-        await engine.start()
+        await lifetime.start()
         if engine.error is None:
             watcher = asyncio.create_task(guard(), name=f"hfg guard of {graph.name}")
             yield run
     except asyncio.CancelledError:
         if not cancelled_by_us:
             engine.finish("cancelled", None)
-            engine.hurry()
+            lifetime.hurry()
             raise
         body.uncancel()
     finally:

@@ -309,9 +309,9 @@ class Region:
         self.detached = waves
         self._note_exit(k)
         self.materialise(k, found)
-        host = self.core.host
-        host.begin(worker)
-        self._after = host.late(worker, firing.when_done(worker))
+        code = self.core.code
+        code.begin(worker)
+        self._after = code.late(worker, firing.when_done(worker))
         self._left()
 
     def _late(self, result: Any, error: BaseException | None) -> None:

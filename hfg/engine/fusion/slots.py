@@ -159,7 +159,7 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
     """
     worker = event.worker
     core = worker.core
-    host: Any = core.host
+    host = core.host
     edges = event.edges
 
     def emit_general(value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:

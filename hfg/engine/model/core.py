@@ -14,13 +14,14 @@ from types import FrameType
 from typing import Any, Protocol
 
 from hfg.engine.model.scopes import Gate, Scope
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.errors import HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
+from hfg.ports.events import EventPort
 from hfg.token import Token
 from hfg.trace import TraceEvent
 
-__all__ = ["PENDING", "Core", "Host", "Region", "Timer", "Upstairs"]
+__all__ = ["PENDING", "Code", "Core", "Host", "Region", "Timer", "Upstairs"]
 
 
 class _Pending:
@@ -80,6 +81,28 @@ class Host(Protocol):
     def kick(self) -> None:
         """Something was queued from outside the pump: see to it that it goes on."""
 
+    def finish(self, outcome: str, error: HfgError | None) -> None:
+        """End the run; only the first call counts."""
+
+    def soon(self, callback: Callable[[], None]) -> None:
+        """Call back at the loop's next pass."""
+
+    def on_loop(self) -> bool:
+        """Whether the caller is on the run's own thread."""
+
+    def from_any_thread(self, call: Callable[[], None]) -> None:
+        """Do this on the loop; calls of one thread keep their order."""
+
+    def bring_in(self, call: Callable[[], None]) -> None:
+        """From a thread that is none of the run's: do this on the loop, in order, unless the run is over by then."""
+
+    def adopt_event(self, port: EventPort[Any]) -> None:
+        """Give an event the run's scheduler and thread."""
+
+
+class Code(Protocol):
+    """What runs the code of nodes where it belongs."""
+
     def execute(
         self,
         worker: Worker,
@@ -108,11 +131,8 @@ class Host(Protocol):
     def interrupt(self, worker: Worker) -> None:
         """Cancel or abandon the code of the worker that is under way (X2)."""
 
-    def quiet(self) -> None:
-        """Nothing runs, nothing can start and no timer is pending."""
-
-    def finish(self, outcome: str, error: HfgError | None) -> None:
-        """End the run; only the first call counts."""
+    async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+        """Trigger an event, then wait until no `wait` queue behind the events of its node is full (F8)."""
 
 
 class Upstairs(Protocol):
@@ -162,6 +182,8 @@ class Core:
     """One run.
 
     Attributes:
+      host: the waiting part of the engine.
+      code: what runs the nodes' code; given by the host.
       trace: receives every event of the run, or None: nobody listens and nothing is built (R7).
       in_flight: firings, calls and hooks that wait or run in a thread.
       timers: pending calls that could start something.
@@ -171,6 +193,7 @@ class Core:
 
     def __init__(self, host: Host, upstairs: Upstairs) -> None:
         self.host = host
+        self.code: Code
         self.upstairs = upstairs
         self.now = host.now
         self.workers: list[Worker] = []

@@ -15,8 +15,8 @@ from hfg.ports.edges import Edge
 
 if TYPE_CHECKING:
     from hfg.engine.model.core import Core, Region
+    from hfg.engine.model.groups import Group
     from hfg.engine.model.scopes import Gate, Scope
-    from hfg.engine.runtime.groups import Group
 
 __all__ = [
     "AMID_NOTHING",

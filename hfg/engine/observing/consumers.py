@@ -14,15 +14,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import anyio
 
+from hfg.engine.fusion.specialise import specialise
+from hfg.engine.runtime.engine import Engine
 from hfg.errors import UsageError
 from hfg.trace import TraceEvent
-
-if TYPE_CHECKING:
-    from hfg.engine.runtime.engine import Engine
 
 __all__ = ["Consumers", "Listener", "check_consumer"]
 
@@ -229,8 +228,7 @@ class _InThread(_Buffered):
 class Consumers:
     """All consumers of one run's trace."""
 
-    def __init__(self, listen: Callable[[Take | None], None], engine: Engine) -> None:
-        self._listen = listen
+    def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self._listeners: list[Listener] = []
 
@@ -267,6 +265,15 @@ class Consumers:
                 take(event)
 
         self._listen(tell)
+
+    def _listen(self, take: Take | None) -> None:
+        """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""
+        core = self._engine.core
+        core.trace = take
+        core.speaker = None
+        if core.started:
+            for worker in core.workers:
+                specialise(worker)
 
     async def end(self) -> None:
         """The run is over: those behind a buffer take what lies in it, all together within a second."""

@@ -7,16 +7,13 @@ looks twice knows rates and shares. Stands on `statistics`.
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from hfg.engine.observing.measuring import doing
+from hfg.engine.runtime.engine import Engine
 
-if TYPE_CHECKING:
-    from hfg.engine.face.run import Run
-
-__all__ = ["Glance", "NodeGlance", "glance"]
+__all__ = ["Glance", "NodeGlance", "glance_at"]
 
 
 class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
@@ -61,11 +58,8 @@ class Glance(msgspec.Struct, frozen=True):
     nodes: list[NodeGlance]
 
 
-def glance(run: Run) -> Glance:
-    """Look at a run; to be called on its loop. The first glance begins to measure, as `run.statistics()` does."""
-    engine = run._engine
-    if engine.measuring is None:
-        run.statistics()
+def glance_at(engine: Engine) -> Glance:
+    """Look at a run; to be called on its loop."""
     now = engine.now() if engine.ended_at is None else engine.ended_at
     nodes = []
     engine.core.settle_counts()
@@ -86,8 +80,8 @@ def glance(run: Run) -> Glance:
             )
         )
     return Glance(
-        graph=run.graph.name,
-        outcome="paused" if run.paused and engine.outcome == "running" else engine.outcome,
+        graph=engine.graph.name,
+        outcome="paused" if engine.core.held and engine.outcome == "running" else engine.outcome,
         duration_s=now - engine.started_at if engine.core.started else 0.0,
         machine_s=time.monotonic(),
         nodes=nodes,

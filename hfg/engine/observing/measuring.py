@@ -7,9 +7,9 @@ exact. Stands on `meters` and `statistics`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import (
@@ -28,10 +28,9 @@ from hfg.engine.model.worker import (
 )
 from hfg.engine.observing.meters import Distribution, Meter
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
+from hfg.engine.runtime.callbacks import Edited
+from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.virtual import VirtualTimeLoop
-
-if TYPE_CHECKING:
-    from hfg.engine.runtime.engine import Engine
 
 __all__ = ["Measuring", "doing"]
 
@@ -92,11 +91,16 @@ class Measuring:
         self._before = self._marks
         for worker in self._workers():
             self._meter(worker)
+        engine.callbacks.pumped.append(self._pumped)
+        engine.callbacks.finished.append(self._end)
+        engine.callbacks.edited.append(self._refit)
         loop: Any = engine.loop
         if isinstance(loop, VirtualTimeLoop):
             loop.watchers.append(self._passed)
         else:
             self._timer = loop.call_later(_LOOK_EVERY_S, self._look, context=engine.context)
+        if engine.ended_how is not None:
+            self._end()
 
     def _workers(self) -> Iterator[Worker]:
         return (worker for worker in self._engine.all_workers() if worker.type is not None and worker.scope is None)
@@ -110,14 +114,14 @@ class Measuring:
                 specialise(worker)
         return meter
 
-    def refit(self, workers: Iterable[Worker]) -> None:
+    def _refit(self, edited: Edited) -> None:
         """These workers have other nodes now: from here on the code of those is measured."""
-        for worker in workers:
+        for worker in edited.workers:
             if worker.meter is not None:
                 worker.meter.refit()
                 specialise(worker)
 
-    def end(self) -> None:
+    def _end(self) -> None:
         """The run is over."""
         if self._ended_on_machine is not None:
             return
@@ -128,7 +132,7 @@ class Measuring:
         else:
             loop.watchers.remove(self._passed)
 
-    def pumped(self) -> None:
+    def _pumped(self) -> None:
         """A slice of the pump is over: twenty times a second what was measured is summed up."""
         if monotonic() >= self._fold_at:
             began = monotonic()

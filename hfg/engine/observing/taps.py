@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.rules.listening import find_listeners
 from hfg.engine.runtime import ports, relays
+from hfg.engine.runtime.callbacks import Edited
+from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.places import Ends, behind, edges_at, is_near, place_of
 from hfg.errors import GraphError, UsageError
 from hfg.graph.structure.edge import Edge as DrawnEdge
@@ -24,9 +26,6 @@ from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 from hfg.token import Token
-
-if TYPE_CHECKING:
-    from hfg.engine.runtime.engine import Engine
 
 __all__ = ["Tap", "Taps"]
 
@@ -135,6 +134,9 @@ class Taps:
         self._engine = engine
         self._buffers: dict[_Buffer, tuple[Any, list[tuple[Any, Look]]]] = {}  # what each looks at, and where that is
         self._looks: dict[Any, list[Look]] = {}  # by edge, event, or (worker, slot) for edges still to come
+        engine.callbacks.finished.append(self._end)
+        engine.callbacks.edited.append(self._find_again)
+        engine.callbacks.joined.append(self._adopt)
 
     def add(self, what: Any, size: int | None, max_rate_hz: Any) -> Tap:
         """Begin to look at a port or an edge, given itself or by path.
@@ -155,17 +157,12 @@ class Taps:
             buffer.end()
         return Tap(buffer, max_rate_hz, partial(self._remove, buffer))
 
-    def find_again(self, swapped: Mapping[Any, Any], nodes: Set[Any]) -> None:
-        """The graph was edited: what is looked at may be elsewhere, or nowhere for now (R4).
-
-        Args:
-          swapped: nodes that were replaced, and by what.
-          nodes: at which something is not as it was.
-        """
+    def _find_again(self, edited: Edited) -> None:
+        """The graph was edited: what is looked at may be elsewhere, or nowhere for now (R4)."""
         for buffer, (where, _) in list(self._buffers.items()):
-            if not is_near(where, nodes):
+            if not is_near(where, edited.nodes):
                 continue
-            what = behind(where, swapped)
+            what = behind(where, edited.swapped)
             self._remove(buffer)
             try:
                 places = self._places(what)
@@ -180,13 +177,13 @@ class Taps:
             self._looks.setdefault(place, []).append(look)
             self._install(place)
 
-    def adopt(self, edge: Any) -> None:
+    def _adopt(self, edge: Any) -> None:
         """An edge into a slot was made while the graph runs: whoever looks at the slot looks at it too."""
         for look in self._looks.get((edge.target, edge.port_name), ()):
             self._looks.setdefault(edge, []).append(look)
             self._install(edge)
 
-    def end(self) -> None:
+    def _end(self) -> None:
         """The run is over."""
         for buffer in self._buffers:
             buffer.end()

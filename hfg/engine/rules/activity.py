@@ -48,7 +48,7 @@ def _call_hook(worker: Worker, name: str) -> None:
         if error is not None:
             worker.core.upstairs.fail(worker, f"{name}()", error, answer=False)
 
-    worker.core.host.execute_aside(worker, hook, done)
+    worker.core.code.execute_aside(worker, hook, done)
 
 
 def _time_out_later(worker: Worker, active: bool) -> None:

@@ -79,7 +79,7 @@ def call(worker: Worker) -> None:
         else:
             worker.core.upstairs.fail_call(worker, name, error)
 
-    core.host.execute(worker, handler, (token,), done)
+    core.code.execute(worker, handler, (token,), done)
 
 
 def await_call(worker: Worker, name: str, coroutine: Any) -> None:
@@ -91,7 +91,7 @@ def await_call(worker: Worker, name: str, coroutine: Any) -> None:
         else:
             worker.core.upstairs.fail_call(worker, name, error)
 
-    worker.core.host.drive(worker, coroutine, done)
+    worker.core.code.drive(worker, coroutine, done)
 
 
 def refuse_coroutine(worker: Worker, coroutine: Any) -> TypeError:

@@ -46,7 +46,7 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
         _ended(worker, None, None)
         return
     worker.busy = "ending"
-    core.host.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
+    core.code.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
 
 
 def drain_left(edges: Sequence[Any]) -> None:

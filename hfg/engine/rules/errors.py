@@ -96,7 +96,7 @@ def time_out(worker: Worker) -> None:
     limit = worker.options.max_duration_s
     what = f"firing {worker.firings}"
     worker.ticket += 1
-    worker.core.host.interrupt(worker)
+    worker.core.code.interrupt(worker)
     problem = FiringTimeout(worker.path, what, f"it took longer than max_duration_s = {limit:g} s and was given up")
     worker.failed += 1
     apply_policy(worker, problem, answer=True)

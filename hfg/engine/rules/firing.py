@@ -73,7 +73,7 @@ def _ask_ready(worker: Worker) -> None:
         else:
             idle_again(worker)
 
-    worker.core.host.execute(worker, hook, (), answered)
+    worker.core.code.execute(worker, hook, (), answered)
 
 
 def fire(worker: Worker) -> None:
@@ -235,7 +235,7 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
             call = partial(_open, worker, step)
         else:
             call, arguments = step, (worker.generator,)
-    worker.core.host.execute(worker, call, arguments, when_done(worker))
+    worker.core.code.execute(worker, call, arguments, when_done(worker))
 
 
 def _open(worker: Worker, step: Callable[[Any], Any]) -> Any:
@@ -274,7 +274,7 @@ def complete_firing(worker: Worker, result: Any) -> None:
     """The process function ran to its end: its outputs leave together (F3)."""
     if type(result) is CoroutineType and not worker.group.threaded:
         # a plain function has called an async one, or a generator has yielded a call of one
-        worker.core.host.drive(worker, result, when_done(worker))
+        worker.core.code.drive(worker, result, when_done(worker))
         return
     try:
         if type(result) is CoroutineType:

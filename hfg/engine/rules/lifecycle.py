@@ -77,7 +77,7 @@ def _run_hook(worker: Worker, name: str, then: Then) -> None:
         problem.__cause__ = error
         then(problem)
 
-    worker.core.host.execute(worker, hook, (), done)
+    worker.core.code.execute(worker, hook, (), done)
 
 
 def set_up(worker: Worker, then: Then) -> None:
@@ -117,7 +117,7 @@ def tear_down(worker: Worker, then: Then) -> None:
     if close is None:  # none, or an iterator that has nothing to close
         closed(None, None)
     else:
-        worker.core.host.execute(worker, close, (), closed)
+        worker.core.code.execute(worker, close, (), closed)
 
 
 def disable(worker: Worker) -> None:

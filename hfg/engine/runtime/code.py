@@ -11,21 +11,18 @@ import contextlib
 import contextvars
 import inspect
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from types import CoroutineType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
-from hfg.engine.model.core import PENDING
+from hfg.engine.model.core import PENDING, Core
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.rules import errors
 from hfg.engine.rules.sending import trigger
 from hfg.engine.runtime.carrier import Carrier
 from hfg.engine.runtime.groups import Job
 from hfg.engine.runtime.virtual import VirtualTimeLoop
-
-if TYPE_CHECKING:
-    from hfg.engine.runtime.engine import Engine
 
 __all__ = ["CodeRunner", "answer", "whose_code"]
 
@@ -45,8 +42,29 @@ def answer(waiter: asyncio.Future[Any], value: Any) -> None:
         waiter.set_result(value)
 
 
+class _Pump(Protocol):
+    """What is told that code has come back: the engine."""
+
+    beside_work: int
+
+    def all_workers(self) -> Iterator[Worker]:
+        """Those inside iterations too."""
+
+    def guard(self, call: Callable[[], None]) -> None:
+        """Call something of ours; what it raises ends the run."""
+
+    def go_on(self) -> None:
+        """A callback of the loop is over: pump."""
+
+    def internal_fault(self, error: BaseException) -> None:
+        """A fault of ours ends the run."""
+
+    def kick(self) -> None:
+        """Something may be queued."""
+
+
 class CodeRunner:
-    """Runs the code of the nodes of one engine.
+    """Runs the code of the nodes of one engine; see `core.Code`.
 
     Attributes:
       given_up: carriers of firings that took too long, until their code has ended.
@@ -55,11 +73,13 @@ class CodeRunner:
       holds: work in threads for which virtual time stands still.
     """
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(
+        self, engine: _Pump, core: Core, loop: asyncio.AbstractEventLoop, context: contextvars.Context
+    ) -> None:
         self._engine = engine
-        self.loop = engine.loop
-        self.core = engine.core
-        self.context = engine.context
+        self.core = core
+        self.loop = loop
+        self.context = context
         self.given_up: set[Any] = set()
         self.aside: set[asyncio.Task[None]] = set()
         self.came_back = asyncio.Event()
@@ -67,7 +87,7 @@ class CodeRunner:
         self._early_signals: dict[int, list[Callable[[], None]]] = {}
 
     def execute(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
-        """See `Host`."""
+        """See `core.Code`."""
         if worker.group.threaded and not inspect.iscoroutinefunction(call):
             self._in_thread(worker, call, arguments, done)
             return
@@ -86,7 +106,7 @@ class CodeRunner:
             done(result, None)
 
     def drive(self, worker: Worker, coroutine: Any, done: Done) -> None:
-        """See `Host`."""
+        """See `core.Code`."""
         carrier = worker.carrier
         if carrier is None:
             carrier = worker.carrier = self.carrier(worker)
@@ -117,12 +137,12 @@ class CodeRunner:
             worker.limit_timer = self.core.after(options.max_duration_s, lambda: errors.time_out(worker))
 
     def begin(self, worker: Worker) -> None:
-        """See `Host`."""
+        """See `core.Code`."""
         worker.in_flight = True
         worker.core.in_flight += 1
 
     def late(self, worker: Worker, done: Done) -> Done:
-        """See `Host`."""
+        """See `core.Code`."""
         closing = self.core.over  # a hook of the teardown; what began before the end is not listened to after it
 
         def over(result: Any, error: BaseException | None) -> None:
@@ -213,7 +233,7 @@ class CodeRunner:
         self._engine.go_on()
 
     def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Done) -> None:
-        """See `Host`."""
+        """See `core.Code`."""
         try:
             result = call()
         except KeyboardInterrupt:
@@ -245,7 +265,7 @@ class CodeRunner:
         task.add_done_callback(self.aside.discard)
 
     def interrupt(self, worker: Worker) -> None:
-        """See `Host`."""
+        """See `core.Code`."""
         if not worker.in_flight:
             return
         job = worker.job

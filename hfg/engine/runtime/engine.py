@@ -12,31 +12,27 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from hfg.clock import current_clock
-from hfg.engine.editing.edits import Edits
-from hfg.engine.editing.pausing import Pausing
-from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.core import Core
+from hfg.engine.model.groups import Group
 from hfg.engine.model.policies import make_policy
 from hfg.engine.model.worker import TORN_DOWN, Worker
-from hfg.engine.observing.consumers import Consumers
-from hfg.engine.observing.measuring import Measuring
-from hfg.engine.observing.taps import Taps
 from hfg.engine.rules import quiet
 from hfg.engine.runtime import plan, rx
+from hfg.engine.runtime.callbacks import Callbacks
 from hfg.engine.runtime.code import CodeRunner, answer
-from hfg.engine.runtime.groups import Dispatching, Group, LoopGroup, SideGroup, ThreadGroup
-from hfg.engine.runtime.lifetime import Lifetime
+from hfg.engine.runtime.groups import Dispatching, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.runtime.settings import Settings
 from hfg.engine.runtime.upstairs import Deciders
 from hfg.engine.runtime.virtual import VirtualTimeLoop
-from hfg.errors import EngineInternalError, HfgError, NodeError, RunError
+from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
-from hfg.trace import TraceEvent
+from hfg.nodetype import Node
+from hfg.ports import EventPort
 
 __all__ = ["Engine"]
 
@@ -91,10 +87,10 @@ class Engine:
     Attributes:
       core: the state the deciding modules work on.
       epoch: what the run's clock is ahead of the machine's monotonic one; None: it follows another.
-      consumers: who listens to the trace.
-      taps: who looks at ports and edges.
-      measuring: what keeps statistics, from the first time somebody asks.
-      finished: done when the run is over and torn down; its result is the outcome, its exception what went wrong.
+      callbacks: what those who stand on the engine want to be told.
+      code: runs the nodes' code.
+      ending: set from the moment the run is over.
+      ended_how: its outcome, and what it failed with; None before.
       holds: people outside who may still bring something (R5).
       readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
       read_out: those whose END somebody has read.
@@ -110,9 +106,7 @@ class Engine:
         self.context = contextvars.copy_context()
         self.context.run(current_clock.set, self.now)
         self.core: Core = Core(self, Deciders())
-        self.consumers = Consumers(self._listen, self)
-        self.measuring: Measuring | None = None
-        self.taps = Taps(self)
+        self.callbacks = Callbacks()
         self.core.debug = settings.debug
         self.core.fast = settings.fast
         self.core.fuse_after = settings.fuse_after
@@ -128,31 +122,16 @@ class Engine:
         self._thread = threading.get_ident()
         self._ready_groups: deque[Dispatching] = deque()
         self.scheduler = rx.RunScheduler(self)
-        self.code = code = CodeRunner(self)
-        self.lifetime = Lifetime(self)
-        # the host's part that others do for it
-        self.execute = code.execute
-        self.drive = code.drive
-        self.begin = code.begin
-        self.late = code.late
-        self.execute_aside = code.execute_aside
-        self.interrupt = code.interrupt
-        self.trigger_wait = code.trigger_wait
-        self.start = self.lifetime.start
-        self.close = self.lifetime.close
+        self.code = CodeRunner(self, self.core, self.loop, self.context)
+        self.core.code = self.code
         self.groups = self._make_groups()
-        self.pausing = Pausing(self)
-        self.edits = Edits(self)
         self._loop_group = self.groups["loop"]
         self.started_at = 0.0
-        self._leave_by = float("inf")
         self.ended_at: float | None = None
         self._instant = -1.0
         self._instant_steps = 0
         self.beside_work = 0  # looks of the pump since work in a thread was begun or came in; counted in virtual time
         plan.build(self.core, flat, self.groups, loop=self._loop_group)
-        if settings.trace is not None:
-            self.consumers.add(settings.trace)
 
     # --- time -------------------------------------------------------------------------------------------------------
 
@@ -163,6 +142,10 @@ class Engine:
     def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> _Timer:
         """See `Host`."""
         return _Timer(self, when - self._epoch, callback, counts)
+
+    def soon(self, callback: Callable[[], None]) -> None:
+        """See `Host`."""
+        self.loop.call_soon(callback, context=self.context)
 
     # --- groups -----------------------------------------------------------------------------------------------------
 
@@ -177,6 +160,21 @@ class Engine:
     def all_workers(self) -> Iterator[Worker]:
         """Those inside iterations too."""
         return (worker for core in self.all_cores() for worker in core.workers)
+
+    def worker_of(self, node: Node | Graph) -> Worker:
+        """Find who runs a node, or what stands for the graph itself.
+
+        Raises:
+          UsageError: it is no node of this run.
+        """
+        if node is self.graph:
+            assert self.core.boundary is not None
+            return self.core.boundary
+        place = getattr(node, "_place", None)
+        worker = None if place is None else self.core.by_path.get(place.path)
+        if worker is None or worker.node is not node:
+            raise UsageError(f"{node!r} is no node of this run: its graph is another one, or it was never added")
+        return worker
 
     def _make_groups(self) -> dict[str, Group]:
         groups: dict[str, Group] = {}
@@ -259,8 +257,8 @@ class Engine:
         finally:
             core.pumping = False
             core.current = core.speaker = None
-        if self.measuring is not None:
-            self.measuring.pumped()
+        for call in self.callbacks.pumped:
+            call()
         if self.ended_how is not None:
             return
         if self._rests():
@@ -281,11 +279,19 @@ class Engine:
 
     def _rests(self) -> bool:
         """R3: paused, so nothing new starts: it is quiet when nothing is under way, but does not end by that."""
-        if self.pausing.paused:
-            if not self.pausing.is_under_way():
+        if self.core.held:
+            if not self.is_under_way():
                 self._answer_quiet()
-            self.pausing.rest()
-        return self.pausing.paused
+            for call in self.callbacks.rested:
+                call()
+        return self.core.held
+
+    def is_under_way(self) -> bool:
+        """Whether something comes to its end by itself; what iterates does not while its inside is held (R3, G4)."""
+        return any(
+            core.in_flight > sum(worker.in_flight for worker in core.workers if worker.iteration is not None)
+            for core in self.all_cores()
+        )
 
     def internal_fault(self, error: BaseException) -> None:
         """A fault of ours must end the run, not hang it."""
@@ -447,33 +453,12 @@ class Engine:
         self.holds -= 1
         self.kick()
 
-    def adopt_event(self, port: Any) -> None:
+    def adopt_event(self, port: EventPort[Any]) -> None:
         """Give an event the run's scheduler and thread (ARCHITECTURE §3)."""
         port._scheduler = self.scheduler
         port._thread = self._thread
 
     # --- the end ----------------------------------------------------------------------------------------------------
-
-    @property
-    def teardown_limit_s(self) -> float:
-        """X3: how long one node may take; when somebody wants to leave, what is left for all of them."""
-        return max(0.0, min(self.settings.teardown_limit_s, self._leave_by - time.monotonic()))
-
-    @property
-    def in_a_hurry(self) -> bool:
-        """Whether somebody wants to leave."""
-        return self._leave_by != float("inf")
-
-    def hurry(self) -> None:
-        """Somebody wants to leave: tear down what can be torn down in 1.5 s, for in two the process is to be over."""
-        if not self.in_a_hurry:
-            self._leave_by = time.monotonic() + 1.5
-            self.lifetime.hurry()
-
-    def leave_now(self) -> None:
-        """Somebody is tired of waiting: wait for nothing any more."""
-        self._leave_by = 0.0
-        self.lifetime.hurry()
 
     def finish(self, outcome: str, error: HfgError | None) -> None:
         """See `Host`."""
@@ -490,11 +475,9 @@ class Engine:
             if worker.room_waiters is not None:
                 for waiter in worker.room_waiters:
                     waiter()
-        if self.measuring is not None:
-            self.measuring.end()
-        self.taps.end()
+        for call in self.callbacks.finished:
+            call()
         self._answer_quiet()
-        self.pausing.rest()
         self.ending.set()
 
     @property
@@ -506,35 +489,3 @@ class Engine:
     def error(self) -> HfgError | None:
         """What the run failed with, if it did."""
         return None if self.ended_how is None else self.ended_how[1]
-
-    # --- the trace --------------------------------------------------------------------------------------------------
-
-    def measure(self) -> Measuring:
-        """Keep statistics, from now on if nobody has asked before."""
-        if self.measuring is None:
-            self.measuring = Measuring(self)
-            if self.ended_how is not None:
-                self.measuring.end()
-        return self.measuring
-
-    def looked_at_anew(self, workers: Sequence[Worker], swapped: Mapping[Any, Any], nodes: Set[Any]) -> None:
-        """The graph was edited: who looks at it finds its places again (R4).
-
-        Args:
-          workers: have another node.
-          swapped: nodes that were replaced, and by what.
-          nodes: at which something is not as it was, also those that are gone.
-        """
-        if self.measuring is not None:
-            self.measuring.refit(workers)
-        self.taps.find_again(swapped, nodes)
-        self.pausing.find_again(swapped, nodes)
-
-    def _listen(self, take: Callable[[TraceEvent], None] | None) -> None:
-        """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""
-        core = self.core
-        core.trace = take
-        core.speaker = None
-        if core.started:
-            for worker in core.workers:
-                specialise(worker)

@@ -14,41 +14,15 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
-from hfg.engine.model.policies import FairShare, Fifo, Policy
+from hfg.engine.model.groups import Group
+from hfg.engine.model.policies import Policy
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 
-__all__ = ["Dispatching", "Group", "Job", "LoopGroup", "SideGroup", "ThreadGroup"]
+__all__ = ["Dispatching", "Job", "LoopGroup", "SideGroup", "ThreadGroup"]
 
 
 _DISPATCH_STEPS = 16  # how much one group may do on the loop before others have their turn
-
-
-class Group:
-    """Nodes that never run at the same time.
-
-    Attributes:
-      push: takes in a worker that can move.
-      take: gives out what is to be stepped next.
-    """
-
-    threaded = False
-    held = False  # the run is paused: nobody of it moves
-
-    def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
-        self.name = name
-        self.policy = policy
-        self.push: Callable[[Worker], None] = policy.push
-        self.depth_first = isinstance(policy, Fifo)  # what a firing enables goes next (R2)
-        self.push_next: Callable[[Worker], None] = policy.push_next if isinstance(policy, Fifo) else policy.push
-        self.take: Callable[[], Any] = policy.popleft if isinstance(policy, Fifo) else policy.pop
-        self.fair = policy if isinstance(policy, FairShare) else None
-        self.clock = clock  # read only where time is shared
-
-    def charge(self, worker: Worker, busy_s: float) -> None:
-        """A worker has kept the group busy for so long."""
-        if self.fair is not None:
-            self.fair.charge(worker, busy_s)
 
 
 class LoopGroup(Group):

@@ -17,13 +17,13 @@ import asyncio
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from hfg.engine.runtime.engine import Engine
+from hfg.engine.runtime.lifetime import Lifetime
+from hfg.errors import HfgError
 
 __all__ = ["CtrlC"]
 
@@ -37,13 +37,15 @@ class CtrlC:
     Attributes:
       count: how often it was pressed.
       task: what it cancels; set by the task itself.
-      engine: runs what is cancelled.
+      lifetime: of the run that is cancelled.
+      error: what that run failed with.
     """
 
     def __init__(self) -> None:
         self.count = 0
         self.task: asyncio.Task[Any] | None = None
-        self.engine: Engine | None = None
+        self.lifetime: Lifetime | None = None
+        self.error: Callable[[], HfgError | None] = lambda: None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._noticed = threading.Event()
         self._over = threading.Event()
@@ -72,7 +74,7 @@ class CtrlC:
 
     def sentence(self, name: str) -> str:
         """What the user reads at the end."""
-        error = self.engine.error if self.engine is not None else None
+        error = self.error()
         return f'graph "{name}" was interrupted; ' + ("what came back is torn down" if error is None else str(error))
 
     def _pressed(self, _number: int, _frame: FrameType | None) -> None:
@@ -81,8 +83,8 @@ class CtrlC:
             raise KeyboardInterrupt
         self.count += 1
         if self.count > 1 or self.task is None or self._loop is None:
-            if self.engine is not None:
-                self.engine.leave_now()
+            if self.lifetime is not None:
+                self.lifetime.leave_now()
             raise KeyboardInterrupt
         threading.Thread(target=self._insist, name="hfg interrupt", daemon=True).start()
         self._loop.call_soon_threadsafe(self._cancel)

@@ -12,14 +12,16 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hfg.engine.model.core import Core, Timer
+from hfg.engine.model.core import Core, Host, Timer
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import errors, firing, quiet
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import put_outputs
 from hfg.engine.runtime import plan
 from hfg.engine.runtime.code import answer
+from hfg.errors import HfgError
 from hfg.graph.flat import FlatGraph
+from hfg.ports.events import EventPort
 from hfg.token import NO_MESSAGE, Marker
 
 __all__ = ["Iteration"]
@@ -28,18 +30,17 @@ __all__ = ["Iteration"]
 class _InnerHost:
     """The engine, as the inside sees it: the same, but it is told what is under way inside."""
 
-    def __init__(self, outer: Any, iteration: Iteration) -> None:
+    def __init__(self, outer: Host, iteration: Iteration) -> None:
         self._outer = outer
         self._iteration = iteration
-        self.now = outer.now
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._outer, name)
+    def now(self) -> float:
+        return self._outer.now()
 
     def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> Timer:
         """A timer of the inside keeps the inside from being quiet too."""
         if not counts:
-            return self._outer.call_at(when, callback, counts=False)  # type: ignore[no-any-return]
+            return self._outer.call_at(when, callback, counts=False)
         core = self._iteration.core
         core.timers += 1
 
@@ -48,13 +49,30 @@ class _InnerHost:
             callback()
             self._iteration.settle()
 
-        timer: Timer = self._outer.call_at(when, due)
-        return _InnerTimer(timer, core)
+        return _InnerTimer(self._outer.call_at(when, due), core)
 
     def kick(self) -> None:
         """Something inside may move, or the inside may be quiet now."""
         self._outer.kick()
         self._iteration.look_later()
+
+    def finish(self, outcome: str, error: HfgError | None) -> None:
+        self._outer.finish(outcome, error)
+
+    def soon(self, callback: Callable[[], None]) -> None:
+        self._outer.soon(callback)
+
+    def on_loop(self) -> bool:
+        return self._outer.on_loop()
+
+    def from_any_thread(self, call: Callable[[], None]) -> None:
+        self._outer.from_any_thread(call)
+
+    def bring_in(self, call: Callable[[], None]) -> None:
+        self._outer.bring_in(call)
+
+    def adopt_event(self, port: EventPort[Any]) -> None:
+        self._outer.adopt_event(port)
 
 
 class _InnerTimer:
@@ -80,8 +98,8 @@ class Iteration:
     def __init__(self, worker: Worker, flat: FlatGraph, groups: Any, loop: Any) -> None:
         self.worker = worker
         outer = worker.core
-        host: Any = _InnerHost(outer.host, self)
-        self.core = Core(host, outer.upstairs)
+        self.core = Core(_InnerHost(outer.host, self), outer.upstairs)
+        self.core.code = outer.code
         self.core.pumping = True  # whatever is queued inside kicks the pump by itself
         self.core.debug = outer.debug
         self.core.fast = False
@@ -133,7 +151,7 @@ class Iteration:
         self._elements = list(zip(*columns, strict=True))
         self._position = 0
         self._results = [[] for _ in self.worker.type.outputs]
-        self.worker.core.host.begin(self.worker)
+        self.worker.core.code.begin(self.worker)
         self._next()
 
     def _next(self) -> None:
@@ -161,8 +179,7 @@ class Iteration:
         """See at the loop's next pass whether the inside is quiet."""
         if not self.looks and self.worker.in_flight:
             self.looks = True
-            engine: Any = self.worker.core.host
-            engine.loop.call_soon(self._look, context=engine.context)
+            self.worker.core.host.soon(self._look)
 
     def _look(self) -> None:
         self.looks = False
@@ -173,9 +190,8 @@ class Iteration:
 
     async def looked(self) -> None:
         """Wait until it was seen whether the inside is quiet, and what follows has been done."""
-        engine: Any = self.worker.core.host
         while self.looks:
-            waiter: asyncio.Future[None] = engine.loop.create_future()
+            waiter: asyncio.Future[None] = asyncio.get_running_loop().create_future()
             self._waiters.append(waiter)
             await waiter
 

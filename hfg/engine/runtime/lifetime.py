@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import anyio
 
@@ -24,6 +24,7 @@ from hfg.engine.rules.sending import trigger
 from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime import ports as engine_ports
 from hfg.engine.runtime.code import answer
+from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.groups import ThreadGroup
 from hfg.engine.runtime.watchdog import Watch, watchdog
 from hfg.errors import HfgError, NodeError, TeardownError
@@ -31,19 +32,23 @@ from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.token import Token
 from hfg.trace import RunEnded, RunStarted
 
-if TYPE_CHECKING:
-    from hfg.engine.runtime.engine import Engine
-
 __all__ = ["Lifetime"]
 
 _LEAVING_S = 0.1  # how long a teardown that was cancelled may still take before the next one begins
 
 
 class Lifetime:
-    """Begins and ends the run of one engine."""
+    """Begins and ends the run of one engine.
 
-    def __init__(self, engine: Engine) -> None:
+    Attributes:
+      leaving: the teardowns of nodes that an edit took out; the end of the run waits for them.
+    """
+
+    def __init__(self, engine: Engine, last: Callable[[], Awaitable[None]]) -> None:
         self._engine = engine
+        self._last = last  # what is waited for when everything else is over
+        self._leave_by = float("inf")
+        self.leaving: set[asyncio.Task[None]] = set()
         self._was_set_up: dict[Worker, None] = {}
         self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
         self._watch: Watch | None = None
@@ -55,7 +60,7 @@ class Lifetime:
         engine = self._engine
         core = engine.core
         engine.started_at = engine.now()
-        self._watch = watchdog.watch(core, engine.settings.block_warning_s)
+        self._watch = watchdog.watch(core, engine.settings.block_warning_s, virtual=engine.virtual)
         if not await self._set_up_all(core):
             return
         if engine.settings.until_s is not None:
@@ -192,7 +197,7 @@ class Lifetime:
             await asyncio.wait({closing})
         except asyncio.CancelledError as error:
             cancelled = error
-            self._engine.hurry()
+            self.hurry()
             # A scope of anyio's that is cancelled cancels whatever is awaited in it, again and again, which would keep
             # the loop busy, and a virtual clock from moving on.
             with anyio.CancelScope(shield=True):
@@ -207,7 +212,7 @@ class Lifetime:
         engine = self._engine
         if engine.ended_how is None:
             engine.finish("cancelled", None)
-            engine.hurry()
+            self.hurry()
         assert engine.ended_how is not None
         core = engine.core
         outcome, error = engine.ended_how
@@ -215,9 +220,9 @@ class Lifetime:
         try:
             for dispose in self._disposables.values():
                 dispose()
-            if engine.edits.leaving:
+            if self.leaving:
                 with self._within_limit():
-                    await asyncio.wait(engine.edits.leaving)
+                    await asyncio.wait(self.leaving)
             stuck = await self._cancel_code()
             problems += stuck.values()
             for worker in reversed(self._was_set_up):
@@ -237,7 +242,7 @@ class Lifetime:
         engine.ended_how = (outcome, error)
         if core.trace is not None:
             core.trace(RunEnded(engine.now(), outcome))
-        await engine.consumers.end()
+        await self._last()
 
     def _let_go(self) -> None:
         """Whatever happened: nothing of the run goes on, and the graph is free."""
@@ -276,16 +281,35 @@ class Lifetime:
     @contextmanager
     def _within_limit(self) -> Iterator[None]:
         """Wait in it as long as a node may take for its teardown (X3); `hurry` moves the moment it is left at."""
-        limit_s = self._engine.teardown_limit_s
+        limit_s = self._limit_s
         self._engine.code.hold_no_longer_than(limit_s)
         with anyio.move_on_after(limit_s) as self._patience:
             yield
 
+    @property
+    def _limit_s(self) -> float:
+        """X3: how long one node may take; when somebody wants to leave, what is left for all of them."""
+        return max(0.0, min(self._engine.settings.teardown_limit_s, self._leave_by - time.monotonic()))
+
     def hurry(self) -> None:
-        """Somebody wants to leave: what is waited for now has less time from here on."""
+        """Somebody wants to leave: tear down what can be torn down in 1.5 s, for in two the process is to be over."""
+        if not self._in_a_hurry:
+            self._leave_within(1.5)
+
+    def leave_now(self) -> None:
+        """Somebody is tired of waiting: wait for nothing any more."""
+        self._leave_within(0.0)
+
+    @property
+    def _in_a_hurry(self) -> bool:
+        return self._leave_by != float("inf")
+
+    def _leave_within(self, seconds: float) -> None:
+        """What is waited for now has less time from here on."""
         engine = self._engine
-        engine.code.hold_no_longer_than(engine.teardown_limit_s)
-        self._patience.deadline = min(self._patience.deadline, engine.loop.time() + engine.teardown_limit_s)
+        self._leave_by = time.monotonic() + seconds
+        engine.code.hold_no_longer_than(self._limit_s)
+        self._patience.deadline = min(self._patience.deadline, engine.loop.time() + self._limit_s)
 
     async def _until_back(self, under_way: Callable[[], bool]) -> None:
         code = self._engine.code
@@ -323,7 +347,7 @@ class Lifetime:
         try:
             lifecycle.tear_down(worker, partial(answer, waiter))
         except KeyboardInterrupt:  # meant for this hook, which blocks; the others have their turn
-            engine.hurry()
+            self.hurry()
             return NodeError(worker.path, "teardown()", "it was interrupted")
         except BaseException as error:
             problem = NodeError(worker.path, "teardown()", error)
@@ -337,11 +361,11 @@ class Lifetime:
         if waiter.done():
             return waiter.result()
         limit = f"{engine.settings.teardown_limit_s:g}"
-        if engine.in_a_hurry:
+        if self._in_a_hurry:
             limit = f"{time.monotonic() - begun:.1f}"
         engine.code.interrupt(worker)
         if not worker.group.threaded:  # what it still has to do when it is cancelled comes before the next teardown
-            with anyio.move_on_after(min(_LEAVING_S, engine.teardown_limit_s)):
+            with anyio.move_on_after(min(_LEAVING_S, self._limit_s)):
                 await asyncio.wait({waiter})
         return NodeError(worker.path, "teardown()", f"it took longer than {limit} s and was given up")
 

@@ -11,10 +11,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hfg.engine.model.core import Core
+from hfg.engine.model.groups import Group
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import DISABLED, STARTING, UNWIRED, RunningEvent, Worker
 from hfg.engine.rules.wiring import is_live, rewire
-from hfg.engine.runtime.groups import Group
 from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat import Scope as FlatScope

@@ -48,7 +48,7 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     if worker.node is None:  # the graph's own `start`
         return event
     port = event.port = worker.node.ports.events[name]
-    host: Any = worker.core.host
+    host = worker.core.host
     if relayed:
         host.adopt_event(port)
         return event
@@ -62,7 +62,7 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         emit = slots.emitter(event)
         port.trigger = emit  # in place of the method, which would only call it
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
-    port._emit_wait = partial(host.trigger_wait, event)
+    port._emit_wait = partial(worker.core.code.trigger_wait, event)
     if worker.core.debug:
         port._emit, port._emit_wait = _checked(port, port._emit), _checked(port, port._emit_wait)
     host.adopt_event(port)
@@ -108,7 +108,7 @@ def bind_automatic(worker: Worker) -> None:
 
 def _from_thread(worker: Worker, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
     """F3: a signal from a thread leaves at the loop's next pass, in order and before the outputs of its firing."""
-    host: Any = worker.core.host
+    host = worker.core.host
     if host.on_loop():
         trigger(event, value, activity, stamp)
     else:
@@ -121,8 +121,7 @@ def bind_start(boundary: Worker, port: EventPort[None]) -> RunningEvent | None:
     if event is None and port._observers:
         event = boundary.events["start"] = RunningEvent(boundary, "start", port)
     if event is not None:
-        host: Any = boundary.core.host
-        host.adopt_event(port)
+        boundary.core.host.adopt_event(port)
     return event
 
 

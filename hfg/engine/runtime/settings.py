@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hfg.engine.observing.consumers import check_consumer
 from hfg.errors import UsageError
 from hfg.trace import TraceEvent
 
@@ -39,8 +38,6 @@ class Settings:
             raise UsageError(f"until_s must be seconds from 0 on, or None for no end, got {until_s!r}")
         if not _seconds(block_warning_s):
             raise UsageError(f"block_warning_s must be seconds, or 0 for never, got {block_warning_s!r}")
-        if trace is not None:
-            check_consumer(trace)
         if seed is not None and type(seed) is not int:
             raise UsageError(f"seed must be a whole number, got {seed!r}")
         self.debug = debug

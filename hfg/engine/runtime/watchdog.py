@@ -25,7 +25,7 @@ _LOGGER = logging.getLogger("hfg.engine")
 class Watch:
     """One run under watch."""
 
-    def __init__(self, core: Core, limit_s: float) -> None:
+    def __init__(self, core: Core, limit_s: float, *, virtual: bool) -> None:
         self.core = core
         self.limit_s = limit_s
         self.seen: tuple[int, int, int] | None = None
@@ -33,7 +33,7 @@ class Watch:
         self.warned: set[int] = set()
         self.slice = -1
         self.thread = threading.get_ident()
-        self.virtual: bool = core.host.epoch is None  # type: ignore[attr-defined]
+        self.virtual = virtual
 
     def look(self, now: float) -> bool:
         """Compare with the last look; any thread. Whether the loop is at work."""
@@ -84,9 +84,9 @@ class _Watchdog:
         self._wake = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def watch(self, core: Core, limit_s: float) -> Watch:
+    def watch(self, core: Core, limit_s: float, *, virtual: bool) -> Watch:
         """Begin to watch a run; a limit of 0 or less watches nothing."""
-        watch = Watch(core, limit_s)
+        watch = Watch(core, limit_s, virtual=virtual)
         with self._lock:
             self._watches.append(watch)
             if self._thread is None:

@@ -1,0 +1,43 @@
+"""A group of nodes, of which one runs at a time, and the queue of those that can move (rules R1, R2).
+
+What the deciding modules see of it; how the loop or a thread takes from the queue is in `runtime.groups`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from hfg.engine.model.policies import FairShare, Fifo, Policy
+
+if TYPE_CHECKING:
+    from hfg.engine.model.worker import Worker
+
+__all__ = ["Group"]
+
+
+class Group:
+    """Nodes that never run at the same time.
+
+    Attributes:
+      push: takes in a worker that can move.
+      take: gives out what is to be stepped next.
+    """
+
+    threaded = False
+    held = False  # the run is paused: nobody of it moves
+
+    def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
+        self.name = name
+        self.policy = policy
+        self.push: Callable[[Worker], None] = policy.push
+        self.depth_first = isinstance(policy, Fifo)  # what a firing enables goes next (R2)
+        self.push_next: Callable[[Worker], None] = policy.push_next if isinstance(policy, Fifo) else policy.push
+        self.take: Callable[[], Any] = policy.popleft if isinstance(policy, Fifo) else policy.pop
+        self.fair = policy if isinstance(policy, FairShare) else None
+        self.clock = clock  # read only where time is shared
+
+    def charge(self, worker: Worker, busy_s: float) -> None:
+        """A worker has kept the group busy for so long."""
+        if self.fair is not None:
+            self.fair.charge(worker, busy_s)
