@@ -52,7 +52,8 @@ def main() -> int:
     parser.add_argument("--engine", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.case:
-        print(json.dumps(here(*arguments.case.split(":", 1), arguments.size, arguments.engine)))
+        suite, _, case = arguments.case.partition(":")
+        print(json.dumps(here(suite, case, arguments.size, arguments.engine)))
         return 0
     unknown = [name for name in arguments.suites if name not in SUITES + OTHERS]
     if unknown:
@@ -87,7 +88,7 @@ def main() -> int:
 
 def chosen(named: Iterable[T], pattern: str | None) -> list[T]:
     """Those in whose name the pattern is found."""
-    return [one for one in named if re.search(pattern or "", one.name if isinstance(one, Goal) else one)]
+    return [one for one in named if re.search(pattern or "", getattr(one, "name", str(one)))]
 
 
 def progress(text: str) -> None:

@@ -59,13 +59,13 @@ def edit(edits: Sequence[commands.Command], length: int) -> float:
     return asyncio.run(main())
 
 
-BETWEEN = [
+BETWEEN: list[commands.Command] = [
     commands.Disconnect("n1.out", "n2.value"),
     commands.Add(TYPE, "another"),
     commands.Connect("n1.out", "another.value"),
     commands.Connect("another.out", "n2.value"),
 ]
-EDITS = {
+EDITS: dict[str, list[commands.Command]] = {
     "connect": [commands.Connect("n1.out", "spare.value")],
     "disconnect": [commands.Disconnect("n1.out", "n2.value")],
     "connect behind a subgraph": [commands.Connect("box.out", "spare.value")],

@@ -19,7 +19,7 @@ from typing import Any
 from benchmarks import bench_edits, bench_shape, rates, threaded, variants
 from benchmarks.goals import Goal, Side
 from benchmarks.measure import BEFORE, Case
-from benchmarks.ours import KINDS, Machine
+from benchmarks.ours import ASYNC, FUNCTION, SUSPENDING, Machine
 
 HOPS = 500_000
 LETTERS = 4_000
@@ -65,7 +65,7 @@ def peer(module: str, who: str, work: str, *made_with: Any) -> Callable[..., Any
 
 def flows() -> None:
     """Functions: chains, forks and joins, silence, an edge that could be active."""
-    function, tokens = KINDS[0], {length: HOPS // (length + 1) for length in (1, 10, 50)}
+    function, tokens = FUNCTION, {length: HOPS // (length + 1) for length in (1, 10, 50)}
     chain = {length: f"chain of {length}" for length in tokens}
     for length, count in tokens.items():
         name = chain[length]
@@ -109,11 +109,12 @@ def signals() -> None:
 def coroutines() -> None:
     """Async functions."""
     tokens = HOPS // 22
-    for kind, node, at_most in ((KINDS[2], "through", 0.2), (KINDS[3], "through_waiting", 1.0)):
+    for kind, node, at_most in ((ASYNC, "through", 0.2), (SUSPENDING, "through_waiting", 1.0)):
 
         def queues(count: int, node: str = node) -> dict[str, float]:
             module = import_module("benchmarks.peers.queues")
-            return module.Queues(getattr(module, node)).chain(10, count)
+            figures: dict[str, float] = module.Queues(getattr(module, node)).chain(10, count)
+            return figures
 
         ours = case(f"hfg, {kind.name}", partial(kind.chain, 10), tokens)
         theirs = case(f"asyncio.Queue(1), {kind.name}", queues, tokens)
@@ -124,8 +125,8 @@ def machines() -> None:
     """State machines of a few and of many states."""
     for states in (10, 100):
         ours = case(f"hfg, {states} states", Machine(states).step, LETTERS)
-        theirs = peer("with_transitions", "Transitions", "step", states)
-        theirs = case(f"transitions, {states} states", theirs, LETTERS, needs="transitions")
+        step = peer("with_transitions", "Transitions", "step", states)
+        theirs = case(f"transitions, {states} states", step, LETTERS, needs="transitions")
         goal(f"a letter to {states} states / transitions", ours, theirs, 1.0)
     goal("a letter to 100 states / to 10", "hfg, 100 states", "hfg, 10 states", 1.3)
 

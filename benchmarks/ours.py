@@ -226,11 +226,14 @@ class Machine(Participant):
         return meter.figures()
 
 
+FUNCTION = Kind("function", through)
+ASYNC = Kind("async that does not suspend", through_async)
+SUSPENDING = Kind("async that suspends once", through_waiting)
 KINDS: list[Kind | Fan | Outside] = [
-    Kind("function", through),
+    FUNCTION,
     Kind("class", Through),
-    Kind("async that does not suspend", through_async),
-    Kind("async that suspends once", through_waiting),
+    ASYNC,
+    SUSPENDING,
     Kind("event → slot", Relay, ends=end),
     Kind("event → input", Starter),
     Kind("output → slot and event → input in turn", Relay, through, ends=end),

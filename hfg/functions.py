@@ -61,6 +61,8 @@ class NodeFunction(Generic[P, R_co]):
       function: the function itself.
     """
 
+    __name__: str
+
     def __init__(self, function: Callable[..., R_co], node_class: type[Node]) -> None:
         self.function = function
         self._class = node_class

@@ -9,7 +9,9 @@ listens.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 
@@ -20,6 +22,7 @@ __all__ = [
     "ActivityLost",
     "CallEnded",
     "CallStarted",
+    "Consumer",
     "EditWaits",
     "ErrorRaised",
     "EventTriggered",
@@ -47,6 +50,10 @@ class TraceEvent(msgspec.Struct, frozen=True, tag=True):
     """Something happened at `time` (seconds on the run's clock)."""
 
     time: float
+
+
+Consumer: TypeAlias = Callable[[TraceEvent], Any] | list[TraceEvent] | deque[TraceEvent]
+"""Who takes the events of a run: a function of each, or a list to which they are appended."""
 
 
 class RunStarted(TraceEvent, frozen=True):

@@ -113,7 +113,7 @@ def test_the_function_itself_is_still_there() -> None:
 
 def test_calling_it_like_the_function_is_answered_with_where_the_function_is() -> None:
     with pytest.raises(TypeError) as caught:
-        blur(np.zeros((2, 2)))  # type: ignore[call-arg]
+        blur(np.zeros((2, 2)))  # type: ignore[arg-type, call-arg]
     assert str(caught.value) == "blur(...) makes a node; the function itself is blur.function"
     with pytest.raises(TypeError, match=r'blur has no parameter "image".*inputs are connected, not given here'):
         blur(image=3)  # type: ignore[call-arg]
@@ -131,7 +131,7 @@ def test_parameters_are_read_at_each_call() -> None:
     node = scale()
     call = node._process_call()
     assert call(3) == 6
-    node.factor = 5
+    node.factor = 5  # type: ignore[attr-defined]
     node.ports.parameters["offset"].value = 1
     assert call(3) == 16
 

@@ -84,10 +84,10 @@ def test_process_declares_ports_as_a_function_would() -> None:
     assert [(spec.name, spec.type) for spec in kind.outputs.values()] == [("out", int)]
     assert list(kind.parameters) == ["scale"]
     node = Count(scale=3)
-    assert node.scale == 3
+    assert node.scale == 3  # type: ignore[attr-defined]
     assert node._process_call()(2, 1) == 6
-    assert isinstance(Count.value, hfg.Input)
-    assert node.out is node.ports.outputs["out"]
+    assert isinstance(Count.value, hfg.Input)  # type: ignore[attr-defined]
+    assert node.out is node.ports.outputs["out"]  # type: ignore[attr-defined]
 
 
 def test_declared_inputs_meet_arguments_by_name_whatever_their_order() -> None:
@@ -196,9 +196,9 @@ def test_a_subclass_inherits_ports_and_may_say_process_anew() -> None:
     assert Looser._type.hooks == {"setup"}
     assert list(Renamed._type.inputs) == ["number"]
     assert Renamed._type.outputs["out"].type is str
-    assert Renamed().out.type is str
+    assert Renamed().out.type is str  # type: ignore[attr-defined]
     with pytest.raises(UsageError, match='node type renamed has no input "value"'):
-        _ = Renamed().value
+        _ = Renamed().value  # type: ignore[attr-defined]
 
 
 def test_ports_may_come_from_a_mixin_and_types_may_be_generic() -> None:

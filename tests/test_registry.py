@@ -34,7 +34,7 @@ def test_a_type_is_found_by_its_reference(kind: type[hfg.Node]) -> None:
 def test_a_module_is_imported_when_a_type_of_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "robot_parts.py").write_text("import hfg\nclass Arm(hfg.Node):\n    moved = hfg.Event()\n")
     monkeypatch.syspath_prepend(tmp_path)
-    assert registry.find("robot_parts:Arm").__name__ == "Arm"
+    assert registry.reference_of(registry.find("robot_parts:Arm")) == "robot_parts:Arm"
     del sys.modules["robot_parts"]
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime, timedelta
 
 import csp
@@ -40,13 +41,13 @@ def join(x: ts[int], y: ts[int]) -> ts[int]:
 
 
 @csp.node
-def sink(x: ts[int], take: object):
+def sink(x: ts[int], take: Callable[[int], None]) -> None:
     if csp.ticked(x):
         take(x)
 
 
 @csp.node
-def count(back: ts[int], meter: object) -> ts[int]:
+def count(back: ts[int], meter: Laps) -> ts[int]:
     """Count on whenever the last number is back."""
     with csp.alarms():
         begin: ts[bool] = csp.alarm(bool)

@@ -44,6 +44,11 @@ def relay(after: reactivex.Subject[int]) -> Callable[[int], None]:
     return take
 
 
+def first(pair: tuple[int, int]) -> int:
+    """The left one of two."""
+    return pair[0]
+
+
 class Reactivex(Participant):
     """Synchronous push."""
 
@@ -74,7 +79,7 @@ class Reactivex(Participant):
         meter = Arrivals(tokens)
         subject, left = mapped(1)
         right = subject.pipe(ops.map(through))
-        reactivex.zip(left, right).pipe(ops.map(lambda pair: pair[0])).subscribe(meter.take)
+        reactivex.zip(left, right).pipe(ops.map(first)).subscribe(meter.take)
         for value in range(tokens):
             subject.on_next(value)
         return meter.figures()

@@ -50,7 +50,7 @@ class ByHelper(Step):
 class ByKeywords(Step):
     def process(self, value: int | None, other: int | None) -> int:
         options = {"activity": 1}
-        self.done.trigger(1, **options)  # type: ignore[arg-type]
+        self.done.trigger(1, **options)
         return 1
 
 

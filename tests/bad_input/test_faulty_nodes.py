@@ -96,7 +96,7 @@ def test_the_users_frames_are_in_the_cause(fast: bool) -> None:
     ("state", "said"),
     [
         (hfg.State(threading.Lock()), "TypeError: cannot pickle '_thread.lock' object"),
-        (hfg.State(factory=3), "TypeError: 'int' object is not callable"),  # type: ignore[arg-type]
+        (hfg.State(factory=3), "TypeError: 'int' object is not callable"),  # type: ignore[call-overload]
     ],
 )
 def test_a_state_that_cannot_be_made_is_named(state: Any, said: str, fast: bool) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 import hfg
 from tests.bad_input.graphs import one, sentence
-from tests.semantics.nodes import Ear, Keep, Ringing, drive, forward, numbers, run
+from tests.semantics.nodes import Ear, Keep, Ringing, drive, forward, numbers, run, value_of
 
 # --- queues ---
 
@@ -188,7 +188,7 @@ def test_an_operator_that_raises_is_an_error_of_the_edge_by_the_consumers_policy
     def build(on_error: Any) -> tuple[hfg.Graph, Keep]:
         graph = hfg.Graph()
         source, sink = graph.add(Ringing(count=3)), graph.add(Keep(), on_error=on_error)
-        graph.connect(source.rang, sink.value, through=[operators.map(lambda token: 1 // (token.value - 2))])
+        graph.connect(source.rang, sink.value, through=[operators.map(lambda token: 1 // (value_of(token) - 2))])
         return graph, sink
 
     graph, _ = build("stop")

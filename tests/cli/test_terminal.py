@@ -123,7 +123,7 @@ def test_a_file_or_a_closed_stream_is_no_terminal(
     with (tmp_path / "file").open("w") as file:
         assert not is_terminal(screen, file)
     assert not is_terminal(file)
-    assert not is_terminal(None)
+    assert not is_terminal(None)  # type: ignore[arg-type]
 
 
 def test_no_color_is_heeded(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:

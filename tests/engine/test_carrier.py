@@ -146,11 +146,12 @@ def test_a_cancelled_firing_does_not_cancel_the_next() -> None:
         loop = asyncio.get_running_loop()
         carrier = Carrier(loop, "test", contextvars.copy_context())
         for cancel in (True, False):
-            over = loop.create_future()
-            assert (
-                carrier.start(suspending(), lambda result, error, over=over: over.set_result(error or result))
-                is PENDING
-            )
+            over: asyncio.Future[Any] = loop.create_future()
+
+            def done(result: Any, error: BaseException | None, over: asyncio.Future[Any] = over) -> None:
+                over.set_result(error or result)
+
+            assert carrier.start(suspending(), done) is PENDING
             if cancel:
                 carrier.cancel()
             outcomes.append(await over)

@@ -91,7 +91,7 @@ def test_the_short_ways_tell_the_trace_what_the_general_way_tells(release: str) 
 
 
 def test_a_list_is_a_consumer_and_a_function_sees_the_same() -> None:
-    seen, kept, recorder = [], deque(maxlen=2), Recorder()  # type: ignore[var-annotated]
+    seen, kept, recorder = [], deque(maxlen=2), Recorder()
     hfg.run(chain(), clock="virtual", trace=seen)
     hfg.run(chain(), clock="virtual", trace=recorder)
     hfg.run(chain(), clock="virtual", trace=kept)
@@ -130,7 +130,7 @@ def test_several_consumers_see_the_same_and_one_that_raises_does_not_disturb(cap
 
 def test_an_async_consumer_has_a_buffer_and_sees_all_if_it_keeps_up() -> None:
     async def main() -> tuple[list[TraceEvent], list[TraceEvent], int]:
-        seen, slow = [], []  # type: ignore[var-annotated]
+        seen, slow = [], []
 
         async def consumer(event: TraceEvent) -> None:
             await asyncio.sleep(0)
@@ -149,7 +149,7 @@ def test_an_async_consumer_has_a_buffer_and_sees_all_if_it_keeps_up() -> None:
 
 def test_a_slow_async_consumer_loses_its_oldest_events_counted_and_the_graph_does_not_wait() -> None:
     async def main() -> tuple[int, list[TraceEvent], int, float]:
-        seen, slow = [], []  # type: ignore[var-annotated]
+        seen, slow = [], []
 
         async def consumer(event: TraceEvent) -> None:
             slow.append(event)

@@ -294,7 +294,7 @@ def test_nodes_inside_an_iteration_have_theirs() -> None:
 
     graph = hfg.Graph("each")
     each = graph.add(Each(), name="each", iterate_over=["value"])
-    graph.connect(graph.add(lists()).out, each.value)
+    graph.connect(graph.add(lists()).out, each.ports.inputs["value"])
     statistics = final(graph)
     assert statistics.nodes["each/one"].firings == 4
     assert statistics.nodes["each/one"].busy.count == 4
@@ -405,6 +405,6 @@ def test_joins_and_forks_are_measured_without_losing_their_short_ways() -> None:
         graph.connect(node.out, port)
     graph.connect(join.out, graph.add(end()).value)
     statistics = final(graph)
-    node = statistics.nodes["add"]
-    assert node.processed == 500
-    assert BATCH <= node.busy.count == node.latency.count < 500
+    found = statistics.nodes["add"]
+    assert found.processed == 500
+    assert BATCH <= found.busy.count == found.latency.count < 500

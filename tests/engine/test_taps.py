@@ -291,8 +291,8 @@ def test_a_tap_inside_an_iteration_sees_the_elements() -> None:
         graph = hfg.Graph("iterating")
         keys, results = graph.input("keys", list[int]), graph.output("results", list[int])
         each = graph.add(Each(), name="each", iterate_over=["value"])
-        graph.connect(keys, each.value)
-        graph.connect(each.out, results)
+        graph.connect(keys, each.ports.inputs["value"])
+        graph.connect(each.ports.outputs["out"], results)
 
         async def feed(run: Run) -> None:
             async with run.feed(keys) as into:

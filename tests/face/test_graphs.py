@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import types
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import pytest
@@ -344,7 +345,7 @@ def test_public_names_of_a_node_are_the_reserved_ones_and_no_others() -> None:
     assert {name for name in dir(hfg.Node) if not name.startswith("_")} == set(RESERVED)
 
 
-PORTS = {
+PORTS: dict[str, Callable[[], object]] = {
     "input": lambda: hfg.Input(int),
     "output": lambda: hfg.Output(int),
     "event": lambda: hfg.Event(int),
@@ -356,8 +357,9 @@ PORTS = {
 @pytest.mark.parametrize("kind", PORTS)
 @pytest.mark.parametrize("name", RESERVED)
 def test_reserved_name_is_refused_where_it_is_declared(name: str, kind: str) -> None:
+    declared = PORTS[kind]()
     with pytest.raises(hfg.errors.DeclarationError) as error:
-        type(hfg.Node)("Wrong", (hfg.Node,), {name: PORTS[kind]()})
+        types.new_class("Wrong", (hfg.Node,), exec_body=lambda body: body.update({name: declared}))
     assert f'"{name}"' in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -398,7 +400,7 @@ def test_init_is_not_overridden() -> None:
 
 def test_calling_a_function_node_like_its_function_is_answered() -> None:
     with pytest.raises(TypeError, match=r"^blur\(\.\.\.\) makes a node; the function itself is blur\.function$"):
-        blur(3)
+        blur(3)  # type: ignore[call-arg]
     assert blur.function(3) == 30
 
 

@@ -6,6 +6,7 @@ Here and in the files beside, what stands under "as written" is a line of the pr
 from __future__ import annotations
 
 import asyncio
+import types
 from collections.abc import AsyncIterator, Iterator
 from typing import Annotated, Any, NamedTuple
 
@@ -81,7 +82,7 @@ class MapLookup(hfg.Node):
 
     def setup(self) -> None: ...
 
-    def process(self, key, map):  # noqa: A002
+    def process(self, key, map):  # type: ignore[no-untyped-def]  # noqa: A002 - as many will write it
         if map and key in map:
             self.pose.send(map[key])  # with one output, returning the value does the same
         else:
@@ -257,8 +258,8 @@ def test_library_function_without_words_is_answered_with_the_call_to_write(funct
 def test_state_is_set_afresh_for_each_run() -> None:
     node = Count()
     graph = hfg.Graph()
-    graph.connect(graph.add(numbers(count=3)).out, graph.add(node).value)
-    graph.connect(node.out, graph.output("totals", int))
+    graph.connect(graph.add(numbers(count=3)).out, graph.add(node).ports.inputs["value"])
+    graph.connect(node.ports.outputs["out"], graph.output("totals", int))
     assert hfg.run(graph, clock="virtual").outputs["totals"] == [1, 2, 3]
     assert hfg.run(graph, clock="virtual").outputs["totals"] == [1, 2, 3]
 
@@ -381,7 +382,9 @@ def test_hook_may_be_def_or_async(hook: str, is_async: bool) -> None:
         await asyncio.sleep(0.01)
         return plain(self)
 
-    hooked = type(Body)("Hooked", (Body,), {hook: waiting if is_async else plain})
+    hooked = types.new_class(
+        "Hooked", (Body,), exec_body=lambda body: body.update({hook: waiting if is_async else plain})
+    )
     graph = hfg.Graph()
     node = graph.add(hooked(), active_for_s=1.0)
     graph.connect(graph.add(numbers(count=3), max_rate_hz=1).out, node.value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -125,7 +126,9 @@ def test_ready_that_raises_is_not_asked_without_end(on_error: Any, is_async: boo
     async def ready_later(self: Any) -> bool:
         return ready(self)
 
-    unsure = type(Unsure)("Unsure", (Unsure,), {"ready": ready_later if is_async else ready})
+    unsure = types.new_class(
+        "Unsure", (Unsure,), exec_body=lambda body: body.update(ready=ready_later if is_async else ready)
+    )
     graph = hfg.Graph()
     node = graph.add(unsure(), on_error=on_error, restart_limit=2)
     graph.connect(graph.add(numbers()).out, node.value)
@@ -152,7 +155,7 @@ def test_code_that_raises_what_is_no_exception_does_not_hang(error: type[BaseExc
     graph = hfg.Graph()
     graph.group("thread", threads=1)
     node = graph.add(Odd(), group=where)
-    graph.connect(graph.add(numbers()).out, node.value)
+    graph.connect(graph.add(numbers()).out, node.ports.inputs["value"])
     leaves = where == "loop" and error is KeyboardInterrupt
     with pytest.raises(error if leaves else hfg.errors.NodeError, match="odd"):
         hfg.run(graph, clock="virtual")

@@ -297,7 +297,7 @@ def test_run_ends_behind_the_last_value_that_a_slow_reader_takes(drive: Any) -> 
 
 
 def test_two_readers_share_out_the_values_and_a_late_one_finds_the_end(drive: Any) -> None:
-    async def main() -> list[list[int]]:
+    async def main() -> None:
         graph = counting(count=6)
         async with hfg.running(graph) as run:
 
@@ -329,14 +329,15 @@ def test_output_that_nobody_reads_stalls_a_run_that_waits_for_its_end(drive: Any
 def test_feed_and_read_take_ports_of_the_graph_and_nothing_else(fetch: Fetch, drive: Any) -> None:
     async def main() -> None:
         async with hfg.running(fetch.graph) as run:
+            wrong: Any
             for wrong in (fetch.lookup.key, fetch.poses, "key", None, 3):
                 with pytest.raises(hfg.errors.UsageError, match=r'is no input of graph "fetch", which has "keys"'):
                     run.feed(wrong)
             for wrong in (fetch.lookup.pose, fetch.keys, "pose", None):
                 with pytest.raises(hfg.errors.UsageError, match=r'is no output of graph "fetch", which has "poses"'):
                     run.read(wrong)
-            assert run.feed("keys")
-            assert run.read("poses")
+            assert run.feed("keys") is not None
+            assert run.read("poses") is not None
 
     drive(main())
 

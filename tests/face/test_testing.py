@@ -43,7 +43,7 @@ def drive(goal: Pose) -> None: ...
 class First(hfg.Node):
     """Leans on the order in which two sources fire, which nobody promised."""
 
-    first = hfg.State(None)
+    first: hfg.State[str | None] = hfg.State(None)
 
     @hfg.slot
     def left(self, value: int) -> None:

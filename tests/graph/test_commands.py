@@ -13,10 +13,10 @@ import hfg
 from hfg import commands as c
 from hfg.errors import GraphError, HfgError, UsageError
 from hfg.graph.flat import flatten
-from hfg.registry import reference_of
 from hfg.testing.edits import drawn, random_edit
 from hfg.testing.making import Allowed, SeededChooser, random_plan
 from hfg.testing.nodes import Counter, Scaled, Tally, add, double, script, sink
+from tests.semantics.nodes import named
 
 SEQUENCES = 60  # of 20 edits each; runs are edited in tests/semantics/test_edits.py
 
@@ -417,8 +417,8 @@ class Limited(hfg.Node):
     ("type_", "given", "sentence"),
     [
         ("hfg.testing.nodes:double", {}, 'double, which has no parameter "factor", and that is in use'),
-        (reference_of(Limited), {}, 'with its parameters as they are: "factor" must be <= 5, got 7'),
-        (reference_of(Limited), {"factor": 2}, '"box.factor" cannot stand for "box/inner.factor": must be <= 5, got 7'),
+        (named(Limited), {}, 'with its parameters as they are: "factor" must be <= 5, got 7'),
+        (named(Limited), {"factor": 2}, '"box.factor" cannot stand for "box/inner.factor": must be <= 5, got 7'),
     ],
 )
 def test_a_node_whose_parameter_is_promoted_is_replaced_by_one_that_can_take_it(
@@ -431,7 +431,7 @@ def test_a_node_whose_parameter_is_promoted_is_replaced_by_one_that_can_take_it(
         graph.edit(c.Replace("box/inner", type_, given))
     assert sentence in str(refused.value)
     assert drawn(graph) == before
-    graph.edit(c.SetParameter("box.factor", 3), c.Replace("box/inner", reference_of(Limited)))
+    graph.edit(c.SetParameter("box.factor", 3), c.Replace("box/inner", named(Limited)))
     graph.edit(c.SetParameter("box.factor", 4))
     assert graph["box/inner"].factor == 4
 

@@ -124,7 +124,7 @@ def test_subgraph_does_not_process() -> None:
 def test_options_about_firings_are_refused_on_a_subgraph(graph: Graph) -> None:
     for options in ({"max_rate_hz": 3.0}, {"on_error": "skip"}, {"priority": 1}, {"release": "pipelined"}):
         with pytest.raises(GraphError, match=f"{next(iter(options))} means nothing"):
-            graph.add(FollowPerson(), **options)  # type: ignore[arg-type]
+            graph.add(FollowPerson(), **options)
     graph.add(FollowPerson(), group="vision", active_for_s=5.0, enabled=False)
     assert list(graph.nodes) == ["follow_person"]
 

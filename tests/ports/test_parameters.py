@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import annotated_types as at
@@ -57,11 +58,12 @@ def test_limits_are_checked_on_every_set_and_the_old_value_stays() -> None:
     port = node.ports.parameters["gain"]
     assert port.value == 0.75
     port.value = 1.0
-    for refuse in (
+    attempts: list[Callable[[], None]] = [
         lambda: setattr(node, "gain", 3),
         lambda: setattr(port, "value", 3),
         lambda: node._set_parameter("gain", 3),
-    ):
+    ]
+    for refuse in attempts:
         with pytest.raises(ValueError, match=r'parameter "filter\.gain" must be <= 1, got 3'):
             refuse()
     assert node.gain == 1.0
@@ -140,7 +142,7 @@ def test_a_parameter_without_default_must_be_given() -> None:
 
     assert scale(factor=2)._process_call()(3) == 6
     with pytest.raises(TypeError, match='scale needs a value for its parameter "factor"'):
-        scale()  # type: ignore[call-overload]
+        scale()  # type: ignore[call-arg]
 
 
 def test_none_as_default_allows_none() -> None:

@@ -6,9 +6,11 @@ import asyncio
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Iterator
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import hfg
+from hfg.functions import NodeFunction
+from hfg.registry import reference_of
 from hfg.trace import ActivityChanged, FiringStarted, TokenSent, TraceEvent
 
 T = TypeVar("T")
@@ -58,6 +60,18 @@ def firings(trace: Iterable[TraceEvent], node: str) -> list[str]:
 def activity(trace: Iterable[TraceEvent], node: str) -> list[bool]:
     """Each change of A(v)."""
     return [event.active for event in trace if isinstance(event, ActivityChanged) and event.node == node]
+
+
+def value_of(token: Any) -> Any:
+    """What is in a token; operators do not know that they are given tokens."""
+    return token.value
+
+
+def named(kind: type[hfg.Node] | NodeFunction[..., Any]) -> str:
+    """The reference by which a type is found again."""
+    reference = reference_of(kind)
+    assert reference is not None
+    return reference
 
 
 def of_kind(trace: Iterable[TraceEvent], *kinds: type[T]) -> list[T]:
@@ -271,6 +285,7 @@ class Keep(hfg.Node):
 class KeepTokens(hfg.Node):
     """Keeps whole tokens."""
 
+    value = hfg.Input(object)
     tokens = hfg.State(factory=list)
 
     def process(self, value: hfg.Token[object]) -> None:
@@ -288,7 +303,7 @@ class Ear(hfg.Node):
     @hfg.slot
     def hear(self, value: object) -> None:
         self.heard.append(value)
-        self.passed.trigger(value)
+        self.passed.trigger(cast(int, value))
 
     @hfg.slot
     def begin(self) -> None:

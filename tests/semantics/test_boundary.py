@@ -266,7 +266,7 @@ def test_the_barriers_of_a_node_can_be_waited_for(fast: bool) -> None:
         graph = hfg.Graph()
         slow = graph.add(forward_later())
         source = graph.add(Late())
-        graph.connect(source.out, slow.value)
+        graph.connect(source.ports.outputs["out"], slow.value)
         story = []
         async with hfg.running(graph, fast=fast) as run:
             await run.wait_inputs(slow)

@@ -255,7 +255,7 @@ class Speaks(hfg.Node):
 def test_a_handler_that_gives_back_a_coroutine_is_awaited_before_the_next_call(fast: bool) -> None:
     graph = hfg.Graph()
     speaks, node = graph.add(Speaks()), graph.add(Delegates())
-    graph.connect(graph.add(numbers(count=3)).out, speaks.value)
+    graph.connect(graph.add(numbers(count=3)).out, speaks.ports.inputs["value"])
     graph.connect(speaks.said, node.hear)
     report = run(graph, fast)
     assert node.heard == [1, 2, 3]

@@ -11,11 +11,11 @@ import pytest
 import hfg
 from hfg import commands as c
 from hfg.errors import NodeError, UsageError
-from hfg.registry import reference_of
 from hfg.testing import Recorder, recorder
 from hfg.testing.edits import drawn
 from hfg.testing.nodes import Waiting, script, sink
 from hfg.trace import NodeEnabled, ParameterSet
+from tests.semantics.nodes import named
 
 LOG: list[str] = []
 REFUSES: set[str] = set()
@@ -124,9 +124,9 @@ def drive(graph: hfg.Graph, body: Callable[[hfg.Run], Awaitable[Any]]) -> Record
 @pytest.mark.parametrize(
     ("edits", "seen"),
     [
-        ((c.Add(reference_of(Device), "new"), c.SetParameter("new.gain", 5)), "open 5"),
-        ((c.Replace("device", reference_of(Other)), c.SetParameter("device.gain", 6)), "open other 6"),
-        ((c.SetParameter("device.gain", 7), c.Replace("device", reference_of(Other))), "open other 7"),
+        ((c.Add(named(Device), "new"), c.SetParameter("new.gain", 5)), "open 5"),
+        ((c.Replace("device", named(Other)), c.SetParameter("device.gain", 6)), "open other 6"),
+        ((c.SetParameter("device.gain", 7), c.Replace("device", named(Other))), "open other 7"),
     ],
 )
 def test_a_node_is_set_up_with_the_parameters_of_the_whole_edit(edits: tuple[c.Command, ...], seen: str) -> None:
@@ -193,7 +193,7 @@ def test_a_node_whose_teardown_fails_is_replaced_and_the_failure_told_at_the_end
     async def body(run: hfg.Run) -> None:
         await asyncio.sleep(0.002)
         REFUSES.add("close")
-        await run.edit(c.Replace("device", reference_of(Other)))
+        await run.edit(c.Replace("device", named(Other)))
         REFUSES.clear()
         await run.wait_finished()
         assert ["it hangs" in error for error in run.report().errors] == [True]
@@ -211,7 +211,7 @@ def test_a_node_whose_successor_cannot_be_set_up_is_set_up_again() -> None:
         await asyncio.sleep(0.002)
         REFUSES.add("other")
         with pytest.raises(NodeError, match="no such device"):
-            await run.edit(c.Replace("device", reference_of(Other)))
+            await run.edit(c.Replace("device", named(Other)))
         assert drawn(graph) == before
         await run.wait_finished()
 
@@ -226,7 +226,7 @@ def test_a_run_fails_if_neither_the_successor_nor_the_node_itself_can_be_set_up(
         await asyncio.sleep(0.002)
         REFUSES.update({"other", "open"})
         with pytest.raises(NodeError, match="no such device"):
-            await run.edit(c.Replace("device", reference_of(Other)))
+            await run.edit(c.Replace("device", named(Other)))
         await run.wait_finished()
 
     with pytest.raises(NodeError, match='node "device" failed in setup'):
@@ -239,7 +239,7 @@ def test_an_edit_cancelled_while_it_replaces_a_node_sets_it_up_again() -> None:
         await asyncio.sleep(0.002)
         with pytest.raises(TimeoutError):
             async with asyncio.timeout(0.005):
-                await run.edit(c.Replace("device", reference_of(Other)))
+                await run.edit(c.Replace("device", named(Other)))
         await run.wait_finished()
 
     drive(line(), body)
@@ -299,7 +299,7 @@ def test_the_failing_teardown_of_a_removed_node_is_told_at_the_end() -> None:
 def test_a_setup_that_waits_for_an_edit_behind_its_own_is_told() -> None:
     async def body(run: hfg.Run) -> None:
         with pytest.raises(NodeError, match='"new" edits the graph in the middle of its code and would wait for ever'):
-            await run.edit(c.Add(reference_of(Restless), "new"))
+            await run.edit(c.Add(named(Restless), "new"))
         await run.edit(c.Rename("script", "first"))  # the turn is free
 
     drive(line(), body)

@@ -53,7 +53,7 @@ def calls_of(edit: Sequence[commands.Command], length: int) -> int:
                 await run.undo()
             finally:
                 sys.setprofile(None)
-            assert planned(run._engine) == planned_afresh(run._engine)  # type: ignore[attr-defined]
+            assert planned(run._engine) == planned_afresh(run._engine)
 
     asyncio.run(main())
     return count
@@ -93,6 +93,6 @@ def test_a_ring_that_edits_close_step_by_step_is_refused() -> None:
             await run.edit(commands.Connect("n3.out", "spare.value"))
             with pytest.raises(GraphError, match="ring of synchronous edges"):
                 await run.edit(commands.Connect("n1.out", "n2.value"))
-            assert planned(run._engine) == planned_afresh(run._engine)  # type: ignore[attr-defined]
+            assert planned(run._engine) == planned_afresh(run._engine)
 
     asyncio.run(main())

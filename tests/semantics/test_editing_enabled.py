@@ -11,7 +11,6 @@ import pytest
 import hfg
 from hfg import commands as c
 from hfg.errors import NodeError
-from hfg.registry import reference_of
 from hfg.testing import Recorder, recorder, replay
 from hfg.testing.edits import drawn
 from hfg.testing.nodes import Failing, Latch, Scaled, Waiting, add, ascript, double, script, sink
@@ -25,7 +24,7 @@ from hfg.trace import (
     StructureChanged,
     TokenDropped,
 )
-from tests.semantics.nodes import Farewell, Last
+from tests.semantics.nodes import Farewell, Last, named
 
 
 class Pair(hfg.Subgraph):
@@ -164,7 +163,7 @@ def test_an_edit_that_is_cancelled_while_it_sets_up_cancels_that_and_can_be_done
     graph = hfg.Graph()
     source = graph.add(script(values=(1, 2, 3, 4)), max_rate_hz=100.0)
     source >> graph.add(sink(), name="free")
-    edit: list[c.Command] = [c.Add(reference_of(Moody), "moody"), c.Connect("script.out", "moody.value")]
+    edit: list[c.Command] = [c.Add(named(Moody), "moody"), c.Connect("script.out", "moody.value")]
     if there:
         source >> graph.add(Moody(), name="moody", enabled=False)
         edit = [c.Enable("moody")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from typing import Any
 
 import pytest
 
@@ -43,7 +44,7 @@ def test_producers_neither_send_to_a_disabled_node_nor_wait_for_it(fast: bool) -
 
 @pytest.mark.rule("F10")
 def test_disabling_discards_and_counts_what_lies_on_inputs_and_in_slot_queues(fast: bool) -> None:
-    async def main() -> tuple[hfg.Report, list[object]]:
+    async def main() -> tuple[hfg.Statistics, list[object]]:
         graph = hfg.Graph()
         node, values, calls = graph.add(SlowBoth()), graph.add(Ear(), name="values"), graph.add(Ear(), name="calls")
         graph.connect(values.passed, node.value)
@@ -113,14 +114,15 @@ def test_untaken_tokens_on_the_outputs_of_a_disabled_node_are_discarded_its_sign
         graph.connect(graph.input("in", int), send.value)
         graph.connect(send.out, busy.a)
         graph.connect(never.passed, busy.b)
-        graph.connect(send.rang, graph.add(Lazy()).value)
+        lazy = graph.add(Lazy())
+        graph.connect(send.rang, lazy.value)
         async with hfg.running(graph, trace=trace.append) as run, run.feed("in", end=False) as feed:
             sending = asyncio.create_task(feed.send(1))
             await asyncio.sleep(0.1)
             await run.trigger(send.disable)
             await sending
             await asyncio.sleep(5)
-            return graph["lazy"].values
+            return lazy.values
 
     assert drive(main) == [1]
     dropped = [(event.edge, event.reason) for event in of_kind(trace, TokenDropped)]
@@ -156,7 +158,7 @@ class Box(hfg.Subgraph):
 
 @pytest.mark.rule("F10", "G2")
 def test_a_firing_under_way_is_finished_and_its_outputs_go_nowhere(fast: bool) -> None:
-    async def main() -> tuple[list[object], hfg.Report]:
+    async def main() -> tuple[list[object], hfg.Statistics]:
         graph = hfg.Graph()
         box, sink = graph.add(Box()), graph.add(Keep())
         graph.connect(graph.input("in", int), box.value)
@@ -256,7 +258,7 @@ def test_enable_works_by_an_edge_while_the_node_is_disabled(fast: bool) -> None:
 
 @pytest.mark.rule("F10", "A9")
 def test_reset_tears_down_and_sets_up_but_keeps_tokens_and_activity(fast: bool) -> None:
-    async def main() -> tuple[list[object], list[object], list[str]]:
+    async def main() -> tuple[list[Any], list[str], list[str]]:
         graph = hfg.Graph()
         node, source = graph.add(Resettable()), graph.add(Ear())
         graph.connect(source.passed, node.value)

@@ -150,7 +150,7 @@ def test_a_restarted_generator_begins_anew(fast: bool) -> None:
     Fragile.failed_once.clear()
     graph = hfg.Graph()
     source, sink = graph.add(Fragile(), on_error="restart"), graph.add(Keep())
-    graph.connect(source.out, sink.value)
+    graph.connect(source.ports.outputs["out"], sink.value)
     run(graph, fast)
     assert sink.values == [1, 2, 1, 2, 3]
 
@@ -160,7 +160,7 @@ def test_a_generator_that_failed_and_is_skipped_is_over_so_its_node_ends(fast: b
     Fragile.failed_once.clear()
     graph = hfg.Graph()
     source, sink = graph.add(Fragile(), on_error="skip"), graph.add(Keep())
-    graph.connect(source.out, sink.value)
+    graph.connect(source.ports.outputs["out"], sink.value)
     report = run(graph, fast)
     assert sink.values == [1, 2]
     assert report.nodes["fragile"].ended
@@ -300,7 +300,7 @@ def test_no_policy_gets_over_what_is_no_error(
     graph = hfg.Graph()
     graph.group("work", threads=1)
     node = graph.add(kind(where=where, problem=problem), name="node", group=group, on_error=on_error)
-    graph.connect(graph.add(numbers()).out, node.value)
+    graph.connect(graph.add(numbers()).out, node.ports.inputs["value"])
     graph.start.activates(node.hear)
     with pytest.raises(hfg.errors.NodeError, match='^node "node" failed in ') as raised:
         run(graph)

@@ -67,8 +67,8 @@ def iterated(
     graph = hfg.Graph()
     one, two, box = graph.add(Lists(lengths=a)), graph.add(Lists(lengths=b)), graph.add(Each(), **options)
     sums, odd = graph.add(Keep(), name="sums"), graph.add(Keep(), name="odds")
-    graph.connect(one.out, box.a)
-    graph.connect(two.out, box.b)
+    graph.connect(one.out, box.ports.inputs["a"])
+    graph.connect(two.out, box.ports.inputs["b"])
     graph.connect(box.sums, sums.value)
     graph.connect(box.odd, odd.value)
     report = run(graph, fast)
@@ -184,7 +184,7 @@ def test_other_inputs_repeat_and_feedback_inside_keeps_its_tokens(fast: bool) ->
     graph = hfg.Graph()
     values, offsets = graph.add(Lists(lengths=(3, 2))), graph.add(Tens())
     box, sink = graph.add(Repeats()), graph.add(Keep())
-    graph.connect(values.out, box.values)
+    graph.connect(values.out, box.ports.inputs["values"])
     graph.connect(offsets.out, box.offset)
     graph.connect(box.out, sink.value)
     run(graph, fast)
@@ -229,7 +229,7 @@ async def forward_later_once(value: int) -> int:
 def test_each_element_goes_to_quiet_before_the_next(fast: bool) -> None:
     graph = hfg.Graph()
     values, box, sink = graph.add(Lists(lengths=(3,))), graph.add(Signals()), graph.add(Timed())
-    graph.connect(values.out, box.values)
+    graph.connect(values.out, box.ports.inputs["values"])
     graph.connect(box.out, sink.value)
     run(graph, fast)
     assert sink.seen == [([1, 2, 3], 3)]
@@ -249,7 +249,7 @@ def test_an_error_inside_an_iteration_names_the_inner_node(fast: bool) -> None:
 
     graph = hfg.Graph()
     values, box, sink = graph.add(Lists()), graph.add(Fails(), name="box"), graph.add(Keep())
-    graph.connect(values.out, box.values)
+    graph.connect(values.out, box.ports.inputs["values"])
     graph.connect(box.out, sink.value)
     with pytest.raises(hfg.errors.NodeError, match='node "box/inner" failed in firing 2'):
         run(graph, fast)
@@ -264,9 +264,9 @@ def test_active_edges_sources_and_signals_over_the_border_are_refused() -> None:
     graph = hfg.Graph()
     values, box = graph.add(Lists()), graph.add(Each())
     with pytest.raises(hfg.errors.ConnectionError, match="iterates"):
-        graph.connect(values.out, box.a, active=True)
+        graph.connect(values.out, box.ports.inputs["a"], active=True)
     with pytest.raises(hfg.errors.ConnectionError, match="iterates"):
-        graph.connect(graph.add(RingsLists()).rang, box.a)
+        graph.connect(graph.add(RingsLists()).rang, box.ports.inputs["a"])
 
     class WithSource(hfg.Subgraph):
         iterate_over = ("values",)
@@ -278,7 +278,7 @@ def test_active_edges_sources_and_signals_over_the_border_are_refused() -> None:
 
     graph = hfg.Graph()
     values, other = graph.add(Lists()), graph.add(WithSource())
-    graph.connect(values.out, other.values)
+    graph.connect(values.out, other.ports.inputs["values"])
     with pytest.raises(hfg.errors.CheckFailed, match=r"numbers"):
         run(graph)
 

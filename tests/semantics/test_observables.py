@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 import reactivex
-from reactivex import Subject, operators
+from reactivex import Observable, Subject, operators
 
 import hfg
 from tests.semantics.nodes import (
@@ -22,6 +23,7 @@ from tests.semantics.nodes import (
     numbers,
     run,
     slow_numbers,
+    value_of,
 )
 
 
@@ -29,8 +31,8 @@ from tests.semantics.nodes import (
 def test_operators_see_tokens_and_lie_before_the_queue(fast: bool) -> None:
     graph = hfg.Graph()
     source, sink = graph.add(Burst(count=6)), graph.add(KeepTokens())
-    even = operators.filter(lambda token: token.value % 2 == 0)
-    times_ten = operators.map(lambda token: token.value * 10)
+    even = operators.filter(lambda token: value_of(token) % 2 == 0)
+    times_ten = operators.map(lambda token: value_of(token) * 10)
     graph.connect(source.rang, sink.value, through=[even, times_ten], capacity=2, overflow="drop_oldest")
     report = run(graph, fast)
     assert [token.value for token in sink.tokens] == [40, 60]
@@ -42,7 +44,7 @@ def test_what_comes_out_and_is_no_token_becomes_one_with_the_newest_stamp_that_w
     graph = hfg.Graph()
     source, send, sink = graph.add(slow_numbers(pause_s=2)), graph.add(Send(modifier=1)), graph.add(KeepTokens())
     graph.connect(source.out, send.value)
-    pairs = [operators.map(lambda token: token.value), operators.buffer_with_count(2)]
+    pairs = [operators.map(value_of), operators.buffer_with_count(2)]
     graph.connect(send.rang, sink.value, through=pairs)
     run(graph, fast)
     assert [(token.value, token.stamp, token.activity) for token in sink.tokens] == [([1, 2], 2, 0), ([3], 4, 0)]
@@ -62,7 +64,7 @@ def test_a_token_that_comes_out_keeps_its_stamp(fast: bool) -> None:
 def test_an_operator_of_time_runs_on_the_clock_of_the_run(fast: bool) -> None:
     graph = hfg.Graph()
     source, sink = graph.add(Burst(count=5)), graph.add(Timed())
-    graph.connect(source.rang, sink.value, through=[operators.delay(0.2), operators.map(lambda token: token.value)])
+    graph.connect(source.rang, sink.value, through=[operators.delay(0.2), operators.map(value_of)])
     report = run(graph, fast)
     assert sink.seen == [(number, 0.2) for number in range(1, 6)]
     assert report.duration_s == 0.2
@@ -72,7 +74,7 @@ def test_an_operator_of_time_runs_on_the_clock_of_the_run(fast: bool) -> None:
 def test_debounce_on_an_edge_lets_the_last_of_a_burst_through(fast: bool) -> None:
     graph = hfg.Graph()
     source, sink = graph.add(Burst(count=5)), graph.add(Timed())
-    graph.connect(source.rang, sink.value, through=[operators.debounce(0.2), operators.map(lambda token: token.value)])
+    graph.connect(source.rang, sink.value, through=[operators.debounce(0.2), operators.map(value_of)])
     assert run(graph, fast).outcome == "done"
     assert [value for value, _ in sink.seen] == [5]
 
@@ -81,7 +83,7 @@ def test_debounce_on_an_edge_lets_the_last_of_a_burst_through(fast: bool) -> Non
 def test_operators_give_out_what_they_hold_before_the_run_ends(fast: bool) -> None:
     graph = hfg.Graph()
     source, ear = graph.add(Burst(count=5)), graph.add(Ear())
-    threes = [operators.map(lambda token: token.value), operators.buffer_with_count(3)]
+    threes = [operators.map(value_of), operators.buffer_with_count(3)]
     graph.connect(source.rang, ear.hear, through=threes)
     run(graph, fast)
     assert ear.heard == [[1, 2, 3], [4, 5]]
@@ -106,7 +108,7 @@ def test_operators_complete_when_the_node_of_the_event_has_ended(fast: bool) -> 
         (operators.start_with(0), [0, 1, 2, 3]),
         (operators.retry(2), [1, 2, 3]),
         (operators.concat(reactivex.of(9)), [1, 2, 3, 9]),
-        (operators.map(lambda token: token.value), [1, 2, 3]),
+        (operators.map(value_of), [1, 2, 3]),
     ],
 )
 def test_operators_are_connected_before_the_first_signal(clock: Any, operator: Any, comes_out: list[int]) -> None:
@@ -122,7 +124,12 @@ def test_operators_are_connected_before_the_first_signal(clock: Any, operator: A
 def test_operators_that_begin_again_lose_nothing_in_between(fast: bool) -> None:
     graph = hfg.Graph()
     source, sink = graph.add(Burst(count=6)), graph.add(Keep())
-    pairs = [operators.take(2), operators.map(lambda token: token.value), operators.sum(), operators.repeat(3)]
+    pairs: list[Callable[[Observable[Any]], Observable[Any]]] = [
+        operators.take(2),
+        operators.map(value_of),
+        operators.sum(),
+        operators.repeat(3),
+    ]
     graph.connect(source.rang, sink.value, through=pairs)
     run(graph, fast)
     assert sink.values == [3, 7, 11]

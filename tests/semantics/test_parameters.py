@@ -12,9 +12,8 @@ import hfg
 from hfg import commands as c
 from hfg.errors import ConnectionError as EdgeRefused
 from hfg.errors import UsageError
-from hfg.registry import reference_of
 from hfg.trace import ParameterSet
-from tests.semantics.nodes import Keep, drive, numbers, of_kind, scale
+from tests.semantics.nodes import Keep, drive, named, numbers, of_kind, scale
 
 
 @hfg.node
@@ -279,7 +278,7 @@ def test_the_remedies_of_the_refusal_work(fast: bool) -> None:
     async def main() -> None:
         async with hfg.running(graph, fast=fast) as run:
             await asyncio.sleep(0.15)
-            await run.edit(c.Replace("function", reference_of(level), parameters={"v": 9.0}))
+            await run.edit(c.Replace("function", named(level), parameters={"v": 9.0}))
             run.set(graph["class.v"], 9.0)
             await asyncio.sleep(0.1)
             assert graph["from_function"].values == graph["from_class"].values == [1.0, 1.0, 9.0]

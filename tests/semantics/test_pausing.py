@@ -179,8 +179,8 @@ class DoublesAll(hfg.Subgraph):
 
     def build(self, graph: hfg.Graph) -> None:
         node = graph.add(Doubles())
-        graph.connect(self.value.inner, node.value)
-        graph.connect(node.out, self.out.inner)
+        graph.connect(self.value.inner, node.ports.inputs["value"])
+        graph.connect(node.ports.outputs["out"], self.out.inner)
 
 
 @hfg.node
@@ -200,7 +200,7 @@ def twos_in_ones() -> Iterator[list[list[int]]]:
 @pytest.mark.rule("R3", "G4")
 def test_waves_go_through_what_iterates_element_by_element() -> None:
     graph = hfg.Graph()
-    graph.connect(graph.add(threes()).out, graph.add(Doubles()).value)
+    graph.connect(graph.add(threes()).out, graph.add(Doubles()).ports.inputs["value"])
 
     async def act(run: Any) -> None:
         waves = [(await run.step()).moved for _ in range(4)]
@@ -219,7 +219,7 @@ def test_waves_go_through_what_iterates_element_by_element() -> None:
 @pytest.mark.rule("R3", "G3", "G4")
 def test_waves_and_steps_go_through_what_iterates_inside_of_what_iterates() -> None:
     graph = hfg.Graph()
-    graph.connect(graph.add(twos_in_ones()).out, graph.add(DoublesAll()).value)
+    graph.connect(graph.add(twos_in_ones()).out, graph.add(DoublesAll()).ports.inputs["value"])
 
     async def act(run: Any) -> None:
         inner, each = "doubles_all/doubles", "doubles_all/doubles/forward"
@@ -349,7 +349,7 @@ def test_what_cannot_be_done_is_one_sentence_and_the_run_goes_on() -> None:
         with pytest.raises(hfg.errors.UsageError, match="is no node of this run"):
             await run.step(Keep())
         with pytest.raises(hfg.errors.UsageError, match="when= takes a function of the token"):
-            run.break_at(node.out, when=3)  # type: ignore[arg-type]
+            run.break_at(node.out, when=3)
         with pytest.raises(hfg.errors.UsageError, match="look at a token|looks at a token"):
             run.break_at(node, when=bool)
         run.resume()

@@ -55,7 +55,7 @@ def loaded(policy: str, group: str = "loop", **options: Any) -> dict[str, float]
     for node in nodes:
         graph.connect(graph.add(ticks(), group=group).out, node.value)
     run(graph, until_s=3, **options)
-    return {node.place.name: len(node.begun) * node.cost_s for node in nodes if node.place is not None}
+    return {node.place.name: len(node.begun) * node.cost_s for node in nodes}
 
 
 # --- fair share ---
@@ -112,15 +112,16 @@ class Account:
 
 @pytest.mark.rule("R2")
 def test_who_comes_back_before_its_turn_was_charged_waits_for_those_it_owes() -> None:
-    policy, heavy, light = FairShare(), Account("heavy"), Account("light")
+    heavy, light = Account("heavy"), Account("light")
+    policy: Any = FairShare()
     for worker in (heavy, light):
-        policy.push(worker)  # type: ignore[arg-type]
+        policy.push(worker)
     served = []
     for _ in range(8):
         worker = policy.pop()
         served.append(str(worker))
         policy.push(worker)  # during its turn, as a slot that calls itself does
-        policy.charge(worker, 3.0 if worker is heavy else 1.0)  # type: ignore[comparison-overlap]
+        policy.charge(worker, 3.0 if worker is heavy else 1.0)
     assert served == ["heavy", "light", "light", "light", "heavy", "light", "light", "light"]
     assert len(policy) == 2
 
@@ -268,9 +269,9 @@ def test_the_deadline_is_that_of_what_comes_next_the_call_or_the_firing() -> Non
     call = _Waiting(placed=True, ahead=1, calls=[_Edge(5.0, 1.0)], live_inputs=[_Edge(3.0)])
     firing = _Waiting(placed=True, live_inputs=[_Edge(4.0), _Edge(9.0)])
     source = _Waiting(placed=True)
-    policy = EarliestDeadline()
+    policy: Any = EarliestDeadline()
     for worker in (source, call, firing):
-        policy.push(worker)  # type: ignore[arg-type]
+        policy.push(worker)
     assert [policy.pop() for _ in range(3)] == [firing, call, source]
 
 

@@ -80,7 +80,7 @@ def test_types_that_do_not_fit_are_refused_and_both_ports_named() -> None:
     graph = hfg.Graph()
     source, sink = graph.add(words()), graph.add(forward())
     with pytest.raises(hfg.errors.ConnectionError, match=r'"forward.value" expects int, "words.out" sends str'):
-        graph.connect(source.out, sink.value)  # type: ignore[misc]
+        graph.connect(source.out, sink.value)
     assert graph.edges == []
 
 
@@ -102,7 +102,7 @@ def test_a_queue_or_policy_on_a_synchronous_edge_is_refused() -> None:
     source, sink = graph.add(numbers()), graph.add(Keep())
     for options in ({"capacity": 3}, {"overflow": "drop_oldest"}, {"capacity_limit": 20}):
         with pytest.raises(hfg.errors.ConnectionError, match="hold one token and no queue"):
-            graph.connect(source.out, sink.value, **options)  # type: ignore[call-overload]
+            graph.connect(source.out, sink.value, **options)
 
 
 @pytest.mark.rule("P5")

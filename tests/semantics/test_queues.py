@@ -48,7 +48,7 @@ def mixed(policy: str, seed: int, place: int, release: str) -> dict[str, list[An
         nonlocal number
         number += 1
         group = "work" if (number * 7 + place) % 3 == 0 and not node._type.process_kind.startswith("async") else None
-        mode = release if release != "mixed" else ("sequential" if number % 2 else "pipelined")
+        mode: Any = release if release != "mixed" else ("sequential" if number % 2 else "pipelined")
         return graph.add(node, group=group, release=mode, priority=number % 4)
 
     source, holes, few = put(numbers(count=12)), put(gaps(count=12)), put(numbers(count=5))

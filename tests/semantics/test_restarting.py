@@ -9,7 +9,7 @@ import pytest
 from reactivex import operators as ops
 
 import hfg
-from tests.semantics.nodes import Ear, Keep, drive, numbers, run
+from tests.semantics.nodes import Ear, Keep, drive, numbers, run, value_of
 
 
 class Device(hfg.Node):
@@ -50,12 +50,12 @@ class Box(hfg.Subgraph):
         graph.connect(self.call.inner, graph.add(Ear()).hear)
 
 
-def life(*acts: tuple[float, str]) -> tuple[list[Any], list[Any], hfg.Report]:
+def life(*acts: tuple[float, str]) -> tuple[list[Any], list[Any], hfg.Statistics]:
     """Let the device fail at 1 s and do to its box what is said, at these moments; 2 is fed from the beginning."""
     Device.story.clear()
     Device.opened = 0
 
-    async def main() -> tuple[list[Any], hfg.Report]:
+    async def main() -> tuple[list[Any], hfg.Statistics]:
         graph = hfg.Graph()
         box, sink = graph.add(Box()), graph.add(Keep())
         graph.connect(graph.input("in", int), box.value)
@@ -139,7 +139,7 @@ def test_a_failure_beside_a_firing_waits_for_its_end_before_the_node_is_torn_dow
     graph = hfg.Graph()
     node, source = graph.add(Limited(), on_error="restart"), graph.add(numbers(count=1))
     graph.connect(source.out, node.ports.parameters["level"])
-    graph.connect(source.out, node.value)
+    graph.connect(source.out, node.ports.inputs["value"])
     run(graph, fast)
     assert Limited.story == ["begin", "end", "close", "close"]
 
@@ -204,7 +204,7 @@ def test_a_call_that_makes_an_operator_fail_is_over_before_its_node_is_restarted
     node, start = graph.add(TellsItself(), on_error="restart", restart_backoff_s=0.1), graph.add(Starter())
     graph.connect(graph.add(numbers(count=2), max_rate_hz=1).out, start.value)
     graph.connect(start.signal, node.say)
-    graph.connect(node.back, node.hear, through=[ops.map(lambda token: token.value / (token.value - 1))])
+    graph.connect(node.back, node.hear, through=[ops.map(lambda token: value_of(token) / (value_of(token) - 1))])
     report = run(graph, fast)
     assert TellsItself.story == ["up", "said 1", "down", "up", "said 2", "down"]
     assert report.nodes["tells_itself"].restarts == 1

@@ -9,6 +9,7 @@ import pytest
 
 import hfg
 from hfg import commands as c
+from hfg.graph.structure.options import Release
 from hfg.trace import CallEnded, CallStarted, FiringEnded, FiringStarted, TokenProcessed, TokenSent, TraceEvent
 from tests.semantics.nodes import (
     Ear,
@@ -127,7 +128,7 @@ def test_one_input_may_be_pipelined_and_another_sequential() -> None:
 
 @pytest.mark.rule("F5", "F7")
 @pytest.mark.parametrize("release", ["sequential", "pipelined"])
-def test_a_fork_that_joins_again_gives_the_same(release: hfg.Release, fast: bool) -> None:
+def test_a_fork_that_joins_again_gives_the_same(release: Release, fast: bool) -> None:
     graph = hfg.Graph()
     source, left = graph.add(gaps(count=6)), graph.add(forward(), name="left", release=release)
     right = graph.add(forward_later(), name="right", release=release)
@@ -144,7 +145,7 @@ def test_a_fork_that_joins_again_gives_the_same(release: hfg.Release, fast: bool
 @pytest.mark.rule("F6")
 @pytest.mark.parametrize(("release", "expected"), [("auto", [0, 1, 2]), ("pipelined", [0, 0, 1])])
 def test_an_edge_into_a_slot_is_free_when_the_call_is_over_or_pipelined_has_begun(
-    release: hfg.Release, expected: list[float]
+    release: Release, expected: list[float]
 ) -> None:
     graph = hfg.Graph()
     slow = graph.add(Slow(), release=release)
@@ -173,7 +174,7 @@ def test_an_edge_into_a_slot_is_free_when_the_call_is_over_or_pipelined_has_begu
     ],
 )
 def test_a_producer_runs_ahead_by_the_tokens_of_the_buffer(
-    buffer: int, release: hfg.Release, expected: list[float]
+    buffer: int, release: Release, expected: list[float]
 ) -> None:
     graph = hfg.Graph()
     source, slow = graph.add(numbers(count=5)), graph.add(forward_later(), release=release)
@@ -184,7 +185,7 @@ def test_a_producer_runs_ahead_by_the_tokens_of_the_buffer(
 @pytest.mark.rule("P4", "F5")
 @pytest.mark.parametrize("buffer", [1, 2, 3])
 @pytest.mark.parametrize("release", ["sequential", "pipelined"])
-def test_a_buffer_is_as_many_pipelined_relays_in_a_row(buffer: int, release: hfg.Release) -> None:
+def test_a_buffer_is_as_many_pipelined_relays_in_a_row(buffer: int, release: Release) -> None:
     """The definition of the rule: nobody can tell the two apart by when the source may send, or what arrives when."""
     short, long = hfg.Graph(), hfg.Graph()
     for graph in (short, long):
@@ -235,7 +236,7 @@ def test_activity_travels_with_its_token_through_a_buffer() -> None:
 
 @pytest.mark.rule("P4", "P7")
 @pytest.mark.parametrize("release", ["sequential", "pipelined"])
-def test_initial_tokens_and_a_buffer_add_up(release: hfg.Release) -> None:
+def test_initial_tokens_and_a_buffer_add_up(release: Release) -> None:
     """With d initial tokens and a buffer of n the producer goes on while at most d + n lie untaken."""
     graph = hfg.Graph()
     source, slow = graph.add(numbers(count=4)), graph.add(forward_later(), release=release)

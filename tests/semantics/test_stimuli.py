@@ -15,7 +15,7 @@ from tests.semantics.nodes import Keep, drive
 
 @pytest.mark.rule("P10", "F10", "A4", "A7", "A9", "A14", "P8")
 def test_what_comes_from_outside_has_the_same_effect() -> None:
-    run_state_machine_as_test(  # type: ignore[no-untyped-call]
+    run_state_machine_as_test(
         EngineAgainstOracle,
         settings=settings(
             max_examples=60,

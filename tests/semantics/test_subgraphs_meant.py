@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 import hfg
+from hfg.ports import OutputPort
 from hfg.testing import Recorder, recorder, replay
 from hfg.testing.nodes import Counter, Pulse, Relay, Script, Waiting, add, ascript, double, script, sink
 from hfg.trace import (
@@ -92,7 +93,7 @@ def of_kind(trace: Recorder, *kinds: type[TraceEvent]) -> list[TraceEvent]:
     return [event for event in trace if isinstance(event, kinds)]
 
 
-def clock(graph: hfg.Graph, *pauses_s: float) -> list[hfg.OutputPort[int]]:
+def clock(graph: hfg.Graph, *pauses_s: float) -> list[OutputPort[int]]:
     """Give outputs that speak once, each after its pause."""
     return [
         graph.add(ascript(values=(1,), pause_s=pause), name=f"at_{number}").out for number, pause in enumerate(pauses_s)

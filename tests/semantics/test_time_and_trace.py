@@ -66,7 +66,7 @@ def test_in_virtual_time_code_in_a_thread_sees_the_activity_with_which_it_began(
     graph = hfg.Graph()
     graph.group("work", threads=1)
     numbers, node = graph.input("numbers", int), graph.add(Looking(), group="work")
-    graph.connect(numbers, node.value)
+    graph.connect(numbers, node.ports.inputs["value"])
 
     async def main() -> list[bool]:
         async with hfg.running(graph) as run, run.feed(numbers) as feed:

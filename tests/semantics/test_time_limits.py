@@ -376,10 +376,10 @@ def test_generators_are_closed(fast: bool) -> None:
     Closes.closed = closed
     graph = hfg.Graph()
     source, node, sink = graph.add(Closes()), graph.add(forward()), graph.add(KeepTokens())
-    graph.connect(source.out, node.value)
+    graph.connect(source.ports.outputs["out"], node.value)
     graph.connect(node.out, sink.value)
     other = graph.add(fail_on(bad=2))
-    graph.connect(source.out, other.value)
+    graph.connect(source.ports.outputs["out"], other.value)
     with pytest.raises(hfg.errors.NodeError):
         run(graph, fast)
     assert closed == ["closed"]

@@ -94,7 +94,7 @@ class SendNone(hfg.Node):
     out = hfg.Output(int)
 
     def process(self, value: int) -> None:
-        self.out.send(None)  # type: ignore[arg-type]
+        self.out.send(None)
 
 
 @pytest.mark.rule("T2")
@@ -292,8 +292,8 @@ def test_silence_is_stamped_by_the_markers_if_no_value_was_taken() -> None:
     graph.connect(first.out, second.value)
     graph.connect(second.out, sink.value)
     trace = traced(graph)
-    first, last = tokens(trace, "slow_gaps.out -> forward.value")[0], tokens(trace, "forward_2.out -> keep.value")[0]
-    assert (last.value, last.stamp) == (NO_MESSAGE, first.stamp)
+    sent, last = tokens(trace, "slow_gaps.out -> forward.value")[0], tokens(trace, "forward_2.out -> keep.value")[0]
+    assert (last.value, last.stamp) == (NO_MESSAGE, sent.stamp)
 
 
 @hfg.node

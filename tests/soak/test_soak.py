@@ -61,7 +61,7 @@ def test_the_short_ways_do_the_same_as_the_general_way(block: int) -> None:
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
 def test_what_comes_from_outside_has_the_same_effect() -> None:
-    run_state_machine_as_test(  # type: ignore[no-untyped-call]
+    run_state_machine_as_test(
         EngineAgainstOracle,
         settings=settings(
             max_examples=max(1, GRAPHS // 40),

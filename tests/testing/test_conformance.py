@@ -71,9 +71,9 @@ def keep_activity(trace: Recorder) -> None:
 
 
 def carry_activity_where_none_is(trace: Recorder) -> None:
-    index = next(i for i, e in enumerate(trace) if isinstance(e, TokenSent) and e.edge.startswith("script"))
-    old = trace[index].token
-    trace[index] = TokenSent(trace[index].time, trace[index].edge, Token(old.value, 1, old.stamp, old.sequence))
+    sent = next(event for event in trace if isinstance(event, TokenSent) and event.edge.startswith("script"))
+    old = sent.token
+    trace[trace.index(sent)] = TokenSent(sent.time, sent.edge, Token(old.value, 1, old.stamp, old.sequence))
 
 
 def forget_an_end(trace: Recorder) -> None:
@@ -94,8 +94,8 @@ def end_otherwise(trace: Recorder) -> None:
 
 
 def let_time_pass(trace: Recorder) -> None:
-    index = first(trace, FiringStarted)
-    trace[index] = FiringStarted(5.0, trace[index].node, 1, "process")
+    started = next(event for event in trace if isinstance(event, FiringStarted))
+    trace[trace.index(started)] = FiringStarted(5.0, started.node, 1, "process")
 
 
 def stop_short(trace: Recorder) -> None:

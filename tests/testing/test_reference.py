@@ -10,6 +10,7 @@ import pytest
 import reactivex.operators as ops
 
 import hfg
+from hfg.graph.structure.options import Release
 from hfg.testing import ReferenceMachine, ReferenceReport, recorder, reference_run, replay
 from hfg.testing.nodes import (
     AsyncRelay,
@@ -106,7 +107,7 @@ def test_stamps_come_from_the_newest_value_that_was_taken() -> None:
 
 @pytest.mark.rule("P4", "F5")
 @pytest.mark.parametrize(("release", "held"), [("sequential", 1), ("pipelined", 2)])
-def test_a_synchronous_edge_holds_one_token_and_a_mode_says_until_when(release: str, held: int) -> None:
+def test_a_synchronous_edge_holds_one_token_and_a_mode_says_until_when(release: Release, held: int) -> None:
     """With `sequential` one wave is in the graph, with `pipelined` one token on each edge."""
     graph = hfg.Graph()
     source = graph.add(script(values=(1, 2, 3)))
@@ -128,7 +129,7 @@ def test_a_full_queue_follows_its_policy(overflow: Any, kept: list[int], lost: l
     graph = hfg.Graph()
     source, pulse, target = graph.add(script(values=(3,))), graph.add(Pulse()), graph.add(sink())
     source >> pulse
-    options = {} if overflow == "latest" else {"capacity": 2}
+    options: dict[str, Any] = {} if overflow == "latest" else {"capacity": 2}
     graph.connect(pulse.pulse, target.value, overflow=overflow, **options)
     report = reference_run(graph)
     seen = recorder()
@@ -624,7 +625,7 @@ def show(value: list[int]) -> None:
 def iterating() -> hfg.Graph:
     graph = hfg.Graph()
     source, each = graph.add(lists(values=([1, 2, 3], [], [4]))), graph.add(EachDoubled())
-    graph.connect(source.out, each.items)
+    graph.connect(source.out, each.ports.inputs["items"])
     graph.connect(graph.add(script(values=(10, 20, 30))).out, each.offset)
     graph.connect(each.doubled, graph.add(show(), name="all").value)
     graph.connect(each.even, graph.add(show(), name="even").value)

@@ -124,6 +124,9 @@ class MapLookup(hfg.Node):
     def look(self, key: hfg.Token[str]) -> None: ...
 
     @hfg.slot
+    def watch(self, token: hfg.Token[object]) -> None: ...
+
+    @hfg.slot
     async def wake(self) -> None: ...
 
     @hfg.slot(type=float)
@@ -148,6 +151,7 @@ assert_type(lookup.newest, deque[int])
 assert_type(lookup.last, int | None)
 assert_type(lookup.forget, SlotPort[int])
 assert_type(lookup.look, SlotPort[str])
+assert_type(lookup.watch, SlotPort[object])
 assert_type(lookup.wake, SlotPort[object])
 assert_type(lookup.aim, SlotPort[float])
 assert_type(lookup.activated, EventPort[None])
@@ -160,6 +164,7 @@ lookup.forget(3)
 connect(numbers().out, lookup.key)
 connect(numbers().out, lookup.either)
 connect(lookup.unknown, lookup.forget)
+connect(lookup.unknown, lookup.watch)
 connect(lookup.unknown, lookup.aim)  # int is a float
 connect(lookup.done, lookup.wake, active=True)
 connect(blur().out, lookup.anything)

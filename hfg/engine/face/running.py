@@ -24,7 +24,7 @@ from hfg.graph.checks import check_flat
 from hfg.graph.checks.endless import endless
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure.level import level_of
-from hfg.trace import TraceEvent
+from hfg.trace import Consumer
 
 __all__ = ["run", "run_async", "running"]
 
@@ -109,7 +109,7 @@ async def run_async(
     debug: bool = False,
     policy: str | None = None,
     seed: int | None = None,
-    trace: Callable[[TraceEvent], None] | None = None,
+    trace: Consumer | None = None,
     begin: Callable[[Run], object] | None = None,
     allow_idle: bool = False,
     block_warning_s: float = 0.1,
@@ -140,7 +140,7 @@ def run(
     debug: bool = False,
     policy: str | None = None,
     seed: int | None = None,
-    trace: Callable[[TraceEvent], None] | None = None,
+    trace: Consumer | None = None,
     begin: Callable[[Run], object] | None = None,
     allow_idle: bool = False,
     block_warning_s: float = 0.1,
@@ -211,7 +211,7 @@ async def running(
     debug: bool = False,
     policy: str | None = None,
     seed: int | None = None,
-    trace: Callable[[TraceEvent], None] | None = None,
+    trace: Consumer | None = None,
     block_warning_s: float = 0.1,
     fast: bool = True,
 ) -> AsyncIterator[Run]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from hfg.errors import UsageError
-from hfg.trace import TraceEvent
+from hfg.trace import Consumer
 
 __all__ = ["FUSE_AFTER", "Settings"]
 
@@ -26,7 +24,7 @@ class Settings:
         debug: bool = False,
         policy: str | None = None,
         seed: int | None = None,
-        trace: Callable[[TraceEvent], None] | None = None,
+        trace: Consumer | None = None,
         fast: bool = True,
         fuse_after: int | None = None,
         until_s: float | None = None,
