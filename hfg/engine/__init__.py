@@ -1,6 +1,7 @@
-"""Running graphs: where asyncio begins.
+"""Running graphs: where asyncio begins. `docs/engine.md` shows it from above, with the way of a token through it.
 
-The wings, each of which knows those above it in this list, never those below:
+The wings, each of which imports from those above it in this list and names nothing below; observing and editing stand
+side by side and know nothing of each other:
 
     model       what a run is made of: nodes (workers), subgraphs (scopes), ready queues, and the state they share
     rules       what the rules decide: firing, sending, releasing, activity, ending; plain functions that never wait
@@ -8,7 +9,11 @@ The wings, each of which knows those above it in this list, never those below:
     runtime     what waits: the loop, the code of nodes, threads, clocks, beginning and ending
     observing   who looks at a run: listeners, taps, statistics, reports
     editing     what changes or holds a run while it goes on: edits, pause, steps, breakpoints
-    face        what users hold in their hands: a run, its feeds and readers
+    face        what users hold in their hands: a run, its feeds and readers; composes all the others
+
+What has to go the other way is called by a table that is declared below and filled from above: `core.Host` and
+`core.Code` (deciding needs somebody who waits), `core.Upstairs` (a rule that ends in another one further up), and
+`callbacks.Callbacks` (who stands on an engine wants to be told).
 """
 
 from hfg.engine.face.run import Run

@@ -1,3 +1,7 @@
-"""What a run is made of: its nodes, subgraphs and ready queues, and the state they share."""
+"""What a run is made of: its nodes, subgraphs and ready queues, and the state they share.
+
+worker    one node              core      one run, and what it needs of those above
+scopes    subgraphs, gates      groups    nodes that run one at a time      policies  who of them is next
+"""
 
 __all__: list[str] = []

@@ -1,3 +1,7 @@
-"""Who looks at a run: listeners, taps, statistics, reports."""
+"""Who looks at a run: listeners, taps, statistics, reports.
+
+consumers   of the trace        taps        at ports and edges
+measuring   statistics, kept by meters, shown as statistics, glance (cheap) and report (at the end)
+"""
 
 __all__: list[str] = []

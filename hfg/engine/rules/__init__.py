@@ -1,3 +1,14 @@
-"""What the rules decide: firing, sending, releasing, activity, ending, being quiet. Plain functions that never wait."""
+"""What the rules decide: firing, sending, releasing, activity, ending, being quiet. Plain functions that never wait.
+
+agenda      who may move                 firing      a firing, from taking to answering
+sending     what leaves a node           releasing   when that is processed
+calls       of slots                     builtin_slots   those that every node has
+modifiers   what activity does           activity    what follows when it changes
+listening   slots that are awake only while their node is active
+wiring      which edges are live         subgraphs   as wholes
+lifecycle   setup, teardown, restart, disable, enable
+ending      of one node                  sources     which rest, or work for nobody
+quiet       what happens when nothing moves          errors  what becomes of failures
+"""
 
 __all__: list[str] = []
