@@ -30,6 +30,7 @@ _MACHINERY = (
     "runpy.py",
     "<frozen importlib",
     "<frozen runpy",
+    "<hfg region",
     "concurrent/futures",
     "threading.py",
     "typer",

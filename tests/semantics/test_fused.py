@@ -5,12 +5,15 @@ Regions are fused from the first firing on here. `test_soak_fused.py` compares m
 
 from __future__ import annotations
 
+import threading
+import traceback
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
 import hfg
+from hfg.cli.show import user_traceback
 from hfg.engine.runtime import settings
 from hfg.testing import Divergence, nodes, recorder, reference_run, replay
 from hfg.testing.making import Allowed, random_plan
@@ -19,6 +22,7 @@ from hfg.testing.recording import Recorder
 from hfg.testing.shrinking import shrink
 
 MOST_MOVES = 1500
+BESIDE_THREADS = Allowed(plain=True, threads=True, lossy=False, gates=False)
 
 
 @pytest.fixture(autouse=True)
@@ -26,8 +30,27 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(settings, "FUSE_AFTER", 0)
 
 
-Calls = list[tuple[str, str]]
-"""Each call of a node's code, in order: the node's path, and what it was given."""
+class Calls(list[tuple[str, str]]):
+    """Each call of a node's code on the loop, in order: the node's path, and what it was given.
+
+    Attributes:
+      aside: the same of code in threads, by node: between those there is no order.
+    """
+
+    def __init__(self) -> None:
+        self.aside: dict[str, list[str]] = {}
+
+    def note(self, node: Any, given: str) -> None:
+        if threading.current_thread() is threading.main_thread():
+            self.append((str(node.place.path), given))
+        else:
+            self.aside.setdefault(str(node.place.path), []).append(given)
+
+    def take(self) -> tuple[list[tuple[str, str]], dict[str, list[str]]]:
+        taken = list(self), self.aside
+        self.clear()
+        self.aside = {}
+        return taken
 
 
 def plain_shapes(seed: int) -> Allowed:
@@ -37,7 +60,7 @@ def plain_shapes(seed: int) -> Allowed:
 
 def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
     """Have every call of the code of every node noted from now on."""
-    calls: Calls = []
+    calls = Calls()
     process_call, handler = hfg.Node._process_call, hfg.Node._handler
 
     def noted_process(self: Any) -> Callable[..., Any]:
@@ -47,7 +70,7 @@ def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
             def draw(*arguments: Any) -> Iterator[Any]:
                 values = iter(call(*arguments))
                 while True:
-                    calls.append((str(self.place.path), "next"))
+                    calls.note(self, "next")
                     try:
                         value = next(values)
                     except StopIteration:
@@ -57,7 +80,7 @@ def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
             return draw
 
         def process(*arguments: Any) -> Any:
-            calls.append((str(self.place.path), repr(arguments)))
+            calls.note(self, repr(arguments))
             return call(*arguments)
 
         return process
@@ -68,7 +91,7 @@ def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
             return None
 
         def handle(*arguments: Any) -> Any:
-            calls.append((str(self.place.path), name + repr(arguments)))
+            calls.note(self, name + repr(arguments))
             return call(*arguments)
 
         return handle
@@ -78,15 +101,15 @@ def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
     return calls
 
 
-def noted_run(calls: Calls, plan: GraphPlan, *, fast: bool, trace: Recorder | None = None) -> tuple[Any, str, Calls]:
+def noted_run(calls: Calls, plan: GraphPlan, *, fast: bool, trace: Recorder | None = None) -> tuple[Any, str, Any]:
     """Run it; give its report, what it failed with, and its calls."""
-    calls.clear()
+    calls.take()
     error = ""
     try:
         report = hfg.run(plan.build(), clock="virtual", fast=fast, trace=trace, until_s=30.0)
     except hfg.errors.RunError as problem:
         report, error = problem.report, str(problem)  # type: ignore[attr-defined]
-    return report, error, list(calls)
+    return report, error, calls.take()
 
 
 def ends(plan: GraphPlan, seed: int) -> bool:
@@ -134,7 +157,7 @@ def test_fused_interpreted_and_watched_runs_are_one(block: int, monkeypatch: pyt
 @pytest.mark.rule("R1", "F7")
 @pytest.mark.parametrize("seed", range(30))
 def test_threads_beside_a_region_change_nothing_of_it(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    check(note_calls(monkeypatch), seed, Allowed(plain=True, threads=True, lossy=False, gates=False))
+    check(note_calls(monkeypatch), seed, BESIDE_THREADS)
 
 
 def fused_order(graph: hfg.Graph, monkeypatch: pytest.MonkeyPatch) -> list[str]:
@@ -142,9 +165,8 @@ def fused_order(graph: hfg.Graph, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     calls = note_calls(monkeypatch)
     orders = []
     for fast in (True, False):
-        calls.clear()
         hfg.run(graph, clock="virtual", fast=fast)
-        orders.append(list(calls))
+        orders.append(calls.take()[0])
     assert orders[0] == orders[1]
     return [path for path, _ in orders[0]]
 
@@ -193,3 +215,36 @@ def test_whose_turn_depends_on_silence_is_not_scheduled_before_it_is_known(monke
     parted.odd >> tally.value
     graph.connect(parted.even, tally.note)
     assert fused_order(graph, monkeypatch) == ["s", "p", "t", "s", "p", "a", "t", "s"]
+
+
+@pytest.mark.rule("R5")
+def test_what_a_stalled_member_waits_for_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = hfg.Graph()
+    source, first, second = graph.add(nodes.script(), name="s"), nodes.double(), nodes.double()
+    graph.add(first, name="a", release="pipelined")
+    source.out >> first.value
+    first.out >> graph.add(second, name="b").value
+    second.out >> graph.add(nodes.add(), name="j").a
+    with pytest.raises(hfg.errors.Stalled, match=r'"a" waits until its token is processed on "a.out -> b.value"'):
+        hfg.run(graph, clock="virtual")
+
+
+@pytest.mark.rule("X1")
+def test_a_traceback_shows_which_node_a_line_of_a_region_calls() -> None:
+    graph = hfg.Graph()
+    source, fails = graph.add(nodes.script(values=(1, 2, 3)), name="s"), graph.add(nodes.picky(), name="middle")
+    source.out >> graph.add(nodes.double(), name="a").value
+    source.out >> fails.value
+    with pytest.raises(hfg.errors.NodeError, match="firing 3") as caught:
+        hfg.run(graph, clock="virtual")
+    assert '# node "middle"' in "".join(traceback.format_exception(caught.value.__cause__))
+
+
+def test_a_traceback_for_the_user_begins_in_the_code_of_the_user(capsys: pytest.CaptureFixture[str]) -> None:
+    graph = hfg.Graph()
+    source, fails = graph.add(nodes.script(values=(1, 2, 3)), name="s"), graph.add(nodes.picky(), name="middle")
+    source.out >> fails.value
+    with pytest.raises(hfg.errors.NodeError) as caught:
+        hfg.run(graph, clock="virtual")
+    user_traceback(caught.value.__cause__)
+    assert "region" not in capsys.readouterr().err

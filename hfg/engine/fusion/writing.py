@@ -133,13 +133,10 @@ def _renamed(code: CodeType, name: str) -> CodeType:
 def _show(name: str, text: str, calls: dict[int, int], paths: list[str]) -> None:
     """Let tracebacks and debuggers show the lines, each call with the path of its node."""
 
-    def lines() -> str:
-        shown = text.splitlines()
-        for line, member in calls.items():
-            shown[line - 1] += f'  # node "{paths[member]}"'
-        return "\n".join(shown) + "\n"
-
-    linecache.cache[name] = (lines,)
+    shown = text.splitlines(keepends=True)
+    for line, member in calls.items():
+        shown[line - 1] = f'{shown[line - 1].rstrip()}  # node "{paths[member]}"\n'
+    linecache.cache[name] = (len(text), None, shown, name)  # at once: nobody asks a loader for a name in <>
     _shown[name] = None
     while len(_shown) > _KEPT_SOURCES:
         oldest = next(iter(_shown))

@@ -58,6 +58,9 @@ class Region(Protocol):
     def settle_counts(self) -> None:
         """Let the members' counts say what the waves so far have done."""
 
+    def disarm(self) -> None:
+        """Let each member's barriers say what it waits for."""
+
 
 class Timer(Protocol):
     """A call that has not happened yet."""
@@ -246,6 +249,12 @@ class Core:
         """Somebody is about to read how often nodes have fired: fused regions count by waves."""
         for region in self.regions:
             region.settle_counts()
+
+    def settle_barriers(self) -> None:
+        """Somebody is about to read what nodes wait for: in fused regions the head's barrier stands for all."""
+        for region in self.regions:
+            if not region.running:
+                region.disarm()
         for listeners in self.listeners:
             listeners.settle_counts()
 

@@ -63,6 +63,7 @@ def glance_at(engine: Engine) -> Glance:
     now = engine.now() if engine.ended_at is None else engine.ended_at
     nodes = []
     engine.core.settle_counts()
+    engine.core.settle_barriers()
     for worker in engine.all_workers():
         if worker.type is None or worker.scope is not None:
             continue

@@ -162,6 +162,7 @@ class Measuring:
         """So much time has passed on the run's clock."""
         if self._engine.core.over:
             return
+        self._engine.core.settle_barriers()
         for worker in self._workers():
             meter = self._meter(worker)
             what = doing(worker)
@@ -192,6 +193,7 @@ class Measuring:
         """Say what the run has done so far."""
         engine = self._engine
         core = engine.core
+        core.settle_barriers()
         now = engine.now() if engine.ended_at is None else engine.ended_at
         machine = (self._ended_on_machine or monotonic()) - self._began_on_machine
         passed = now - self._began

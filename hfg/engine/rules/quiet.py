@@ -192,6 +192,7 @@ def only_waiting_for_room(core: Core) -> bool:
 
 def stall(core: Core) -> Stalled | None:
     """R5: say who waits for what, if a source is blocked or tokens lie where they can never be taken."""
+    core.settle_barriers()
     reasons: list[str] = []
     stuck: dict[int, list[Any]] = {}
     for edge in core.edges:
