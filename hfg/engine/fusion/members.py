@@ -12,7 +12,7 @@ from hfg.engine.model.policies import Fifo
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.ports.edges import SyncEdge
 
-__all__ = ["may_be_inside", "may_lead"]
+__all__ = ["lives_by_its_slots", "may_be_called", "may_be_inside", "may_lead"]
 
 
 def _is_plain(worker: Worker) -> bool:
@@ -64,6 +64,39 @@ def may_be_inside(worker: Worker) -> bool:
     )
 
 
+def may_be_called(worker: Worker) -> bool:
+    """Whether a slot call of it may be a member: it lives by one slot that an output of its own group feeds."""
+    if len(worker.slot_edges) != 1 or worker.in_edges or worker.is_source or not lives_by_its_slots(worker):
+        return False
+    edge = worker.slot_edges[0]
+    return bool(
+        type(edge) is SyncEdge
+        and edge.follows
+        and edge.handler is not None
+        and not edge.while_active
+        and not worker.unfit
+        and isinstance(worker.group.policy, Fifo)
+        and _nobody_looks(worker)
+    )
+
+
+def lives_by_its_slots(worker: Worker) -> bool:
+    """Its calls may go the fast path: nobody looks, and nothing depends on its activity but itself."""
+    core = worker.core
+    return (
+        core.fast
+        and not core.debug
+        and core.trace is None
+        and worker.options is not None
+        and not worker.group.threaded
+        and bool(worker.slot_edges)
+        and not worker.in_edges
+        and not worker.is_source
+        and not (worker.gates_over or worker.ready_hook is not None or worker.observed or worker.on_idle is not None)
+        and not (worker.scopes or worker.watched or worker.options.max_rate_hz or worker.options.max_duration_s)
+    )
+
+
 def may_lead(worker: Worker) -> bool:
     """Whether a region may begin with it: a source, or a function with an edge into each input that it waits for."""
     core = worker.core
@@ -72,7 +105,7 @@ def may_lead(worker: Worker) -> bool:
     if worker.type is None or worker.process is None or not _is_plain(worker) or worker.paced:
         return False
     if worker.is_source:
-        return bool(worker.type.process_kind == "generator")
+        return worker.type.process_kind in ("generator", "function")
     if worker.type.process_kind not in ("function", "async"):
         return False
     return bool(0 < len(worker.live_inputs) == len(worker.in_edges) and _has_all(worker))

@@ -20,15 +20,15 @@ Counts follow from the number of waves; who reads them has them settled first. S
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from types import CodeType, FrameType
+from collections.abc import Callable, Collection, Sequence
+from types import CodeType, CoroutineType, FrameType
 from typing import Any
 
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Wave, write_wave
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import agenda, ending, errors, firing
+from hfg.engine.rules import agenda, calls, ending, errors, firing
 from hfg.engine.rules.releasing import release
 from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge
@@ -92,7 +92,12 @@ class Region:
         for worker in self.order[1:]:
             if worker.busy or worker.blocked or worker.placed or worker.outputs.missing or worker.pending_end:
                 return False
-            if worker.calls or worker.on_idle is not None or worker.inputs.missing != len(worker.live_inputs):
+            if (
+                worker.queued
+                or worker.calls
+                or worker.on_idle is not None
+                or worker.inputs.missing != len(worker.live_inputs)
+            ):
                 return False
         for edge in self.border:
             edge.waits = self.head
@@ -138,15 +143,18 @@ class Region:
         """Each member has fired once a wave, and each inner edge has carried one token."""
         waves, self.waves = self.waves, 0
         if waves:
-            for worker in self.order:
-                worker.firings += waves
             for edge in self.inner:
                 edge.sent += waves
-        spread = 0
+        spread, called = 0, self.schedule.called
         for number, worker in enumerate(self.order):
-            worker.silent += self.silent[number] + spread
+            silent = self.silent[number] + spread
             spread += self.spread[number]
             self.silent[number] = self.spread[number] = 0
+            if number in called:  # by a marker a slot is not called (T4)
+                worker.call_number += waves - silent
+            else:
+                worker.firings += waves
+                worker.silent += silent
 
     # --- the end of a wave --------------------------------------------------------------------------------------------
 
@@ -197,7 +205,12 @@ class Region:
         if not self.core.flags:
             self._note_exit(k)
         worker = self.materialise(k, found)
-        firing.complete_firing(worker, result)
+        if k not in self.schedule.called:
+            firing.complete_firing(worker, result)
+        elif type(result) is CoroutineType:
+            calls.await_call(worker, worker.call_edge.port_name, result)
+        else:
+            calls.finish_call(worker, "done")
         self._left()
         return None
 
@@ -218,6 +231,8 @@ class Region:
         worker = self.materialise(k, found)
         if worker.is_source and isinstance(error, StopIteration | EndOfStream):
             ending.source_ended(worker)
+        elif isinstance(error, Exception) and k in self.schedule.called:
+            errors.fail_call(worker, worker.call_edge.port_name, error)
         elif isinstance(error, Exception):
             errors.fail(worker, f"firing {worker.firings}", error, answer=True)
         else:
@@ -242,40 +257,69 @@ class Region:
         self.settle_counts()
         self.armed = self.running = False
         order, stamp = self.order, found["stamp"]
+        silent_calls: set[Any] = set()
         for j in range(k):
-            order[j].firings += 1
+            self._count(j, found)
             for edge, output, to in self.schedule.outs[j]:
                 if to is None:
                     continue
                 edge.sent += 1
-                if to > k:
-                    value = found.get(f"v{j}_{output}")
-                    value = NO_MESSAGE if value is None else value
-                    edge.token = Token(value, 0, stamp, edge.sent)
+                if to <= k:
+                    continue
+                value = found.get(f"v{j}_{output}")
+                if value is None and to in self.schedule.called:
+                    silent_calls.add(edge)
+                    continue
+                value = NO_MESSAGE if value is None else value
+                edge.token = Token(value, 0, stamp, edge.sent)
+                if to in self.schedule.called:
+                    order[to].calls.append(edge)  # type: ignore[union-attr]
+                else:
                     order[to].inputs.missing -= 1
                     order[to].special = order[to].special or value is NO_MESSAGE
-        self._write_barriers(k)
+        self._write_barriers(k, silent_calls)
         worker = order[k]
-        worker.firings += 1
         worker.ticket += 1
-        worker.busy = "firing"
         worker.stamp = stamp
-        worker.taken = worker.live_inputs if k else self.held_entries
+        if k in self.schedule.called:
+            worker.call_number += 1
+            worker.busy = "call"
+            worker.call_edge = worker.slot_edges[0]
+        else:
+            worker.firings += 1
+            worker.busy = "firing"
+            worker.taken = worker.live_inputs if k else self.held_entries
         self._queue_behind(k)
         self.core.speaker = worker
         return worker
+
+    def _count(self, j: int, found: dict[str, Any]) -> None:
+        """Member j has fired, or was called, in the wave that does not come to its end."""
+        worker = self.order[j]
+        if j not in self.schedule.called:
+            worker.firings += 1
+            return
+        edge = worker.slot_edges[0]
+        source = self.schedule.position[edge.source]
+        output = next(output for one, output, _ in self.schedule.outs[source] if one is edge)
+        worker.call_number += found.get(f"v{source}_{output}") is not None
 
     def _queue_behind(self, k: int) -> None:
         """Who stands behind member k is enabled by now, or by an outside edge that was waited for (R2)."""
         behind = self.schedule.behind[k]
         for worker in behind:
-            if worker in self.schedule.position and agenda.place(worker):
+            if worker in self.schedule.position and (worker.calls or agenda.place(worker)):
                 worker.queued = True
                 self.core.followers.append(worker)
         self._let_follow(behind)
 
-    def _write_barriers(self, k: int) -> None:
-        """F5: who of those that have fired, the first k, still waits for what it has sent."""
+    def _write_barriers(self, k: int, silent_calls: Collection[Any] = ()) -> None:
+        """F5: who of those that have fired, the first k, still waits for what it has sent.
+
+        Args:
+          k: how many have fired.
+          silent_calls: edges into slots that carried a marker, which is processed at once (T4).
+        """
         for edge in self.border:
             edge.waits = edge.source
         done = [False] * len(self.order)
@@ -283,7 +327,7 @@ class Region:
             worker, missing = self.order[j], 0
             for edge, _, to in self.schedule.outs[j]:
                 if to is not None:
-                    edge.held = to >= k or not done[to]
+                    edge.held = (to >= k or not done[to]) and edge not in silent_calls
                 missing += edge.held
             worker.outputs.missing = missing
             worker.held = missing > 0
@@ -330,12 +374,16 @@ class Region:
             frame = frame.f_back
         return None
 
+    def is_calling(self, worker: Worker) -> bool:
+        """Whether the call of this member is the one under way in a running wave."""
+        return self.running and self.at_work(sys._getframe(1)) is worker
+
     def speaks(self, worker: Worker) -> bool:
         """A member sends by itself, which a plain call does not: whether it is the one whose call runs.
 
         It leaves the wave behind this call, and the next region says before each of its calls that it runs.
         """
-        if not self.running or self.at_work(sys._getframe(1)) is not worker:
+        if worker.slot_edges or not self.is_calling(worker):  # (what a slot handler may not do is for others to say)
             return False
         worker.speaks = self.doomed = True
         self.core.flags.append("speaks")

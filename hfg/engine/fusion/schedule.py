@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from hfg.engine.fusion.members import may_be_inside
+from hfg.engine.fusion.members import may_be_called, may_be_inside
 from hfg.engine.model.worker import Worker
 
 __all__ = ["MOST_MEMBERS", "Schedule", "schedule"]
@@ -28,6 +28,7 @@ class Schedule:
       outs: per member its live output edges in the order of their sending, each with the number of its output and the
         position of the member it leads to; None where it leaves the region.
       behind: per member who would stand in front of the run queue when its turn has come, the next one first.
+      called: which members are slot calls, by their position; the others are firings.
       followers: those outside who would stand there when the last member has fired.
     """
 
@@ -35,14 +36,15 @@ class Schedule:
         self.order = order
         self.position = {worker: number for number, worker in enumerate(order)}
         self.behind = behind
+        self.called = frozenset(k for k, worker in enumerate(order) if worker.slot_edges)
         self.followers = followers
         self.outs: list[list[tuple[Any, int, int | None]]] = [
             [(edge, output, self._inside(edge)) for edge, output in _sending(worker)] for worker in order
         ]
 
     def _inside(self, edge: Any) -> int | None:
-        """Where the edge leads to; its target may be a member by name only, fed past the region (a second edge)."""
-        return self.position.get(edge.target) if edge.follows and edge.target_kind == "input" else None
+        """Where the edge leads to, if that is a member and the edge belongs to its waves."""
+        return self.position.get(edge.target) if edge.follows else None
 
 
 def schedule(head: Worker) -> Schedule | None:
@@ -69,9 +71,13 @@ def _closure(head: Worker) -> set[Worker]:
     while todo and len(inside) < MOST_MEMBERS:
         for edge, _ in reversed(_sending(todo.pop())):
             target: Worker = edge.target
-            if not edge.follows or edge.target_kind != "input" or target in inside:
+            if not edge.follows or target in inside:
                 continue
             if target.region is not None and target.region.head is not target:
+                continue
+            if edge.target_kind == "slot":
+                if may_be_called(target) and len(inside) < MOST_MEMBERS:
+                    inside.add(target)
                 continue
             if target not in missing and not may_be_inside(target):
                 continue

@@ -7,7 +7,7 @@ condition they do not cover they hand over to `sending.trigger` and `firing.step
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from types import CoroutineType
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 from hfg.engine.model.worker import CALLS_BLOCKED, RunningEvent, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
-from hfg.engine.rules.calls import await_call
+from hfg.engine.rules.calls import await_call, finish_call
 from hfg.engine.rules.listening import may_listen
 from hfg.engine.rules.modifiers import derive_scopes, touch
 from hfg.engine.rules.releasing import release
@@ -51,8 +51,8 @@ def _call_step(worker: Worker, edge: Any) -> Step:
     if handler is None:
         return firing.step
     if type(edge) is SyncEdge:
-        return _call_of_output_step(worker, edge, handler)
-    if type(edge) is not EventEdge or edge.while_active:
+        return _call_by_output_step(worker, edge)
+    if edge.while_active:
         return firing.step
     core = worker.core
     node = worker.node
@@ -88,60 +88,65 @@ def _call_step(worker: Worker, edge: Any) -> Step:
         worker.stamp = None
         if gives:
             worker.right = False
-        if worker.follows:  # a wave has brought the next call meanwhile, and that goes on with it (R2)
-            worker.queued = False
+        worker.queued = False
+        if calls or worker.on_idle is not None:
             idle_again(worker)
-        elif calls and not worker.blocked & CALLS_BLOCKED:
-            worker.push(worker)
-        else:
-            worker.queued = False
 
     return step
 
 
-def _call_of_output_step(worker: Worker, edge: SyncEdge, handler: Any) -> Step:
-    """The same for an edge from an output: its token is processed when the call is over (F6)."""
+def _call_by_output_step(worker: Worker, edge: SyncEdge) -> Step:
+    """The same behind an output: its token is processed when the call is over, or takes it (F6)."""
+    handler: Any = edge.handler
     core = worker.core
-    node = worker.node
     general = firing.step
     calls: Any = worker.calls
-    gives = any(one.active for one in worker.event_edges())
-    while_active = edge.while_active
     only = (edge,)
+    sequential = edge.sequential
+    while_active = edge.while_active
 
     def step(worker: Worker) -> None:
-        if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
+        token: Any = edge.token
+        if not calls or worker.blocked & CALLS_BLOCKED or worker.busy or token.activity:
             general(worker)
             return
         calls.popleft()
-        token: Any = edge.token
         edge.token = None
         worker.call_number += 1
-        if token.activity:
-            worker.active = node._active = token.activity > 0
-        if worker.active or not while_active:
-            core.speaker = worker
-            worker.stamp = token.stamp
-            try:
-                result = handler(token.value)
-            except Exception as error:
-                _call_taken(worker, edge)
-                errors.fail_call(worker, edge.port_name, error)
-                return
-            if result is not None and type(result) is CoroutineType:
-                _call_taken(worker, edge)
-                await_call(worker, edge.port_name, result)
-                return
-            worker.stamp = None
-        release(only)
-        if gives:
-            worker.right = False
-        if calls and not worker.blocked & CALLS_BLOCKED:
-            worker.push(worker)
-        else:
-            worker.queued = False
+        if not sequential:
+            release(only)
+        if while_active and not worker.active:  # T4: it was when the token came
+            _over(worker, only if sequential else (), calls)
+            return
+        core.speaker = worker
+        worker.stamp = token.stamp
+        try:
+            result = handler(token.value)
+        except Exception as error:
+            _call_taken(worker, edge)
+            errors.fail_call(worker, edge.port_name, error)
+            return
+        if result is not None and type(result) is CoroutineType:
+            _call_taken(worker, edge)
+            await_call(worker, edge.port_name, result)
+            return
+        if worker.right or worker.events_due:
+            _call_taken(worker, edge)
+            finish_call(worker, "done")
+            return
+        worker.stamp = None
+        _over(worker, only if sequential else (), calls)
 
     return step
+
+
+def _over(worker: Worker, held: tuple[SyncEdge, ...], calls: Collection[Any]) -> None:
+    """A call by an output is over: its token is processed."""
+    if held:
+        release(held)
+    worker.queued = False
+    if calls or worker.on_idle is not None:
+        idle_again(worker)
 
 
 def _call_taken(worker: Worker, edge: EventEdge | SyncEdge) -> None:

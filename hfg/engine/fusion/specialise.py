@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hfg.engine.fusion.members import may_lead
+from hfg.engine.fusion.members import lives_by_its_slots, may_lead
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import schedule
 from hfg.engine.fusion.slots import calls_step
@@ -37,7 +37,7 @@ def _step_of(worker: Worker) -> Step:
     if core.inside is not None:  # one that iterates itself, too: whoever is around it counts what is queued (G3, G4)
         step: Step = core.inside.step
         return step
-    if _lives_by_its_slots(worker):
+    if lives_by_its_slots(worker):
         return calls_step(worker)
     if may_lead(worker):
         return _until_warm(worker)
@@ -67,24 +67,6 @@ def _until_warm(worker: Worker) -> Step:
             firing.step(worker)
 
     return step
-
-
-def _lives_by_its_slots(worker: Worker) -> bool:
-    """Its calls may go the fast path: nobody looks, and nothing depends on its activity but itself."""
-    core = worker.core
-    return (
-        core.fast
-        and not core.debug
-        and core.trace is None
-        and worker.options is not None
-        and not worker.group.threaded
-        and bool(worker.slot_edges)
-        and not worker.in_edges
-        and not worker.is_source
-        and not worker.type.parameters  # which are not set amid a call (P8), so it is to be seen that one is under way
-        and not (worker.gates_over or worker.ready_hook is not None or worker.observed or worker.on_idle is not None)
-        and not (worker.scopes or worker.watched or worker.options.max_rate_hz or worker.options.max_duration_s)
-    )
 
 
 def _leave_lying(worker: Worker) -> None:

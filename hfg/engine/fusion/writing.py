@@ -82,11 +82,18 @@ class _Names:
         self.ready = host._ready_groups
         self.entries = region.entries
         self.workers = order
-        self.calls = [worker.process if worker.meter is None else worker.meter.code for worker in order]
+        self.calls = [_code_of(worker) for worker in order]
         self.unset = [worker.unset for worker in order]
         self.edges = [[edge for edge, _, _ in out] for out in region.schedule.outs]
         self.took = [worker.meter.took if measured else None for worker in order]
         self.splits = [worker.node._split for worker in order]
+
+
+def _code_of(worker: Worker) -> Any:
+    """What a call of the member runs; who measures wraps handlers, and measures functions by the wave."""
+    if worker.slot_edges:
+        return worker.slot_edges[0].handler
+    return worker.process if worker.meter is None else worker.meter.code
 
 
 def _take_queued(edge: Any) -> Token[Any]:
@@ -155,12 +162,14 @@ class _Writer:
         self.measured = measured
         self.head = self.order[0]
         self.is_source = self.head.is_source
+        self.is_generator = self.is_source and self.head.type.process_kind == "generator"
         self.has_border = bool(region.border)
         self.carries = self.head in region.carriers
         self.is_async = any(worker.is_async for worker in self.order)
         host: Any = region.core.host
         self.real = host.epoch is not None  # time goes on while code runs
         self.loops = self.real and not self.head.paced and (self.is_source or self._one_queue())
+        self.called = region.schedule.called
         self.single = [self._is_single(worker) for worker in self.order]
         self.over_if_silent: set[int] = set()  # behind whose silence no code of the wave runs
         self.lines: list[str] = []
@@ -172,7 +181,7 @@ class _Writer:
 
     def _is_single(self, worker: Worker) -> bool:
         """What it gives back is the value of its one output, or nothing."""
-        return not _speaks(worker) and worker.type.result in ("none", "single")
+        return not worker.slot_edges and not _speaks(worker) and worker.type.result in ("none", "single")
 
     def say(self, text: str, call: int | None = None) -> None:
         self.lines.append("    " * self.indent + text)
@@ -212,9 +221,9 @@ class _Writer:
         if pipelined:
             say(f"pipelined = ({', '.join(f'entry{number}' for number in pipelined)},)")
         for k, worker in enumerate(self.order):
-            if k or not self.is_source:
+            if k or not self.is_generator:
                 say(f"f{k} = names.calls[{k}]")
-            if _speaks(worker):
+            if _speaks(worker) or k in self.called:
                 say(f"w{k} = names.workers[{k}]")
             elif not self.single[k]:
                 say(f"split{k} = names.splits[{k}]")
@@ -249,7 +258,7 @@ class _Writer:
             self._nonlocal()
         odd = ["worker.special", "worker.busy", "not worker.placed"]
         odd += ["worker.active"] if self.carries else []
-        odd += ["worker.generator is None"] if self.is_source else ["inputs.missing"]
+        odd += ["worker.generator is None"] if self.is_generator else [] if self.is_source else ["inputs.missing"]
         for number, edge in enumerate(self.entries):
             if type(edge) is SyncEdge:
                 odd.append(f"entry{number}.token.activity")
@@ -266,10 +275,10 @@ class _Writer:
             self.indent = 2
             self._nonlocal()
         say("done = 0")
-        if self.is_source:
+        if self.is_generator:
             say("generator = worker.generator")
-            if self.loops:
-                say("until = core.until")
+        if self.is_source and self.loops:
+            say("until = core.until")
 
     def _nonlocal(self) -> None:
         if self._kinds():
@@ -279,7 +288,7 @@ class _Writer:
         say = self.say
         if self.is_source:
             say("stamp = monotonic() + epoch" if self.real else "stamp = now()")
-            self._call(0, "next(generator)")
+            self._call(0, "next(generator)" if self.is_generator else "f0()")
             return
         for number, edge in enumerate(self.entries):
             if type(edge) is SyncEdge:
@@ -302,6 +311,9 @@ class _Writer:
 
     def _member(self, k: int) -> None:
         """One member: silent if what it needs is (F4), else a call."""
+        if k in self.called:
+            self._slot_call(k)
+            return
         say = self.say
         worker = self.order[k]
         edges = {edge.position: edge for edge in worker.live_inputs}
@@ -328,6 +340,19 @@ class _Writer:
         self._call(k, call, within=True)
         self.indent -= 1
 
+    def _slot_call(self, k: int) -> None:
+        """A slot that an output feeds: a marker is processed at once, the handler is not called (T4, F6)."""
+        say, value = self.say, self._value(self.order[k].slot_edges[0])
+        say(f"if {value} is not None:")
+        self.indent += 1
+        say(f"core.speaker = w{k}; w{k}.busy = 'call'; w{k}.stamp = stamp")
+        say(f"r{k} = f{k}({value})", k)
+        say(f"w{k}.busy = ''; w{k}.stamp = None")
+        unusual = f"flags or type(r{k}) in EXCEPTIONAL or w{k}.right or w{k}.events_due"
+        say(f"if {unusual}: return region.leave({k}, locals())")
+        self.indent -= 1
+        say(f"else: silent[{k}] += 1")
+
     def _value(self, edge: Any) -> str:
         """The local that holds what the edge carries in this wave."""
         source = self.position[edge.source]
@@ -351,7 +376,8 @@ class _Writer:
             return False
         silent = {k}
         for t in range(k + 1, len(self.order)):
-            if any(edge.mandatory and self.position[edge.source] in silent for edge in self.order[t].live_inputs):
+            fed = self.order[t].slot_edges or [edge for edge in self.order[t].live_inputs if edge.mandatory]
+            if any(self.position[edge.source] in silent for edge in fed):
                 silent.add(t)
         border = any(to is None for out in self.outs[k:] for _, _, to in out)
         return len(silent) == len(self.order) - k and not border

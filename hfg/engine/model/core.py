@@ -43,6 +43,9 @@ class Region(Protocol):
     def at_work(self, frame: FrameType | None) -> Worker | None:
         """Whose call a running wave is in, by the line it is at."""
 
+    def is_calling(self, worker: Worker) -> bool:
+        """Whether the call of this member is the one under way in a running wave."""
+
     def disturb(self, worker: Worker) -> None:
         """A member does not rest any more: the interpreted way goes on from here."""
 

@@ -313,6 +313,10 @@ class Worker:
         if self.region is not None:
             self.region.disturb(self)
 
+    def is_on_fast_path(self) -> bool:
+        """Whether a call of its code is under way that `busy` does not tell, by a fast path."""
+        return self.stamp is not None or (self.region is not None and self.region.is_calling(self))
+
     def edges_in(self) -> tuple[Edge, ...]:
         """All edges into it, slots too."""
         return self.in_edges + self.slot_edges

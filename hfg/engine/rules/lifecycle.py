@@ -54,7 +54,7 @@ def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], Non
         worker.core.upstairs.idle_again(worker)
         then()
 
-    if not worker.busy:
+    if not worker.busy and not worker.is_on_fast_path():
         begin()
         return
     if worker.on_idle is None:

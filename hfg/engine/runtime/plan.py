@@ -330,8 +330,7 @@ def _into(edge: Edge, target: Worker, flat: FlatEdge) -> None:
         target.slot_edges += (edge,)
         if target.calls is None:
             target.calls = deque()
-        if isinstance(edge, EventEdge | SyncEdge):
-            edge.handler = target.plain_handlers.get(flat.target.name)
+        edge.handler = target.plain_handlers.get(flat.target.name)
         return
     if kind == "input" and target.type is not None:
         edge.position = list(target.type.inputs).index(flat.target.name)
