@@ -60,7 +60,7 @@ def _write(worker: Worker, node: Node, name: str, value: Any) -> None:
 
 def _between_firings(worker: Worker, write: Callable[[], None]) -> None:
     """Do it now, or as soon as the firing or call under way is over; nobody waits for that."""
-    if worker.busy in AMID_NOTHING:
+    if worker.busy in AMID_NOTHING and not worker.is_on_fast_path():
         write()
         return
 

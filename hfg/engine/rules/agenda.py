@@ -58,10 +58,13 @@ def consider(worker: Worker) -> None:
 
 
 def _follow(worker: Worker) -> None:
-    """It goes next, when the sending is over; behind an earlier call if it stands in the queue for one (F9)."""
-    if worker.queued or worker.busy:
+    """It goes next, when the sending is over; behind an earlier call if it stands in the queue for one (F9).
+
+    What is busy is not enabled by what it gets now, but by the end of what it does (F1).
+    """
+    if worker.queued:
         worker.follows = True
-    else:
+    elif not worker.busy:
         worker.queued = True
         worker.core.followers.append(worker)
 
