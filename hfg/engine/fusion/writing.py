@@ -58,7 +58,7 @@ def write_wave(region: Region, *, measured: bool) -> Wave:
     """Write, compile and bind the wave of a region; `measured`: each call tells the member's meter how long it took."""
     writer = _Writer(region, measured)
     text = writer.write()
-    name = f"<hfg region {next(_numbers)}: {region.head.path}>"
+    name = f"hfg region {next(_numbers)}, from {region.head.path}"
     _show(name, text, writer.calls, [worker.path for worker in region.order])
     names: dict[str, Any] = {}
     exec(_renamed(_compiled(text), name), names)
