@@ -27,7 +27,7 @@ from typing import Any
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Wave, write_wave
 from hfg.engine.model.core import PENDING
-from hfg.engine.model.worker import Worker
+from hfg.engine.model.worker import CALLS_BLOCKED, Worker
 from hfg.engine.rules import agenda, calls, ending, errors, firing
 from hfg.engine.rules.releasing import release
 from hfg.errors import EndOfStream
@@ -37,6 +37,19 @@ from hfg.token import NO_MESSAGE, Token
 __all__ = ["Region"]
 
 _MOST_EXITS = 16  # by one member, before it is asked whether they are the rule
+
+
+_LONGEST_PUT_OFF = 255  # waves for which a region that cannot be armed does not ask again
+
+
+def _rests(worker: Worker, called: bool) -> bool:
+    """Whether nothing is under way at a member, nothing lies before it, and nothing forbids its next firing or call."""
+    blocked = worker.blocked & CALLS_BLOCKED if called else worker.blocked
+    if blocked or worker.busy or worker.placed or worker.queued or worker.calls or worker.on_idle is not None:
+        return False
+    if worker.outputs.missing or worker.pending_end:
+        return False
+    return called or worker.inputs.missing == len(worker.live_inputs)
 
 
 class Region:
@@ -66,6 +79,7 @@ class Region:
         self.detached: Any = None  # the wave whose call waits, and goes on as a firing like any other
         self._after: Callable[[Any, BaseException | None], None] | None = None
         self._lender = next((worker for worker in order if worker.is_async), None)
+        self._put_off = self._patience = 0  # waves before one asks again whether it may be armed
         self.waves = 0  # not yet in the counts of members and edges
         self.silent = [0] * len(order)  # silent firings, likewise
         self.spread = [0] * len(order)  # how often all behind a member were silent since it was
@@ -86,19 +100,20 @@ class Region:
     # --- armed or not -----------------------------------------------------------------------------------------------
 
     def arm(self) -> bool:
-        """Before a wave that follows something unusual: does everything inside rest, and would no activity move?"""
-        if self.doomed or self.head.outputs.missing or any(worker.active for worker in self.carriers):
+        """Before a wave that follows something unusual: does everything inside rest, and would no activity move?
+
+        Where the answer is no again and again (a node that stays active before an active edge), asking is put off.
+        """
+        if self._put_off:
+            self._put_off -= 1
             return False
-        for worker in self.order[1:]:
-            if worker.busy or worker.blocked or worker.placed or worker.outputs.missing or worker.pending_end:
-                return False
-            if (
-                worker.queued
-                or worker.calls
-                or worker.on_idle is not None
-                or worker.inputs.missing != len(worker.live_inputs)
-            ):
-                return False
+        called = self.schedule.called
+        rests = not self.doomed and not self.head.outputs.missing and not any(one.active for one in self.carriers)
+        if not rests or not all(_rests(one, k in called) for k, one in enumerate(self.order) if k):
+            self._put_off = self._patience
+            self._patience = min(2 * self._patience + 1, _LONGEST_PUT_OFF)
+            return False
+        self._patience = 0
         for edge in self.border:
             edge.waits = self.head
         self.armed = True

@@ -435,8 +435,11 @@ class _Writer:
             say(f"if flags or w{k}.right: return region.leave({k}, locals())")
         else:
             say(f"if flags: return region.leave({k}, locals())")
-        say(f"values = values_of(region, {k}, r{k})", k)
-        say(f"if values is None: return region.leave({k}, locals())")
+        if worker.out_names:
+            say(f"values = values_of(region, {k}, r{k})", k)
+            say(f"if values is None: return region.leave({k}, locals())")
+        else:
+            say(f"if r{k} is not None: return region.leave({k}, locals())")
         if _speaks(worker):
             say(f"w{k}.busy = ''; w{k}.stamp = None")
         for output in range(len(worker.out_names)):
