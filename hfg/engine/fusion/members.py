@@ -32,7 +32,6 @@ def _is_plain(worker: Worker) -> bool:
         and worker.ready_hook is None
         and not worker.slot_edges
         and "processed" not in worker.events
-        and not any(edge.while_active for edges in worker.out_edges for edge in edges)  # who hears is asked each time
         and len(worker.out_names) == len(kind.outputs)
         and not any(worker.wants_token)
         and all(edge.target_kind == "input" and not edge.ended for edge in worker.in_edges)

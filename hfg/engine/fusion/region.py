@@ -202,12 +202,14 @@ class Region:
 
     def _let_follow(self, candidates: Sequence[Worker]) -> None:
         """Those outside whom the wave has enabled go next, in the order R2 prescribes."""
-        core = self.core
-        for worker in reversed(candidates):
-            if worker in core.followers:
-                worker.push_next(worker)
-        core.followed += len(core.followers)
-        core.followers.clear()
+        core, followers = self.core, self.core.followers
+        if len(followers) > 1:
+            place = {worker: number for number, worker in enumerate(candidates)}
+            followers.sort(key=place.__getitem__)
+        core.followed += len(followers)
+        for worker in reversed(followers):
+            worker.push_next(worker)
+        followers.clear()
 
     # --- side exits -------------------------------------------------------------------------------------------------
 

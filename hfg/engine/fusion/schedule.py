@@ -13,7 +13,7 @@ from typing import Any
 from hfg.engine.fusion.members import may_be_called, may_be_inside
 from hfg.engine.model.worker import Worker
 
-__all__ = ["MOST_MEMBERS", "Schedule", "schedule"]
+__all__ = ["MOST_MEMBERS", "Schedule", "asks_who_hears", "schedule"]
 
 MOST_MEMBERS = 64
 """Members of one region: Python compiles long functions slowly, and a wave is what the loop may have to wait for."""
@@ -39,12 +39,17 @@ class Schedule:
         self.called = frozenset(k for k, worker in enumerate(order) if worker.slot_edges)
         self.followers = followers
         self.outs: list[list[tuple[Any, int, int | None]]] = [
-            [(edge, output, self._inside(edge)) for edge, output in _sending(worker)] for worker in order
+            [(edge, output, self._inside(edge, output)) for edge, output in _sending(worker)] for worker in order
         ]
 
-    def _inside(self, edge: Any) -> int | None:
+    def _inside(self, edge: Any, output: int) -> int | None:
         """Where the edge leads to, if that is a member and the edge belongs to its waves."""
-        return self.position.get(edge.target) if edge.follows else None
+        return self.position.get(edge.target) if edge.follows and not asks_who_hears(edge.source, output) else None
+
+
+def asks_who_hears(worker: Worker, output: int) -> bool:
+    """Whether slots that listen only while they are active make each sending of the output another (T4)."""
+    return bool(worker.listeners) and worker.listeners[output] is not None
 
 
 def schedule(head: Worker) -> Schedule | None:
@@ -69,9 +74,10 @@ def _closure(head: Worker) -> set[Worker]:
     inside, todo = {head}, [head]
     missing: dict[Worker, int] = {}
     while todo and len(inside) < MOST_MEMBERS:
-        for edge, _ in reversed(_sending(todo.pop())):
+        worker = todo.pop()
+        for edge, output in reversed(_sending(worker)):
             target: Worker = edge.target
-            if not edge.follows or target in inside:
+            if not edge.follows or target in inside or asks_who_hears(worker, output):
                 continue
             if target.region is not None and target.region.head is not target:
                 continue

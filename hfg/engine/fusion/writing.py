@@ -19,8 +19,9 @@ from time import monotonic
 from types import CodeType, CoroutineType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from hfg.engine.fusion.schedule import asks_who_hears
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules.agenda import consider, freed
+from hfg.engine.rules.agenda import freed
 from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import put
@@ -85,6 +86,7 @@ class _Names:
         self.calls = [_code_of(worker) for worker in order]
         self.unset = [worker.unset for worker in order]
         self.edges = [[edge for edge, _, _ in out] for out in region.schedule.outs]
+        self.listeners = [worker.listeners for worker in order]
         self.took = [worker.meter.took if measured else None for worker in order]
         self.splits = [worker.node._split for worker in order]
 
@@ -122,8 +124,14 @@ def _values(region: Region, k: int, result: Any) -> list[Any] | None:
     return [None if entry is None else entry[0] for entry in written]
 
 
-_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, consider, _take_queued, _values)
-_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, consider, take_queued, values_of"
+def _put_heard(listeners: Any, value: Any, stamp: float) -> None:
+    """Put a token on the edges of an output to those who hear it now (T4)."""
+    for edge in listeners.who_hear():
+        put(edge, value, 0, stamp)
+
+
+_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, _put_heard, _take_queued, _values)
+_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, put_heard, take_queued, values_of"
 
 
 @functools.lru_cache(maxsize=512)
@@ -233,8 +241,11 @@ class _Writer:
             for at in range(len(worker.unset)):
                 if (at not in fed and not self.is_source) or (k and at not in fed):
                     say(f"d{k}_{at} = names.unset[{k}][{at}]")
-            for number, (_, _, to) in enumerate(self.outs[k]):
-                if to is None:
+            for output in range(len(worker.out_edges)):
+                if asks_who_hears(worker, output):
+                    say(f"heard{k}_{output} = names.listeners[{k}][{output}]")
+            for number, (_, output, to) in enumerate(self.outs[k]):
+                if to is None and not asks_who_hears(worker, output):
                     say(f"e{k}_{number} = names.edges[{k}][{number}]")
         kinds = self._kinds()
         if kinds:
@@ -447,9 +458,14 @@ class _Writer:
 
     def _put(self, k: int) -> None:
         """Over the border of the region."""
+        heard: set[int] = set()
         for number, (_, output, to) in enumerate(self.outs[k]):
-            if to is None:
-                value = f"v{k}_{output}"
+            value = f"v{k}_{output}"
+            if asks_who_hears(self.order[k], output):
+                if output not in heard:
+                    heard.add(output)
+                    self.say(f"put_heard(heard{k}_{output}, NO_MESSAGE if {value} is None else {value}, stamp)")
+            elif to is None:
                 self.say(f"put(e{k}_{number}, NO_MESSAGE if {value} is None else {value}, 0, stamp)")
 
     def _end_of_wave(self) -> None:
