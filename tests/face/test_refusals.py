@@ -62,6 +62,11 @@ def test_wrong_option_of_a_run_is_refused_before_anything_starts(options: dict[s
     assert hfg.run(graph, clock="virtual").outcome == "done"
 
 
+def test_an_option_that_no_run_has_is_refused_like_any_other_argument() -> None:
+    with pytest.raises(TypeError, match=r'a run has no option "debgu"; did you mean "debug"\?'):
+        hfg.run(ringing(), debgu=True)  # type: ignore[call-arg]
+
+
 @pytest.mark.parametrize("option", [{"through": ops.debounce(1)}, {"initial": 3}])
 def test_one_alone_where_a_list_is_needed_is_refused(option: dict[str, Any]) -> None:
     graph = ringing()

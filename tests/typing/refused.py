@@ -68,3 +68,8 @@ graph.add(MapLookup)  # error
 graph.add(lookup, on_error="ignore")  # error
 graph.promote(follow.speed, 3)  # error
 graph.gate("lookup", by=lookup)  # error
+
+# A run.
+hfg.run(graph, until_s="3")  # error
+hfg.run(graph, until=3)  # error
+hfg.running(graph, begin=print)  # error

@@ -9,14 +9,14 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 from hfg.engine.face import outside
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.observing.report import Report
 from hfg.engine.runtime.interrupt import CtrlC
-from hfg.engine.runtime.settings import Settings
+from hfg.engine.runtime.settings import RunOptions, Settings
 from hfg.engine.runtime.virtual import VirtualTimeLoop
 from hfg.errors import CheckFailed, GraphError, HfgError, RunError, UsageError
 from hfg.graph import Graph
@@ -24,7 +24,7 @@ from hfg.graph.checks import check_flat
 from hfg.graph.checks.endless import endless
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure.level import level_of
-from hfg.trace import Consumer
+from hfg.graph.structure.naming import suggest
 
 __all__ = ["run", "run_async", "running"]
 
@@ -34,6 +34,12 @@ Clock = Literal["real", "virtual"]
 def _need_clock(clock: str) -> None:
     if clock not in ("real", "virtual"):
         raise UsageError(f'clock must be "real" or "virtual", got {clock!r}')
+
+
+def _settings(options: RunOptions, *, allow_idle: bool = False) -> Settings:
+    for name in options.keys() - RunOptions.__annotations__.keys():
+        raise TypeError(f'a run has no option "{name}"; {suggest(name, RunOptions.__annotations__)}')
+    return Settings(allow_idle=allow_idle, **options)
 
 
 def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
@@ -105,30 +111,15 @@ async def run_async(
     graph: Graph,
     *,
     clock: Clock | None = None,
-    until_s: float | None = None,
-    debug: bool = False,
-    policy: str | None = None,
-    seed: int | None = None,
-    trace: Consumer | None = None,
     begin: Callable[[Run], object] | None = None,
     allow_idle: bool = False,
-    block_warning_s: float = 0.1,
-    fast: bool = True,
+    **options: Unpack[RunOptions],
 ) -> Report:
     """Run a graph to its end in the running event loop; see `run` for the arguments.
 
     Cancelling it tears the run down.
     """
-    settings = Settings(
-        debug=debug,
-        policy=policy,
-        seed=seed,
-        trace=trace,
-        fast=fast,
-        until_s=until_s,
-        allow_idle=allow_idle,
-        block_warning_s=block_warning_s,
-    )
+    settings = _settings(options, allow_idle=allow_idle)
     return await _run_to_end(graph, clock or "real", settings, begin)
 
 
@@ -136,15 +127,9 @@ def run(
     graph: Graph,
     *,
     clock: Clock = "real",
-    until_s: float | None = None,
-    debug: bool = False,
-    policy: str | None = None,
-    seed: int | None = None,
-    trace: Consumer | None = None,
     begin: Callable[[Run], object] | None = None,
     allow_idle: bool = False,
-    block_warning_s: float = 0.1,
-    fast: bool = True,
+    **options: Unpack[RunOptions],
 ) -> Report:
     """Run a graph to its end; blocks until then.
 
@@ -177,16 +162,7 @@ def run(
         raise UsageError(
             "hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`"
         )
-    settings = Settings(
-        debug=debug,
-        policy=policy,
-        seed=seed,
-        trace=trace,
-        fast=fast,
-        until_s=until_s,
-        allow_idle=allow_idle,
-        block_warning_s=block_warning_s,
-    )
+    settings = _settings(options, allow_idle=allow_idle)
     _need_clock(clock)
     factory = VirtualTimeLoop if clock == "virtual" else None
     ctrl_c = CtrlC()
@@ -207,23 +183,14 @@ async def running(
     graph: Graph,
     *,
     clock: Clock | None = None,
-    until_s: float | None = None,
-    debug: bool = False,
-    policy: str | None = None,
-    seed: int | None = None,
-    trace: Consumer | None = None,
-    block_warning_s: float = 0.1,
-    fast: bool = True,
+    **options: Unpack[RunOptions],
 ) -> AsyncIterator[Run]:
     """Run a graph as long as the block lasts; the block holds the run open until it calls `wait_finished`.
 
     Leaving the block stops the run and tears it down. A failure of the run cancels what the block waits for and
     comes out here.
     """
-    settings = Settings(
-        debug=debug, policy=policy, seed=seed, trace=trace, fast=fast, until_s=until_s, block_warning_s=block_warning_s
-    )
-    run = _prepare(graph, clock or "real", settings)
+    run = _prepare(graph, clock or "real", _settings(options))
     engine, lifetime = run._engine, run._parts.lifetime
     body = asyncio.current_task()
     assert body is not None

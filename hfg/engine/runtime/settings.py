@@ -1,18 +1,32 @@
-"""How a run is to be done: the arguments of `hfg.run`, in one place. Stands on `trace` and `errors`."""
+"""How a run is to be done: the options of `hfg.run`, in one place. Stands on `trace` and `errors`."""
 
 from __future__ import annotations
+
+from typing import TypedDict
 
 from hfg.errors import UsageError
 from hfg.trace import Consumer
 
-__all__ = ["FUSE_AFTER", "Settings"]
+__all__ = ["FUSE_AFTER", "RunOptions", "Settings"]
 
 FUSE_AFTER = 250
 """Firings of a head before its region is fused: forming one costs about as much as they save."""
 
 
+class RunOptions(TypedDict, total=False):
+    """What may be said of any run, and left out; `hfg.run` tells what it means."""
+
+    until_s: float | None
+    debug: bool
+    policy: str | None
+    seed: int | None
+    trace: Consumer | None
+    block_warning_s: float
+    fast: bool
+
+
 class Settings:
-    """How a run is to be done; the arguments of `hfg.run`.
+    """How a run is to be done: its options, checked, and what else holds of each run.
 
     Raises:
       UsageError: one of them cannot be.
@@ -26,11 +40,9 @@ class Settings:
         seed: int | None = None,
         trace: Consumer | None = None,
         fast: bool = True,
-        fuse_after: int | None = None,
         until_s: float | None = None,
         allow_idle: bool = False,
         block_warning_s: float = 0.1,
-        teardown_limit_s: float = 5.0,
     ) -> None:
         if until_s is not None and not _seconds(until_s):
             raise UsageError(f"until_s must be seconds from 0 on, or None for no end, got {until_s!r}")
@@ -43,11 +55,11 @@ class Settings:
         self.seed = seed
         self.trace = trace
         self.fast = fast
-        self.fuse_after = FUSE_AFTER if fuse_after is None else fuse_after
+        self.fuse_after = FUSE_AFTER
         self.until_s = until_s
         self.allow_idle = allow_idle
         self.block_warning_s = block_warning_s
-        self.teardown_limit_s = teardown_limit_s
+        self.teardown_limit_s = 5.0  # X3
 
 
 def _seconds(value: object) -> bool:
