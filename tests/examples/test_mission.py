@@ -254,11 +254,11 @@ def test_a_number_that_belongs_nowhere_ends_the_mission_in_failure_when_all_is_e
 @pytest.mark.rule("A10")
 def test_abort_ends_the_mission_whatever_is_active() -> None:
     graph = mission.build()
-    graph["referee"].ports.parameters["says"].value = ((1.0, "start"), (20.0, "abort"))
+    graph["referee"].ports.parameters["says"].value = ((1.0, "start"), (19.5, "abort"))
     trace = Recorder()
     with pytest.raises(Aborted):
         watched(graph, trace=trace)
-    assert trace[-1].time == 21.0
+    assert trace[-1].time == 20.5
     assert trace.active_at_end() == ["fetch/wait"]
 
 

@@ -101,7 +101,7 @@ def may_lead(worker: Worker) -> bool:
     core = worker.core
     if not core.fast or core.debug or core.trace is not None or core.inside is not None:
         return False
-    if worker.type is None or worker.process is None or not _is_plain(worker) or worker.paced:
+    if worker.type is None or worker.process is None or not _is_plain(worker):
         return False
     if worker.is_source:
         return worker.type.process_kind in ("generator", "function")

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hfg.engine.fusion.schedule import asks_who_hears
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules.agenda import freed
+from hfg.engine.rules.agenda import freed, note_start
 from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import put
@@ -59,7 +59,7 @@ def write_wave(region: Region, *, measured: bool) -> Wave:
     """Write, compile and bind the wave of a region; `measured`: each call tells the member's meter how long it took."""
     writer = _Writer(region, measured)
     text = writer.write()
-    name = f"hfg region {next(_numbers)}, from {region.head.path}"
+    name = f"<hfg region {next(_numbers)}> from {region.head.path}"  # (linecache passes over what ends with ">")
     _show(name, text, writer.calls, [worker.path for worker in region.order])
     names: dict[str, Any] = {}
     exec(_renamed(_compiled(text), name), names)
@@ -130,8 +130,8 @@ def _put_heard(listeners: Any, value: Any, stamp: float) -> None:
         put(edge, value, 0, stamp)
 
 
-_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, _put_heard, _take_queued, _values)
-_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, put_heard, take_queued, values_of"
+_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, note_start, _put_heard, _take_queued, _values)
+_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, note_start, put_heard, take_queued, values_of"
 
 
 @functools.lru_cache(maxsize=512)
@@ -147,7 +147,6 @@ def _renamed(code: CodeType, name: str) -> CodeType:
 
 def _show(name: str, text: str, calls: dict[int, int], paths: list[str]) -> None:
     """Let tracebacks and debuggers show the lines, each call with the path of its node."""
-
     shown = text.splitlines(keepends=True)
     for line, member in calls.items():
         shown[line - 1] = f'{shown[line - 1].rstrip()}  # node "{paths[member]}"\n'
@@ -279,6 +278,8 @@ class _Writer:
         say("worker.queued = worker.placed = False")
         say("region.running = True")
         say("core.speaker = worker")
+        if self.head.paced:
+            say("note_start(worker, worker.options.max_rate_hz)")
         if self.is_async:
             say("return start(waves(worker))")
             self.indent = 1
