@@ -5,6 +5,8 @@ Regions are fused from the first firing on here. `test_soak_fused.py` compares m
 
 from __future__ import annotations
 
+import asyncio
+import random
 import threading
 import traceback
 from collections.abc import Callable, Iterator
@@ -13,6 +15,7 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg import commands as c
 from hfg.cli.show import user_traceback
 from hfg.engine.runtime import settings
 from hfg.testing import Divergence, nodes, recorder, reference_run, replay
@@ -248,3 +251,38 @@ def test_a_traceback_for_the_user_begins_in_the_code_of_the_user(capsys: pytest.
         hfg.run(graph, clock="virtual")
     user_traceback(caught.value.__cause__)
     assert "region" not in capsys.readouterr().err
+
+
+@pytest.mark.rule("R4", "R7")
+@pytest.mark.parametrize("seed", range(6))
+def test_a_measured_run_that_is_paused_stepped_and_edited_loses_no_value(seed: int) -> None:
+    choose = random.Random(seed)
+    graph = hfg.Graph()
+    source, first, behind, end = nodes.Script(count=60), nodes.double(), nodes.double(), nodes.Tally()
+    graph.add(source, name="s", max_rate_hz=100)
+    graph.add(first, name="a")
+    graph.add(behind, name="b")
+    source.out >> first.value
+    first.out >> behind.value
+    behind.out >> graph.add(end, name="t").value
+
+    async def main() -> hfg.Report:
+        async with hfg.running(graph) as run:
+            for _ in range(8):
+                await asyncio.sleep(choose.choice([0.0, 0.01, 0.035]))
+                run.statistics()
+                await run.edit(c.Copy("a", "n"), c.Connect("a.out", "n.value"))
+                await asyncio.sleep(0.02)
+                run.pause()
+                await run.wait_paused()
+                for _ in range(choose.randint(0, 5)):
+                    await run.step(choose.choice([None, source, first, behind]))
+                run.resume()
+                await run.edit(c.Remove("n"))
+            return await run.wait_finished()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        report = runner.run(main())
+    assert end.count == 60
+    assert {node.firings for node in report.nodes.values()} == {61}
+    assert {edge.sent for edge in report.edges.values()} == {61}

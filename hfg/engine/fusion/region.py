@@ -93,7 +93,8 @@ class Region:
             worker.region = self
         self.core.regions.add(self)
         self._plain = write_wave(self, measured=False)
-        self._measured: Wave | None = write_wave(self, measured=True) if head.meter is not None else None
+        metered = all(worker.meter is not None for worker in order)  # one that an edit has added has none at first
+        self._measured: Wave | None = write_wave(self, measured=True) if metered else None
         self._wave = self._measured or self._plain
         self.step = self._wave.step
 
