@@ -234,3 +234,12 @@ assert_type(follow, FollowPerson)
 assert_type(follow.graph, hfg.Graph)
 graph.connect(numbers().out, follow.person)
 assert_type(hfg.run(graph, clock="virtual", until_s=3, policy="fifo", begin=print, allow_idle=True), hfg.Report)
+
+
+async def with_a_run(run: hfg.Run) -> None:
+    assert_type(await run.wait_for(follow.done), hfg.Token[int])
+    async with run.feed(graph.input("numbers", int)) as feed:
+        await feed.send(3)
+    async for number in run.read(graph.output("numbers out", int)):
+        assert_type(number, int)
+    run.set(follow.ports.parameters["speed"], 2.0)

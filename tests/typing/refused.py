@@ -73,3 +73,11 @@ graph.gate("lookup", by=lookup)  # error
 hfg.run(graph, until_s="3")  # error
 hfg.run(graph, until=3)  # error
 hfg.running(graph, begin=print)  # error
+
+
+async def with_a_run(run: hfg.Run) -> None:
+    async with run.feed(graph.input("numbers", int)) as feed:
+        await feed.send("three")  # error
+    await run.wait_for(lookup.key)  # error
+    run.read(lookup.pose)  # error
+    run.tap(lookup)  # error

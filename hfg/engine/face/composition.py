@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
+from typing import Any
+
 from hfg.engine.editing.edits import Edits
 from hfg.engine.editing.pausing import Pausing
 from hfg.engine.observing.consumers import Consumers
 from hfg.engine.observing.measuring import Measuring
+from hfg.engine.observing.report import Report, edge_reports, node_reports
 from hfg.engine.observing.taps import Taps
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.lifetime import Lifetime
 from hfg.engine.runtime.settings import Settings
+from hfg.errors import RunError
 from hfg.graph.flat import FlatGraph
 
 __all__ = ["Composition"]
@@ -21,6 +26,7 @@ class Composition:
     Attributes:
       consumers: who listens to the trace.
       taps: who looks at ports and edges.
+      outputs: what came out of the graph's own outputs, where nobody reads them.
     """
 
     def __init__(self, flat: FlatGraph, settings: Settings) -> None:
@@ -31,6 +37,9 @@ class Composition:
         self.pausing = Pausing(engine, self.consumers)
         self.edits = Edits(engine, self.lifetime)
         self._measuring: Measuring | None = None
+        self.outputs: dict[str, list[Any]] = {}
+        self._held = False
+        self._done: asyncio.Future[None] | None = None
         if settings.trace is not None:
             self.consumers.add(settings.trace)
 
@@ -40,3 +49,65 @@ class Composition:
         if self._measuring is None:
             self._measuring = Measuring(self.engine)
         return self._measuring
+
+    # --- the end ----------------------------------------------------------------------------------------------------
+
+    @property
+    def ending(self) -> bool:
+        """Whether somebody has begun to wait for the end, and so hears of a failure."""
+        return self._done is not None
+
+    def stay_open(self) -> None:
+        """Let the run not end by itself."""
+        self._held = True
+        self.engine.hold()
+
+    def let_end(self) -> None:
+        """Let the run end by itself (R5)."""
+        if self._held:
+            self._held = False
+            self.engine.unhold()
+
+    async def close(self) -> None:
+        """Tear the run down, once; whoever comes later waits for that.
+
+        Raises:
+          HfgError: the run has failed.
+        """
+        if self._done is None:
+            self._done = self.engine.loop.create_future()
+            try:
+                await self.lifetime.close()
+            finally:
+                self._done.set_result(None)
+        elif not self._done.done():
+            await asyncio.shield(self._done)
+        self.raise_failure()
+
+    def raise_failure(self) -> None:
+        """Raise what the run failed with, if it did, with the report.
+
+        Raises:
+          HfgError: the run has failed.
+        """
+        error = self.engine.error
+        if error is not None:
+            if isinstance(error, RunError):
+                error.report = self.report()  # type: ignore[attr-defined]
+            raise error
+
+    def report(self) -> Report:
+        """See `Run.report`."""
+        engine = self.engine
+        nodes = node_reports(engine.core)
+        ended_at = engine.now() if engine.ended_at is None else engine.ended_at
+        return Report(
+            outcome=engine.outcome,
+            duration_s=ended_at - engine.started_at,
+            firings=sum(node.firings for node in nodes.values()),
+            nodes=nodes,
+            edges=edge_reports(engine.core),
+            outputs=dict(self.outputs),
+            errors=[str(error) for error in engine.core.errors],
+            lost_activity=engine.core.lost_activity,
+        )

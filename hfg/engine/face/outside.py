@@ -10,7 +10,7 @@ import concurrent.futures
 from collections.abc import AsyncIterator, Callable
 from functools import partial
 from types import TracebackType
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from hfg.activity.rules import asked_for
 from hfg.engine.model.worker import ENDED, Worker
@@ -25,15 +25,17 @@ from hfg.types import accepts, describe
 
 __all__ = ["Feed", "collect", "need_sendable", "read", "signal", "until"]
 
+T = TypeVar("T")
 
-class Feed:
+
+class Feed(Generic[T]):
     """Brings tokens into a graph input; while it is open it holds the run open (R5).
 
     Leaving the block sends END behind the last token, unless `end=False` or an exception leaves it. It waits until
     threads have sent what they had begun to send, but not for END's place.
     """
 
-    def __init__(self, engine: Engine, worker: Worker, hint: Any, *, end: bool) -> None:
+    def __init__(self, engine: Engine, worker: Worker, hint: object, *, end: bool) -> None:
         self._engine = engine
         self._worker = worker
         self._hint = hint
@@ -41,7 +43,7 @@ class Feed:
         self._open = False
         self._lock = asyncio.Lock()
 
-    async def __aenter__(self) -> Feed:
+    async def __aenter__(self) -> Feed[T]:
         _check_running(self._engine)
         self._check_not_ended()
         self._open = True
@@ -59,7 +61,9 @@ class Feed:
         finally:
             self._engine.unhold()
 
-    async def send(self, value: Any, *, activity: int | None = None, stamp: float | None = None) -> None:
+    async def send(
+        self, value: T | Token[T] | Marker | None, *, activity: int | None = None, stamp: float | None = None
+    ) -> None:
         """Send one token and wait until the graph has processed it (P10); None is silence.
 
         Raises:
@@ -90,7 +94,7 @@ class Feed:
         _check_running(self._engine)
 
     def send_from_thread(
-        self, value: Any, *, activity: int | None = None, stamp: float | None = None
+        self, value: T | Token[T] | Marker | None, *, activity: int | None = None, stamp: float | None = None
     ) -> concurrent.futures.Future[None]:
         """Send from any other thread, in order; the future is done when the token is processed."""
         return asyncio.run_coroutine_threadsafe(self.send(value, activity=activity, stamp=stamp), self._engine.loop)
@@ -119,7 +123,7 @@ class Feed:
 
         self._engine.loop.call_soon(now)  # not in the middle of what the engine does now
 
-    def _put(self, value: Any, activity: int | None, stamp: float | None) -> None:
+    def _put(self, value: object, activity: int | None, stamp: float | None) -> None:
         if value is None:
             value = NO_MESSAGE
         if type(value) is Token:
@@ -220,7 +224,7 @@ def collect(engine: Engine, worker: Worker, values: list[Any]) -> None:
 
 
 async def signal(
-    engine: Engine, worker: Worker, slot: str, value: Any, activity: int | None, stamp: float | None
+    engine: Engine, worker: Worker, slot: str, value: object, activity: int | None, stamp: float | None
 ) -> None:
     """Bring a signal into a slot from outside, as if by an edge that is active; waits while its queue is full (F8).
 

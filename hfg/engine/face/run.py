@@ -6,10 +6,10 @@ A thin face: what is asked for is done by the parts of `composition`.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from functools import partial
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from hfg.engine.editing.pausing import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
@@ -19,7 +19,7 @@ from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import UNREADY
 from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance, glance_at
-from hfg.engine.observing.report import Report, edge_reports, node_reports
+from hfg.engine.observing.report import Report
 from hfg.engine.observing.statistics import Statistics
 from hfg.engine.observing.taps import Tap
 from hfg.engine.rules.activity import reset_activity
@@ -27,15 +27,20 @@ from hfg.engine.rules.agenda import unblock
 from hfg.engine.runtime import relays
 from hfg.engine.runtime.code import answer
 from hfg.engine.runtime.ports import bind_event, bind_start
-from hfg.errors import HfgError, NotRunning, RunError, UsageError
+from hfg.errors import HfgError, NotRunning, UsageError
 from hfg.graph import Graph
 from hfg.graph.editing.commands import Command
+from hfg.graph.structure.boundary import GraphInput, GraphOutput
+from hfg.graph.structure.edge import Edge, PortEnd
 from hfg.nodetype import Node
-from hfg.ports import EventPort, ParameterPort, SlotPort
+from hfg.ports import EventPort, ParameterPort, Port, SlotPort
 from hfg.token import Token
+from hfg.trace import Consumer
 from hfg.types import accepts, describe
 
 __all__ = ["Run"]
+
+T = TypeVar("T")
 
 
 class Run:
@@ -47,14 +52,16 @@ class Run:
         self._engine = parts.engine
         self._edits = parts.edits
         self._pausing = parts.pausing
-        self._outputs: dict[str, list[Any]] = {}
-        self._held = False
-        self._done: asyncio.Future[None] | None = None
 
     # --- bringing in and taking out ---------------------------------------------------------------------------------
 
     async def trigger(
-        self, port: Any, value: Any = None, *, activity: int | None = None, stamp: float | None = None
+        self,
+        port: EventPort[T] | SlotPort[T],
+        value: T | Token[T] | None = None,
+        *,
+        activity: int | None = None,
+        stamp: float | None = None,
     ) -> None:
         """Send a signal into a slot, or trigger an event as its node would; waits while a queue is full (F8).
 
@@ -86,7 +93,7 @@ class Run:
         event = bind_event(self._engine.worker_of(port.node), port.name)
         await self._engine.code.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
 
-    async def _trigger_inside(self, port: Any, value: Any, activity: int | None, stamp: float | None) -> None:
+    async def _trigger_inside(self, port: Port, value: object, activity: int | None, stamp: float | None) -> None:
         """The slot of a subgraph stands for those inside that it leads to (G1)."""
         behind = relays.slots_behind(port) if port.kind == "slot" else []
         if not behind or any(slot.kind != "slot" for slot, _ in behind):
@@ -97,7 +104,11 @@ class Run:
             explicit = activity if active else 0
             await outside.signal(self._engine, self._engine.worker_of(slot.node), slot.name, value, explicit, stamp)
 
-    def feed(self, port: Any, *, end: bool = True) -> outside.Feed:
+    @overload
+    def feed(self, port: GraphInput[T], *, end: bool = True) -> outside.Feed[T]: ...
+    @overload
+    def feed(self, port: str, *, end: bool = True) -> outside.Feed[Any]: ...
+    def feed(self, port: GraphInput[Any] | str, *, end: bool = True) -> outside.Feed[Any]:
         """Open a feed into a graph input; use it with `async with`.
 
         Which holds the run open and sends END at its end unless `end=False`.
@@ -110,7 +121,11 @@ class Run:
             f'graph input "{name}" is not connected: graph.connect(graph.inputs["{name}"], ...) before the run'
         )
 
-    def read(self, port: Any) -> AsyncIterator[Any]:
+    @overload
+    def read(self, port: GraphOutput[T]) -> AsyncIterator[T]: ...
+    @overload
+    def read(self, port: str) -> AsyncIterator[Any]: ...
+    def read(self, port: GraphOutput[Any] | str) -> AsyncIterator[Any]:
         """Read a graph output, value by value and lossless: a reader that does not read holds the graph back (P10).
 
         While something lies before a reader that goes on, the run does not end.
@@ -123,7 +138,7 @@ class Run:
             f'graph output "{name}" is not connected: graph.connect(..., graph.outputs["{name}"]) before the run'
         )
 
-    def tap(self, what: Any, *, size: int | None = None, max_rate_hz: float | None = None) -> Tap:
+    def tap(self, what: PortEnd | Edge | str, *, size: int | None = None, max_rate_hz: float | None = None) -> Tap:
         """Look at a port or an edge, given itself or by path: an async iterator over the tokens, markers too.
 
         The graph never waits for a tap: tokens that it has no room for are skipped, oldest first, and counted.
@@ -140,7 +155,7 @@ class Run:
         """
         return self._parts.taps.add(what, size, max_rate_hz)
 
-    def trace(self, consumer: Any, *, size: int | None = None) -> Listener:
+    def trace(self, consumer: Consumer, *, size: int | None = None) -> Listener:
         """Let a consumer see every event of the run from now on (R7); gives back what removes it.
 
         Args:
@@ -154,7 +169,7 @@ class Run:
         """
         return self._parts.consumers.add(consumer, size)
 
-    def set(self, parameter: Any, value: Any) -> None:
+    def set(self, parameter: ParameterPort[T], value: T) -> None:
         """Set a parameter of a node between its firings: now, or when the one under way is over (P8).
 
         That of a subgraph sets those inside that it stands for.
@@ -252,7 +267,7 @@ class Run:
         """
         return await self._pausing.wait_paused()
 
-    async def step(self, node: Any = None) -> Step:
+    async def step(self, node: Node | str | None = None) -> Step:
         """Let a paused run make one step, and wait until it is over (R3).
 
         Args:
@@ -265,7 +280,9 @@ class Run:
         """
         return await (self._pausing.wave() if node is None else self._pausing.step(node))
 
-    def break_at(self, place: Any, *, when: Callable[[Token[Any]], object] | None = None) -> Breakpoint:
+    def break_at(
+        self, place: Node | PortEnd | Edge | str, *, when: Callable[[Token[Any]], object] | None = None
+    ) -> Breakpoint:
         """Pause the run at a place from now on; `wait_paused` tells when.
 
         Args:
@@ -281,7 +298,7 @@ class Run:
 
     # --- waiting ----------------------------------------------------------------------------------------------------
 
-    async def wait_for(self, event: Any) -> Token[Any]:
+    async def wait_for(self, event: EventPort[T]) -> Token[T]:
         """Wait for the next signal of an event.
 
         Raises:
@@ -295,7 +312,7 @@ class Run:
                 '"start" was triggered as the run began, so waiting for it would never end: leave the line out, or '
                 "write `await run.wait_quiet()` to wait for what it began"
             )
-        waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
+        waiter: asyncio.Future[Token[T]] = self._engine.loop.create_future()
         bind_event(self._engine.worker_of(event.node), event.name)
         subscription = event.subscribe(partial(answer, waiter))
         ending = asyncio.ensure_future(self._engine.ending.wait())
@@ -312,7 +329,7 @@ class Run:
     async def wait_quiet(self) -> None:
         """Wait until nothing runs, nothing can start and no timer is pending (SEMANTICS, "quiet")."""
         await self._engine.wait_quiet()
-        self._raise_failure()
+        self._parts.raise_failure()
 
     async def wait_inputs(self, node: Node) -> None:
         """Wait for the node's input barrier: every live input holds a token."""
@@ -339,9 +356,9 @@ class Run:
           RunError: the run failed, stalled or was aborted.
         """
         await asyncio.sleep(0)  # tasks that were begun beside us open their feeds and readers first
-        self._release()
+        self._parts.let_end()
         await self._engine.ending.wait()
-        await self._close()
+        await self._parts.close()
         return self.report()
 
     # --- looking ----------------------------------------------------------------------------------------------------
@@ -395,26 +412,11 @@ class Run:
 
     def report(self) -> Report:
         """What the run has done; final once it is over."""
-        engine = self._engine
-        core = engine.core
-        nodes = node_reports(core)
-        outcome = engine.outcome
-        return Report(
-            outcome=outcome,
-            duration_s=engine.ended_at - engine.started_at
-            if engine.ended_at is not None
-            else engine.now() - engine.started_at,
-            firings=sum(node.firings for node in nodes.values()),
-            nodes=nodes,
-            edges=edge_reports(core),
-            outputs=dict(self._outputs),
-            errors=[str(error) for error in core.errors],
-            lost_activity=core.lost_activity,
-        )
+        return self._parts.report()
 
     # --- inside -----------------------------------------------------------------------------------------------------
 
-    def _boundary(self, port: Any, ports: Mapping[str, Any]) -> str:
+    def _boundary(self, port: object, ports: Mapping[str, object]) -> str:
         """Find one of the graph's own ports, given itself or by name."""
         name = str(getattr(port, "name", port))
         if name in ports and (port == name or port is ports[name]):
@@ -426,40 +428,13 @@ class Run:
             f'run.{verb} takes what graph.{kind}("name", type) gave'
         )
 
-    def _adopt(self, event: Any) -> None:
+    def _adopt(self, event: EventPort[Any]) -> None:
         """Somebody has subscribed to an automatic event, or to `start`; asked by the event."""
         if event is self.graph.start:
             bind_start(self._engine.worker_of(self.graph), event)
         else:
             bind_event(self._engine.worker_of(event.node), event.name)
 
-    def _hold(self) -> None:
-        self._held = True
-        self._engine.hold()
 
-    def _release(self) -> None:
-        if self._held:
-            self._held = False
-            self._engine.unhold()
-
-    async def _close(self) -> None:
-        if self._done is None:
-            self._done = self._engine.loop.create_future()
-            try:
-                await self._parts.lifetime.close()
-            finally:
-                self._done.set_result(None)
-        elif not self._done.done():
-            await asyncio.shield(self._done)
-        self._raise_failure()
-
-    def _raise_failure(self) -> None:
-        error = self._engine.error
-        if error is not None:
-            if isinstance(error, RunError):
-                error.report = self.report()  # type: ignore[attr-defined]
-            raise error
-
-
-def _names(ports: Any) -> str:
+def _names(ports: Iterable[str]) -> str:
     return ", ".join(f'"{name}"' for name in ports) or "none"

@@ -42,7 +42,7 @@ def _settings(options: RunOptions, *, allow_idle: bool = False) -> Settings:
     return Settings(allow_idle=allow_idle, **options)
 
 
-def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
+def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Composition]:
     """Check the graph and make its running form; nothing has happened yet."""
     if not isinstance(graph, Graph):
         raise UsageError(f"a Graph can run, not {type(graph).__name__}: write hfg.run(graph)")
@@ -64,9 +64,10 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> Run:
         raise CheckFailed(problems)
     if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
         _refuse_endless(flat)
-    run = Run(graph, Composition(flat, settings))
+    parts = Composition(flat, settings)
+    run = Run(graph, parts)
     level.whole.begin_run(run)
-    return run
+    return run, parts
 
 
 def _refuse_endless(flat: FlatGraph) -> None:
@@ -84,14 +85,14 @@ def _refuse_endless(flat: FlatGraph) -> None:
 async def _run_to_end(
     graph: Graph, clock: Clock, settings: Settings, begin: Callable[[Run], object] | None, ctrl_c: CtrlC | None = None
 ) -> Report:
-    run = _prepare(graph, clock, settings)
-    engine, lifetime = run._engine, run._parts.lifetime
+    run, parts = _prepare(graph, clock, settings)
+    engine, lifetime = parts.engine, parts.lifetime
     if ctrl_c is not None:
         ctrl_c.task, ctrl_c.lifetime = asyncio.current_task(), lifetime
         ctrl_c.error = lambda: engine.error
     try:
         for worker in engine.core.readers:
-            outside.collect(engine, worker, run._outputs.setdefault(worker.port_name, []))
+            outside.collect(engine, worker, parts.outputs.setdefault(worker.port_name, []))
         if begin is not None:
             begin(run)
         if settings.allow_idle:
@@ -103,8 +104,8 @@ async def _run_to_end(
             await lifetime.close()
         finally:
             level_of(graph).whole.end_run()
-    run._raise_failure()
-    return run.report()
+    parts.raise_failure()
+    return parts.report()
 
 
 async def run_async(
@@ -190,8 +191,8 @@ async def running(
     Leaving the block stops the run and tears it down. A failure of the run cancels what the block waits for and
     comes out here.
     """
-    run = _prepare(graph, clock or "real", _settings(options))
-    engine, lifetime = run._engine, run._parts.lifetime
+    run, parts = _prepare(graph, clock or "real", _settings(options))
+    engine, lifetime = parts.engine, parts.lifetime
     body = asyncio.current_task()
     assert body is not None
     cancelled_by_us = False
@@ -199,13 +200,13 @@ async def running(
     async def guard() -> None:
         nonlocal cancelled_by_us
         await engine.ending.wait()
-        if engine.error is not None and run._done is None:
+        if engine.error is not None and not parts.ending:
             cancelled_by_us = True
             body.cancel()
 
     watcher: asyncio.Task[None] | None = None
     try:
-        run._hold()
+        parts.stay_open()
         await lifetime.start()
         if engine.error is None:
             watcher = asyncio.create_task(guard(), name=f"hfg guard of {graph.name}")
@@ -222,10 +223,10 @@ async def running(
         if engine.outcome == "running":
             engine.finish("stopped", None)
         try:
-            await _quietly(run._close())
+            await _quietly(parts.close())
         finally:
             level_of(graph).whole.end_run()
-    run._raise_failure()
+    parts.raise_failure()
 
 
 async def _quietly(closing: Coroutine[Any, Any, None]) -> None:
