@@ -1,10 +1,10 @@
 """Where the time of a hop goes: the share of each part of the engine in a chain of ten functions.
 
-A chain of ten runs for some seconds while py-spy, from another process, stops it some hundred times a second and notes
-the line of Python it is at. That is the honest way here: cProfile would charge every call some 0.1 us where a whole hop
-costs less than ten of them, and samplers inside the process see it only where the interpreter looks for signals. The
-lines are sorted into parts by what stands in them. As a check the parts that can be taken out are measured alone, and
-the hop with and without the sampler.
+A chain of ten runs for some seconds while py-spy, from another process, stops it some hundred times a second and
+notes the line of Python it is at. That is the honest way here: cProfile would charge every call some 0.1 us where a
+whole hop costs less than ten of them, and samplers inside the process see it only where the interpreter looks for
+signals. The lines, those of the code that is written for a fused region too, are sorted into parts by what stands in
+them. As a check the parts that can be taken out are measured alone, and the hop with and without the sampler.
 
 `python -m benchmarks.profile_hop [--json FOLDER]`; needs py-spy (`pip install py-spy`; on some systems more rights).
 """
@@ -12,6 +12,7 @@ the hop with and without the sampler.
 from __future__ import annotations
 
 import argparse
+import json
 import linecache
 import os
 import re
@@ -20,7 +21,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -52,27 +53,20 @@ class Part(NamedTuple):
 
 ANY = ""
 _YOURS = "your function: its call and its return"
-_TOKEN = "the token: making it, onto its edge and off it"
-_CHECKS = "is there anything that is not ordinary?"
-_BARRIER = "the receiver: has it everything now?"
-_QUEUE = "the run queue: in, out, and the step's call"
-_RELEASE = "release: what was taken is processed, up the chain"
-_BOOKS = "books: who is at work, how often, stamps"
-STEP = r"steps\..*step$"
+_GUARD = "guards: is the result of the usual kind, has anything changed?"
+_TURN = "behind a wave: may the next one follow?"
+_BOOKS = "books: stamps, how often"
+_QUEUE = "the run queue, and into the region and out of it"
+WAVE = r"^hfg region.*\.wave$"
 PARTS = (
     Part(_YOURS, r"^(nodes|meters)\.", ANY),
-    Part(_YOURS, STEP, r"process\(|next\(generator\)"),
-    Part(_TOKEN, STEP, r"Token\(|\.sent = |given\.held =|taken\.token|^inputs\.missing = 1"),
-    Part(_BARRIER, STEP, r"target_inputs|^if not missing|target\.(blocked|placed)|consider\("),
-    Part(_CHECKS, STEP, r"special|silent_code|is None|is not None|type\(|^try:|calls|right"),
-    Part("activity", STEP, r"activ|carries"),
-    Part(_QUEUE, STEP, r"queued|push\(|^def step"),
-    Part(_QUEUE, r"^engine\.Engine\._drain$|^agenda\.queue$", ANY),
-    Part(_BARRIER, r"^agenda\.", ANY),
-    Part(_RELEASE, STEP, r"held|sequential|only|outputs|release"),
-    Part(_RELEASE, r"^releasing\.", ANY),
-    Part(_BOOKS, STEP, r"firings|core\.current|stamp|busy"),
-    Part(_BOOKS, r"(now|time)$", ANY),
+    Part(_YOURS, WAVE, r"= f\d+\(|next\(generator\)"),
+    Part(_TURN, WAVE, r"stamp > until|^while|^continue"),
+    Part(_BOOKS, WAVE, r"^stamp =|^done|^spread"),
+    Part(_GUARD, WAVE, r"type\(v|flags|is not None|^else"),
+    Part(_QUEUE, WAVE, ANY),
+    Part(_QUEUE, r"^region\.|^engine\.Engine\._drain$|^agenda\.", ANY),
+    Part("as interpreted: until a region is formed", r"^(specialise|firing|sending|releasing|sources)\.", ANY),
 )
 REST = "the rest of the engine"
 
@@ -103,13 +97,21 @@ def stacks(lines: Iterable[str]) -> Iterable[tuple[list[Frame], int]]:
             yield frames, int(count)
 
 
-def shares(lines: Iterable[str]) -> dict[str, float]:
-    """The share of each part, in percent, of the samples that were taken while the engine was at work."""
+def shares(lines: Iterable[str], written: Mapping[str, Sequence[str]] | None = None) -> dict[str, float]:
+    """The share of each part, in percent, of the samples that were taken while the engine was at work.
+
+    Args:
+      lines: of py-spy's raw form.
+      written: the lines of what is no file: the code of fused regions, by its name.
+    """
+    texts = written or {}
     found: Counter[str] = Counter()
     for frames, count in stacks(lines):
         if any(frame.function == "Engine._drain" for frame in frames):
             innermost = frames[-1]
-            found[part_of(innermost, linecache.getline(innermost.file, innermost.line))] += count
+            text = texts.get(innermost.file)
+            line = linecache.getline(innermost.file, innermost.line) if text is None else text[innermost.line - 1]
+            found[part_of(innermost, line)] += count
     total = found.total()
     if not total:
         raise RuntimeError("no sample met the engine at work: has Engine._drain another name now?")
@@ -117,25 +119,27 @@ def shares(lines: Iterable[str]) -> dict[str, float]:
     return {name: 100 * found[name] / total for name in names}
 
 
-def work(seconds: float) -> None:
-    """Run the chain for about so long; prints microseconds a hop."""
+def work(seconds: float, into: Path) -> None:
+    """Run the chain for about so long; prints microseconds a hop, and leaves the code of its regions in a file."""
     tokens = int(seconds * 1e6 / (LENGTH + 1) / 0.75)
     meter = Arrivals(tokens)
     run(Kind("function", through).chain_graph(LENGTH, tokens, meter))
     print(meter.figures(LENGTH + 1)["wall"])
+    regions = [name for name in linecache.cache if name.startswith("hfg region")]
+    into.write_text(json.dumps({name: linecache.getlines(name) for name in regions}))
 
 
 def sampled(sampler: str, seconds: float) -> tuple[dict[str, float], float]:
     """Shares, and microseconds a hop under the sampler, of one fresh process."""
     with tempfile.TemporaryDirectory() as folder:
-        raw = Path(folder) / "raw.txt"
+        raw, regions = Path(folder) / "raw.txt", Path(folder) / "regions.json"
         watch = [sampler, "record", "--rate", str(RATE_HZ), "--format", "raw", "--full-filenames", "--output", str(raw)]
-        command = [sys.executable, "-m", "benchmarks.profile_hop", "--work", str(seconds)]
+        command = [sys.executable, "-m", "benchmarks.profile_hop", "--work", str(seconds), "--regions", str(regions)]
         done = subprocess.run([*watch, "--", *command], capture_output=True, text=True, check=False, cwd=ROOT)
         if done.returncode or not raw.exists():
             raise RuntimeError(f"py-spy could not watch the run:\n{done.stdout}{done.stderr}")
         hop = next(float(line) for line in done.stdout.splitlines() if re.fullmatch(r"\d+\.\d+", line.strip()))
-        return shares(raw.read_text().splitlines()), hop
+        return shares(raw.read_text().splitlines(), json.loads(regions.read_text())), hop
 
 
 def alone(statement: Callable[[], object], repeat: int = 300_000) -> float:
@@ -194,9 +198,10 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=SECONDS, help="how long each runs, about")
     parser.add_argument("--json", type=Path, metavar="FOLDER", help="write one line per part")
     parser.add_argument("--work", type=float, help=argparse.SUPPRESS)
+    parser.add_argument("--regions", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.work:
-        work(arguments.work)
+        work(arguments.work, arguments.regions)
         return 0
     beside = Path(sys.executable).with_name("py-spy")
     sampler = str(beside) if beside.exists() else shutil.which("py-spy")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib
 import json
+import linecache
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,8 @@ from benchmarks.__main__ import SUITES
 from benchmarks.goals import Goal, Side, judge, verdicts
 from benchmarks.measure import BEFORE, ROOT, Record, measure, one, read, write
 from benchmarks.meters import Arrivals, Laps
+from benchmarks.nodes import through
+from benchmarks.ours import Kind, run
 from benchmarks.works import WORKS
 
 MODULES = {name: importlib.import_module(f"benchmarks.{name}") for name in (*SUITES, "bench_peers", "bench_goals")}
@@ -176,25 +180,29 @@ def test_the_page_has_every_table_once() -> None:
     assert suites == {suite for suite, _ in page.TABLES.values()}
 
 
-def test_samples_are_sorted_into_parts_by_their_innermost_line(tmp_path: Path) -> None:
-    steps = tmp_path / "steps.py"
-    steps.write_text("given.token = Token(result)\nsomething.new()\n")
+def test_samples_are_sorted_into_parts_by_their_innermost_line() -> None:
+    """The lines are those that the engine writes for the chain now: a part that no line falls into has gone stale."""
+    meter = Arrivals(2_000)
+    run(Kind("function", through).chain_graph(3, 2_000, meter))
+    name = next(name for name in reversed(linecache.cache) if name.startswith("hfg region"))
+    code = linecache.getlines(name)
+    wave = range(next(n for n, line in enumerate(code, 1) if "def wave" in line), len(code) + 1)
     outer = "<module> (bench.py:1);Engine._drain (engine/engine.py:1)"
     found = profile_hop.shares(
         [
-            f"{outer};_through_step.<locals>.step ({steps}:1) 3",
-            f"{outer};_through_step.<locals>.step ({steps}:2) 2",
+            *(f"{outer};build.<locals>.wave ({name}:{line}) 1" for line in wave),
+            f"{outer};build.<locals>.wave ({name}:{wave[0]});through (benchmarks/nodes.py:1) 4",
             f"{outer} 1",
-            f"{outer};_through_step.<locals>.step ({steps}:1);through (benchmarks/nodes.py:1) 4",
+            f"{outer};_step (engine/rules/firing.py:1) 1",
+            f"{outer};speak (engine/rules/errors.py:1) 1",
             "<module> (bench.py:1) 100",
-        ]
+        ],
+        {name: code},
     )
-    assert {name: share for name, share in found.items() if share} == {
-        "your function: its call and its return": 40.0,
-        "the token: making it, onto its edge and off it": 30.0,
-        "the run queue: in, out, and the step's call": 10.0,
-        "the rest of the engine": 20.0,
-    }
+    assert all(found.values()), found
+    assert sum(found.values()) == pytest.approx(100)
+    calls = sum(1 for line in code if re.search(r"= f\d+\(|= next\(", line))
+    assert found["your function: its call and its return"] == pytest.approx(100 * (4 + calls) / (len(wave) + 7))
 
 
 def test_a_profile_that_met_nothing_is_an_error() -> None:
