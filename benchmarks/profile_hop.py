@@ -57,7 +57,7 @@ _GUARD = "guards: is the result of the usual kind, has anything changed?"
 _TURN = "behind a wave: may the next one follow?"
 _BOOKS = "books: stamps, how often"
 _QUEUE = "the run queue, and into the region and out of it"
-WAVE = r"^hfg region.*\.wave$"
+WAVE = r"^.?hfg region.*\.wave$"
 PARTS = (
     Part(_YOURS, r"^(nodes|meters)\.", ANY),
     Part(_YOURS, WAVE, r"= f\d+\(|next\(generator\)"),
@@ -125,7 +125,7 @@ def work(seconds: float, into: Path) -> None:
     meter = Arrivals(tokens)
     run(Kind("function", through).chain_graph(LENGTH, tokens, meter))
     print(meter.figures(LENGTH + 1)["wall"])
-    regions = [name for name in linecache.cache if name.startswith("hfg region")]
+    regions = [name for name in linecache.cache if "hfg region" in name]
     into.write_text(json.dumps({name: linecache.getlines(name) for name in regions}))
 
 

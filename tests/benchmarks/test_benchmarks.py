@@ -184,7 +184,7 @@ def test_samples_are_sorted_into_parts_by_their_innermost_line() -> None:
     """The lines are those that the engine writes for the chain now: a part that no line falls into has gone stale."""
     meter = Arrivals(2_000)
     run(Kind("function", through).chain_graph(3, 2_000, meter))
-    name = next(name for name in reversed(linecache.cache) if name.startswith("hfg region"))
+    name = next(name for name in reversed(linecache.cache) if "hfg region" in name)
     code = linecache.getlines(name)
     wave = range(next(n for n, line in enumerate(code, 1) if "def wave" in line), len(code) + 1)
     outer = "<module> (bench.py:1);Engine._drain (engine/engine.py:1)"
