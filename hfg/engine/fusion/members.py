@@ -12,7 +12,7 @@ from hfg.engine.model.policies import Fifo
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.ports.edges import SyncEdge
 
-__all__ = ["lives_by_its_slots", "may_be_called", "may_be_inside", "may_lead"]
+__all__ = ["is_plain_and_fed", "lives_by_its_slots", "may_be_called", "may_be_inside"]
 
 
 def _is_plain(worker: Worker) -> bool:
@@ -22,7 +22,6 @@ def _is_plain(worker: Worker) -> bool:
         options is not None
         and kind is not None
         and worker.scope is None
-        and not worker.unfit
         and _nobody_looks(worker)
         and not worker.group.threaded
         and isinstance(worker.group.policy, Fifo)
@@ -53,6 +52,7 @@ def may_be_inside(worker: Worker) -> bool:
     """Whether it may follow the head: its inputs are all fed by outputs of its own group, in the same wave (R2)."""
     return (
         not worker.is_source
+        and not worker.unfit
         and not worker.blocked & ENDED
         and worker.type is not None
         and worker.type.process_kind in ("function", "async")
@@ -96,8 +96,8 @@ def lives_by_its_slots(worker: Worker) -> bool:
     )
 
 
-def may_lead(worker: Worker) -> bool:
-    """Whether a region may begin with it: a source, or a function with an edge into each input that it waits for."""
+def is_plain_and_fed(worker: Worker) -> bool:
+    """Whether it is a source, or a function with an edge into each input that it waits for, and nobody looks."""
     core = worker.core
     if not core.fast or core.debug or core.trace is not None or core.inside is not None:
         return False

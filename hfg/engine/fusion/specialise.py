@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hfg.engine.fusion.members import lives_by_its_slots, may_lead
+from hfg.engine.fusion.members import is_plain_and_fed, lives_by_its_slots
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import schedule
 from hfg.engine.fusion.slots import calls_step
+from hfg.engine.fusion.waiting import waiting_step
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import firing
 
@@ -39,13 +40,14 @@ def _step_of(worker: Worker) -> Step:
         return step
     if lives_by_its_slots(worker):
         return calls_step(worker)
-    if may_lead(worker):
-        return _until_warm(worker)
-    return firing.step
+    if not is_plain_and_fed(worker):
+        return firing.step
+    alone = waiting_step(worker) if worker.is_async and not worker.paced else firing.step
+    return alone if worker.unfit else _until_warm(worker, alone)
 
 
-def _until_warm(worker: Worker) -> Step:
-    """The interpreted way, until the node has fired so often that fusing pays; then a region behind it."""
+def _until_warm(worker: Worker, alone: Step) -> Step:
+    """What it does alone, until the node has fired so often that fusing pays; then a region behind it."""
     core = worker.core
     left = core.fuse_after
 
@@ -61,10 +63,10 @@ def _until_warm(worker: Worker) -> Step:
             and worker.region is None
         ):
             found = schedule(worker)
-            worker.step = firing.step if found is None else Region(found, specialise).step
+            worker.step = alone if found is None else Region(found, specialise).step
             worker.step(worker)
         else:
-            firing.step(worker)
+            alone(worker)
 
     return step
 

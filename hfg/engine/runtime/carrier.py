@@ -13,6 +13,7 @@ import contextlib
 import contextvars
 import sys
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from hfg.engine.model.core import PENDING
@@ -24,14 +25,12 @@ Done = Callable[[Any, BaseException | None], None]
 if sys.version_info >= (3, 12):
     from asyncio.tasks import _swap_current_task as _swap  # type: ignore[attr-defined]
 else:
-    from asyncio.tasks import _enter_task, _leave_task, current_task
+    from asyncio.tasks import _current_tasks  # type: ignore[attr-defined]
 
     def _swap(loop: asyncio.AbstractEventLoop, task: Any) -> Any:
-        previous = current_task(loop)
-        if previous is not None:
-            _leave_task(loop, previous)
+        previous = _current_tasks.pop(loop, None)
         if task is not None:
-            _enter_task(loop, task)
+            _current_tasks[loop] = task
         return previous
 
 
@@ -62,7 +61,7 @@ class Carrier:
       waiting: whether a coroutine is under way.
     """
 
-    __slots__ = ("_context", "_coroutine", "_done", "_loop", "_must_cancel", "_outside", "_waits_for", "task")
+    __slots__ = ("_context", "_coroutine", "_done", "_loop", "_must_cancel", "_outside", "_soon", "_waits_for", "task")
 
     def __init__(
         self,
@@ -70,8 +69,10 @@ class Carrier:
         name: str,
         outside: contextvars.Context,
         context: contextvars.Context | None = None,
+        soon: Callable[[Callable[[], None]], object] | None = None,
     ) -> None:
         self._loop = loop
+        self._soon = soon or partial(loop.call_soon, context=outside)  # goes on behind what is ready now
         self._outside = outside  # in which the engine's own code goes on
         self._context = outside.copy() if context is None else context
         self._coroutine: Any = None
@@ -151,7 +152,7 @@ class Carrier:
     def _wait(self, waits_for: Any) -> None:
         """Go on when what the coroutine yielded is done; the protocol between coroutines, futures and tasks."""
         if waits_for is None:
-            self._loop.call_soon(self._step, context=self._outside)
+            self._soon(self._step)
             return
         if getattr(waits_for, "_asyncio_future_blocking", None):
             waits_for._asyncio_future_blocking = False

@@ -56,6 +56,9 @@ class _Pump(Protocol):
     def go_on(self) -> None:
         """A callback of the loop is over: pump."""
 
+    def give_way(self, call: Callable[[], None]) -> None:
+        """Call it behind all that is ready now."""
+
     def internal_fault(self, error: BaseException) -> None:
         """A fault of ours ends the run."""
 
@@ -128,7 +131,7 @@ class CodeRunner:
         """Make the dormant task of an async node, in a context that tells whose code runs."""
         context = self.context.copy()
         context.run(_code_of.set, worker)
-        return Carrier(self.loop, f"hfg {worker.path}", self.context, context)
+        return Carrier(self.loop, f"hfg {worker.path}", self.context, context, self._engine.give_way)
 
     def _limit(self, worker: Worker) -> None:
         """X2: the firing may not take longer than its limit."""

@@ -119,6 +119,7 @@ class Engine:
         self.ended_how: tuple[str, HfgError | None] | None = None
         self.ending: asyncio.Event = asyncio.Event()
         self._scheduled = False
+        self._resumed: deque[Callable[[], None]] = deque()  # code that goes on when all is done that is ready now
         self._thread = threading.get_ident()
         self._ready_groups: deque[Dispatching] = deque()
         self.scheduler = rx.RunScheduler(self)
@@ -257,6 +258,8 @@ class Engine:
         finally:
             core.pumping = False
             core.current = core.speaker = None
+        while self._resumed:
+            self.loop.call_soon(self._resumed.popleft(), context=self.context)
         for call in self.callbacks.pumped:
             call()
         if self.ended_how is not None:
@@ -336,6 +339,8 @@ class Engine:
             if policy:
                 worker = take()
                 worker.step(worker)
+            elif self._resumed and not self._others_are_ready():
+                self._resumed.popleft()()
             elif not ready_groups:
                 return
             if flags:
@@ -345,6 +350,20 @@ class Engine:
                 if self.now() >= until:
                     return
                 left = _SLICE_STEPS
+
+    def give_way(self, call: Callable[[], None]) -> None:
+        """Code has given way to others for a moment (`sleep(0)`): let it go on behind all that is ready now.
+
+        Where nothing else is, a pass of the event loop would be for nothing: the pump goes on by itself.
+        """
+        if self.core.pumping and not self.virtual:
+            self._resumed.append(call)
+        else:
+            self.loop.call_soon(call, context=self.context)
+
+    def _others_are_ready(self) -> bool:
+        """Whether the event loop has something to do; taken for granted where it does not tell."""
+        return bool(getattr(self.loop, "_ready", True))
 
     def _drain_virtual(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
         """The same where time stands still: a slice is a number of waves, however fast the machine is (R6).

@@ -1,0 +1,123 @@
+"""The fast path of async functions that really wait: started at once, and their value leaves when it is there.
+
+While such a node waits its wave waits too, so there is nothing to fuse; what can be spared is deciding everything anew
+at each firing. Only a shortening, as in `slots`: what it does not cover goes the interpreted way. Stands on `firing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import CoroutineType
+from typing import Any
+
+from hfg.engine.model.core import PENDING
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules import firing
+from hfg.engine.rules.agenda import consider, let_follow
+from hfg.engine.rules.releasing import release
+from hfg.engine.rules.sending import put
+from hfg.ports.edges import SyncEdge
+from hfg.token import NO_MESSAGE, Token
+
+__all__ = ["waiting_step"]
+
+Step = Callable[[Worker], None]
+_EXCEPTIONAL = frozenset({Token, CoroutineType})
+
+
+def waiting_step(worker: Worker) -> Step:
+    """The step of an async function whose inputs are all fed by outputs; else the interpreted one."""
+    edges = worker.live_inputs
+    kind = worker.type
+    if kind.result == "fields" or worker.listeners or not all(type(edge) is SyncEdge for edge in edges):
+        return firing.step
+    core = worker.core
+    code = core.code
+    process: Any = worker.process
+    inputs, outputs = worker.inputs, worker.outputs
+    count = len(edges)
+    unset = worker.unset
+    held = tuple(edge for edge in edges if edge.sequential)
+    pipelined = tuple(edge for edge in edges if not edge.sequential)
+    wired = worker.out_edges
+    outs = tuple(edge for some in wired for edge in some)
+    outs = tuple(sorted(outs, key=lambda edge: edge.target_kind != "slot"))  # F9
+    carries = any(edge.active for edge in worker.all_out_edges())
+    sends = bool(kind.outputs)
+    lent: Any = None  # the eager task for which `late` was made
+    late: Any = None
+
+    def leave(result: Any, error: BaseException | None) -> None:
+        if (
+            error is not None
+            or type(result) in _EXCEPTIONAL
+            or worker.out_edges is not wired  # the wiring has changed
+            or core.trace is not None  # somebody has begun to look
+            or worker.written is not None
+            or worker.right
+            or worker.events_due
+            or worker.on_idle is not None
+            or worker.follows
+            or (carries and worker.active)
+            or not (sends or result is None)
+        ):
+            firing.when_done(worker)(result, error)
+            return
+        stamp: Any = worker.stamp
+        if outs:
+            since = len(core.followers)
+            value = NO_MESSAGE if result is None else result
+            for edge in outs:
+                put(edge, value, 0, stamp)
+            let_follow(core, since)
+            if outputs.missing:
+                worker.placed = False
+        worker.busy = ""
+        worker.stamp = None
+        if outputs.missing:
+            worker.held = True
+        elif held:
+            release(held)
+        consider(worker)
+
+    def step(worker: Worker) -> None:
+        nonlocal lent, late
+        if worker.special or not worker.placed or inputs.missing or worker.busy:
+            firing.step(worker)
+            return
+        stamp = -1.0
+        arguments = list(unset)
+        for edge in edges:
+            token: Any = edge.token
+            if token.activity:
+                firing.step(worker)
+                return
+            if token.stamp > stamp:
+                stamp = token.stamp
+            arguments[edge.position] = token.value
+        worker.queued = worker.placed = False
+        for edge in edges:
+            edge.token = None
+        inputs.missing = count
+        worker.firings += 1
+        worker.ticket += 1
+        worker.busy = "firing"
+        worker.stamp = stamp
+        worker.taken = held
+        if pipelined:
+            release(pipelined)
+        carrier = worker.carrier
+        if carrier is not lent:
+            lent, late = carrier, code.late(worker, leave)
+        core.speaker = worker
+        try:
+            result = carrier.start(process(*arguments), late)
+        except Exception as error:
+            leave(None, error)
+            return
+        if result is PENDING:
+            code.begin(worker)
+        else:
+            leave(result, None)
+
+    return step
