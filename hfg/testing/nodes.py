@@ -22,6 +22,7 @@ __all__ = [
     "Latch",
     "Merge",
     "OnlyTwice",
+    "Parts",
     "Passing",
     "Pulse",
     "Relay",
