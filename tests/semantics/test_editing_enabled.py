@@ -114,6 +114,25 @@ def test_an_edit_that_enables_a_subgraph_waits_for_the_firings_inside() -> None:
     assert firings(trace, "pair/others")[1] == 0.01
 
 
+@pytest.mark.rule("R4", "F10", "P7")
+def test_initial_tokens_of_an_edge_that_an_edit_leads_to_a_disabled_node_are_discarded() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.add(script(values=(1, 2, 3, 4)), max_rate_hz=250.0) >> graph.add(sink(), name="free")
+        graph.add(double(), name="resting", enabled=False)
+        return graph
+
+    async def body(run: hfg.Run) -> None:
+        await asyncio.sleep(0.001)
+        await run.edit(c.Connect("script.out", "resting.value", initial=(5,)))
+        await asyncio.sleep(0.004)
+        await run.edit(c.Enable("resting"))
+
+    trace = drive(build, body)
+    assert trace.dropped("script.out -> resting.value") == [5]
+    assert trace.taken("script.out -> resting.value") == [3, 4, hfg.END]
+
+
 @pytest.mark.rule("R4", "F10")
 def test_what_an_edit_enables_is_set_up_before_and_takes_part_from_one_moment_on() -> None:
     def build() -> hfg.Graph:

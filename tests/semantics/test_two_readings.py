@@ -6,7 +6,7 @@ What is expected was counted out on paper from the rules alone, before either wa
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from typing import Any
 
 import pytest
@@ -16,6 +16,7 @@ import hfg
 from hfg import END, NO_MESSAGE
 from hfg.testing import Recorder, recorder, reference_run
 from hfg.testing.nodes import (
+    AsyncRelay,
     Doubter,
     Relay,
     Scaled,
@@ -29,6 +30,7 @@ from hfg.testing.nodes import (
     slow_double,
 )
 from hfg.trace import FiringStarted, RunEnded, TokenSent
+from tests.semantics.nodes import drive, forward
 
 Perform = Callable[..., Recorder]
 
@@ -71,6 +73,143 @@ def starts(seen: Recorder, node: str, *, kind: str | None = None) -> list[float]
 
 def signs(seen: Recorder, edge: str) -> list[tuple[Any, int]]:
     return [(token.value, token.activity) for token in seen.tokens(edge)]
+
+
+# --- F5, F6: pipelined means taken
+
+
+@pytest.mark.rule("F5")
+@pytest.mark.parametrize(
+    ("release", "expected"),
+    [
+        # While the consumer works on one value the source makes the next.
+        ("pipelined", [1.0, 2.0, 3.0]),
+        # The source begins with the next when the consumer is done.
+        ("sequential", [1.0, 3.0, 5.0]),
+    ],
+)
+def test_a_pipelined_producer_works_while_its_consumer_does(perform: Any, release: Any, expected: list[float]) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.add(ascript(values=(1, 2, 3), pause_s=1.0)) >> graph.add(slow_double(pause_s=1.0), release=release)
+        return graph
+
+    assert perform(build, lambda seen: starts(seen, "slow_double", kind="process")) == expected
+
+
+@pytest.mark.rule("F5", "P4")
+def test_pipelined_is_still_one_token_on_the_edge(perform: Any) -> None:
+    """One under work and one waiting, never two waiting."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.add(script(values=(1, 2, 3))) >> graph.add(slow_double(pause_s=1.0), release="pipelined")
+        return graph
+
+    # The first is taken at once, so the second can be made at once; the third when that is taken, and so on.
+    assert perform(build, lambda seen: starts(seen, "script")) == [0.0, 0.0, 1.0, 2.0]
+
+
+@pytest.mark.rule("F5")
+def test_sequential_waits_through_a_pipelined_node_only_until_its_tokens_are_taken(perform: Any) -> None:
+    """The wave of the source is over as soon as the slow end of the chain has taken what the middle made of it."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        (
+            graph.add(script(values=(1, 2, 3)))
+            >> graph.add(double())
+            >> graph.add(slow_double(pause_s=1.0), release="pipelined")
+        )
+        return graph
+
+    assert perform(build, lambda seen: starts(seen, "script")) == [0.0, 0.0, 1.0, 2.0]
+
+
+@pytest.mark.rule("F6")
+def test_a_pipelined_slot_frees_the_output_when_the_call_takes_the_token(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, relay = graph.add(script(values=(1, 2, 3))), graph.add(AsyncRelay(), release="pipelined")
+        graph.connect(source.out, relay.say)
+        return graph
+
+    assert perform(build, lambda seen: starts(seen, "script")) == [0.0, 0.0, 0.005, 0.01]
+
+
+# --- P4: a buffer is a row of relays
+
+
+@pytest.mark.rule("P4")
+@pytest.mark.parametrize(
+    ("release", "buffer", "expected"),
+    [
+        ("sequential", 0, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]),
+        ("sequential", 2, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]),
+        ("pipelined", 0, [0.0, 0.0, 1.0, 2.0, 3.0, 4.0]),
+        ("pipelined", 2, [0.0, 0.0, 0.0, 0.0, 1.0, 2.0]),
+    ],
+)
+def test_with_a_buffer_the_producer_runs_ahead(perform: Any, release: Any, buffer: int, expected: list[float]) -> None:
+    def buffered() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, slow = graph.add(script(values=(1, 2, 3, 4, 5))), graph.add(slow_double(pause_s=1.0), release=release)
+        graph.connect(source.out, slow.value, buffer=buffer)
+        return graph
+
+    def relayed() -> hfg.Graph:
+        graph = hfg.Graph()
+        last: Any = graph.add(script(values=(1, 2, 3, 4, 5)))
+        for _ in range(buffer):
+            last >> (relay := graph.add(forward(), release="pipelined"))
+            last = relay
+        last >> graph.add(slow_double(pause_s=1.0), release=release)
+        return graph
+
+    assert perform(relayed, lambda seen: starts(seen, "script")) == expected
+    assert perform(buffered, lambda seen: starts(seen, "script")) == expected
+    assert perform(buffered, lambda seen: starts(seen, "slow_double", kind="process")) == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+@pytest.mark.rule("P4", "A6")
+def test_modifiers_travel_through_a_buffer_with_their_tokens(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, slow = graph.add(Says(signs=(None, None, 1, None))), graph.add(slow_double(pause_s=1.0))
+        graph.connect(source.out, slow.value, active=True, buffer=3)
+        return graph
+
+    found = perform(build, lambda seen: (signs(seen, "says.out -> slow_double.value"), seen.activity()))
+    assert found == ([(1, 0), (2, 0), (3, 1), (4, 0), (END, 0)], [(2.0, "slow_double", True)])
+
+
+@pytest.mark.rule("P4", "F5")
+def test_a_buffer_ends_the_wave_in_front_of_it_as_a_pipelined_relay_does(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, middle = graph.add(script(values=(1, 2, 3))), graph.add(double())
+        source >> middle
+        graph.connect(middle.out, graph.add(slow_double(pause_s=1.0)).value, buffer=1)
+        return graph
+
+    # The second lies in the buffer while the first is worked on; the third is made, and waits at the middle's output.
+    assert perform(build, lambda seen: starts(seen, "double")) == [0.0, 0.0, 1.0, 2.0]
+
+
+@pytest.mark.rule("P4", "F12")
+def test_what_lies_in_a_buffer_before_a_node_that_ends_is_drained(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        total = graph.add(add())
+        graph.connect(graph.add(ascript(values=(1,), pause_s=1.0)).out, total.a)
+        graph.connect(graph.add(script(values=(1, 2, 3, 4))).out, total.b, buffer=5)
+        return graph
+
+    def read(seen: Recorder) -> Any:
+        edge = "script.out -> add.b"
+        return seen.outcome, seen.taken(edge), seen.dropped(edge), seen.drained(edge)
+
+    assert perform(build, read) == ("done", [1, 2], [2], [3, 4, END])
 
 
 # --- P7: a delay ends the wave
@@ -151,7 +290,66 @@ def test_a_signal_sets_a_parameter_between_firings_and_no_firing_waits_for_it(pe
     assert found == ([(1, 1), (7, 7), END], [0.0, 1.0, 2.0])
 
 
+@pytest.mark.rule("P8")
+def test_a_parameter_that_is_set_from_outside_waits_for_the_end_of_the_firing() -> None:
+    seen = recorder()
+
+    async def main() -> None:
+        graph = looking()
+        async with hfg.running(graph, trace=seen) as run:
+            await asyncio.sleep(0.5)
+            run.set(graph["looks"].ports.parameters["gain"], 7)
+            await run.wait_finished()
+
+    drive(main)
+    assert seen.values("looks.seen -> pairs.value") == [(1, 1), (7, 7), END]
+
+
+@hfg.node
+def endless(*, value: int = 1) -> Iterator[int]:
+    while True:
+        yield value
+
+
+@pytest.mark.rule("P8")
+def test_a_generator_function_s_own_parameter_is_refused_with_the_remedy() -> None:
+    async def main() -> None:
+        graph = hfg.Graph()
+        source = graph.add(endless(), max_rate_hz=10.0)
+        source >> graph.add(sink())
+        async with hfg.running(graph) as run:
+            await asyncio.sleep(0.25)
+            with pytest.raises(hfg.errors.HfgError, match=r"endless\.value.*reset|endless\.value.*class"):
+                run.set(source.ports.parameters["value"], 9)
+
+    drive(main)
+
+
 # --- P9: operators lose nothing, and complete with their node
+
+
+def _is_not_two(token: hfg.Token[int]) -> bool:
+    return token.value != 2
+
+
+@pytest.mark.rule("P9")
+@pytest.mark.parametrize(
+    ("operator", "expected"),
+    [
+        (lambda: ops.start_with(0), [0, 1, 2, 3]),
+        (lambda: ops.retry(2), [1, 2, 3]),
+        (lambda: ops.filter(_is_not_two), [1, 3]),
+    ],
+    ids=["start_with", "retry", "filter"],
+)
+def test_operators_are_connected_before_the_first_firing(perform: Any, operator: Any, expected: list[int]) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, tally = graph.add(Script(count=3, every=1)), graph.add(Tally())
+        graph.connect(source.seen, tally.note, through=[operator()])
+        return graph
+
+    assert perform(build, lambda seen: seen.values("script.seen -> tally.note")) == expected
 
 
 @pytest.mark.rule("P9")
@@ -170,6 +368,9 @@ def test_an_event_completes_when_its_node_has_ended_though_others_go_on(perform:
     assert perform(build, read) == ([(0.0, 2)], 2.0)
 
 
+# --- F3: on its edges before any subscriber hears of it
+
+
 class Says(hfg.Node):
     """A source: 1, 2, 3 ... with the given explicit modifiers; None lets A3 decide."""
 
@@ -182,6 +383,31 @@ class Says(hfg.Node):
             raise hfg.EndOfStream
         self.at += 1
         self.out.send(self.at, activity=self.signs[self.at - 1])
+
+
+class Echo(hfg.Node):
+    said = hfg.Event(int)
+
+    @hfg.slot
+    def hit(self, value: int) -> None:
+        self.said.trigger(value)
+
+
+@pytest.mark.rule("F3")
+def test_a_signal_is_on_its_edges_before_a_subscriber_answers_it() -> None:
+    seen = recorder()
+
+    async def main() -> None:
+        graph = hfg.Graph()
+        echo, tally = graph.add(Echo()), graph.add(Tally())
+        graph.connect(echo.said, tally.note)
+        async with hfg.running(graph, trace=seen) as run:
+            echo.said.subscribe(lambda token: echo.said.trigger(token.value + 1) if token.value < 3 else None)
+            await run.trigger(echo.hit, 0)
+            await run.wait_finished()
+
+    drive(main)
+    assert seen.values("echo.said -> tally.note") == [0, 1, 2, 3]
 
 
 # --- F4: the last firing
@@ -232,7 +458,39 @@ def test_end_is_a_sending_of_its_own(perform: Any, last_word: bool, expected: li
     assert perform(build, lambda seen: signs(seen, "node.out -> sink.value")) == expected
 
 
-# --- A10: the beginning
+# --- F10, A10: the beginning
+
+
+@pytest.mark.rule("F10", "P7")
+def test_a_node_that_is_disabled_from_the_start_discards_its_initial_tokens(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        total = graph.add(add(), enabled=False)
+        graph.connect(graph.add(Script(count=1, every=1)).seen, total.a, initial=[5])
+        graph.connect(graph.add(script(values=(1,))).out, total.b, initial=[6])
+        return graph
+
+    assert perform(
+        build, lambda seen: (seen.outcome, seen.dropped("script.seen -> add.a"), seen.dropped("script_2.out -> add.b"))
+    ) == ("done", [5], [6])
+
+
+@pytest.mark.rule("F10", "P7")
+def test_what_lies_behind_a_node_that_is_disabled_from_the_start_goes_as_if_it_were_disabled_now(perform: Any) -> None:
+    """An initial token of its output is untaken and goes; a signal stays, though it has sent neither."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source = graph.add(Script(count=1, every=1), enabled=False)
+        graph.connect(source.out, graph.add(sink(), name="told").value, initial=[5])
+        graph.connect(source.seen, graph.add(sink(), name="heard").value, initial=[6])
+        return graph
+
+    def read(seen: Recorder) -> Any:
+        edges = ("script.out -> told.value", "script.seen -> heard.value")
+        return seen.outcome, [(seen.dropped(edge), seen.taken(edge)) for edge in edges]
+
+    assert perform(build, read) == ("done", [([5], []), ([], [6])])
 
 
 class Early(hfg.Node):
@@ -257,6 +515,28 @@ def test_the_signals_of_start_lie_on_their_edges_before_a_source_is_enabled(perf
         return graph
 
     assert perform(build, lambda seen: signs(seen, "script.out -> sink.value")) == [(1, 1), (2, 0), (END, 0)]
+
+
+# --- F11: a grid
+
+
+@hfg.node
+async def paced(*, pauses: tuple[float, ...] = ()) -> AsyncIterator[int]:
+    """Pause before each value, counted from when the one before was processed."""
+    for at, pause in enumerate(pauses):
+        await asyncio.sleep(pause)
+        yield at
+
+
+@pytest.mark.rule("F11")
+def test_a_late_start_does_not_move_the_grid_and_what_was_missed_is_not_made_up(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        graph.add(paced(pauses=(0.25, 1.5, 0.1, 2.5, 0.0, 0.0))) >> graph.add(double(), max_rate_hz=1.0)
+        return graph
+
+    # Due at 0.25, 1.25, 2.25 ...; ready at 0.25, 1.75, 1.85, 4.75, and then at once.
+    assert perform(build, lambda seen: starts(seen, "double", kind="process")) == [0.25, 1.75, 2.25, 4.75, 5.25, 6.25]
 
 
 # --- F12, F13: behind the end
@@ -368,6 +648,7 @@ def test_a_signal_behind_the_end_of_its_edge_is_dropped_and_nobody_waits_for_it(
     ("modifiers", "expected", "left"),
     [
         pytest.param((0, None, None), [0, 1, 0, 0], False, id="an explicit 0 holds the activity back"),
+        pytest.param((1, None), [1, 0, 0], False, id="an explicit +1 of an active sender takes it"),
         pytest.param((-1, None), [-1, 1, 0], False, id="an explicit -1 does not"),
         pytest.param((0, -1, 0), [0, -1, 0, 1], False, id="END carries what was held back"),
     ],
@@ -394,6 +675,51 @@ def test_an_explicit_plus_of_an_inactive_sender_goes_out_and_takes_nothing(perfo
 
     found = perform(build, lambda seen: (signs(seen, "says.out -> sink.value"), seen.active_at_end()))
     assert found == ([(1, 1), (2, 1), (END, 0)], ["sink"])
+
+
+class PassesOn(hfg.Node):
+    """Passes on the token itself."""
+
+    said = hfg.Event(int)
+
+    @hfg.slot
+    def hear(self, token: hfg.Token[int]) -> None:
+        self.said.trigger(token)
+
+
+@pytest.mark.rule("A4", "A5", "A6")
+def test_a_relay_of_tokens_never_doubles_activity(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        one, two = graph.add(PassesOn(), name="one"), graph.add(PassesOn(), name="two")
+        graph.connect(graph.add(Says(signs=(1,))).out, one.hear, active=True)
+        graph.connect(one.said, two.hear, active=True)
+        return graph
+
+    assert perform(build, lambda seen: [change[1:] for change in seen.activity()]) == [
+        ("one", True),
+        ("one", False),
+        ("two", True),
+    ]
+
+
+@pytest.mark.rule("A4", "A3")
+def test_a_token_without_a_modifier_that_is_passed_on_counts_as_its_value(perform: Any) -> None:
+    """It came over an edge that is not active, so its a = 0 is nobody's word: the activity of who passes it on goes."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, relay, tally = graph.add(Script(count=1, every=1)), graph.add(PassesOn()), graph.add(Tally())
+        graph.start.activates(relay.activate)
+        graph.connect(source.seen, relay.hear)
+        graph.connect(relay.said, tally.note, active=True)
+        return graph
+
+    def read(seen: Recorder) -> Any:
+        return signs(seen, "passes_on.said -> tally.note"), seen.active_at_end()
+
+    # `start` lies before the relay before anything that a source says.
+    assert perform(build, read) == ([(1, 1)], ["tally"])
 
 
 class Forks(hfg.Node):

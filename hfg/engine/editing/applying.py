@@ -490,6 +490,7 @@ class _Applying:
             edge.live = wiring.is_live(edge)
             if isinstance(edge, BufferEdge | EventEdge) and edge.initial:
                 _lay(edge)
+                lifecycle.discard_initial((edge,))
                 if edge.target.blocked & ENDED:
                     drain_left((edge,))
         self._derive_live()

@@ -24,6 +24,7 @@ __all__ = [
     "Then",
     "disable",
     "disable_around",
+    "discard_initial",
     "enable",
     "enable_around",
     "not_ended",
@@ -174,6 +175,13 @@ def _settle_disabled(workers: Sequence[Worker]) -> None:
             if worker.pending_end and worker.busy in AMID_NOTHING:
                 send_end(worker)
     judge_sources(workers[0].core)
+
+
+def discard_initial(edges: Iterable[Any]) -> None:
+    """F10 for who is disabled from the start: what lies on its edges is what disabling it now would discard."""
+    for edge in edges:
+        if edge.target.blocked & DISABLED or (edge.source.blocked & DISABLED and type(edge) is BufferEdge):
+            discard(edge, "disabled")
 
 
 def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> None:

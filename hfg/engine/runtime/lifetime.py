@@ -68,6 +68,7 @@ class Lifetime:
         if core.trace is not None:
             core.trace(RunStarted(engine.now()))
         core.started = True
+        self._discard_initial(core)
         self._connect_operators(core)
         assert core.boundary is not None
         start = engine_ports.bind_start(core.boundary, engine.graph.start)
@@ -104,6 +105,14 @@ class Lifetime:
                 engine_ports.bind(worker)
             wiring.rewire(worker)
         return True
+
+    def _discard_initial(self, core: Core) -> None:
+        lifecycle.discard_initial(
+            edge for edge in core.edges if isinstance(edge, BufferEdge | EventEdge) and edge.initial
+        )
+        for worker in core.workers:
+            if worker.iteration is not None:
+                self._discard_initial(worker.iteration.core)
 
     def _connect_operators(self, core: Core) -> None:
         """P9: before anything is triggered; what they give out by themselves is the first of all."""

@@ -7,8 +7,9 @@ from typing import Any
 
 from hfg.errors import Aborted, NodeError
 from hfg.testing.reference.firing import Firing
-from hfg.testing.reference.state import Flight, Line, Station
+from hfg.testing.reference.state import Flight, Line, Lying, Station
 from hfg.testing.reference.structure import ROOT, boundary_of, is_box
+from hfg.token import Token
 from hfg.trace import CallEnded, CallStarted, ErrorRaised, NodeEnabled, TokenProcessed, TokenTaken
 
 __all__ = ["Calling"]
@@ -241,6 +242,15 @@ class Calling(Firing):
                 self.process(line)
         self._empty(lambda line: line.edge.target.owner == index and line.edge.target.name != "enable")
         self._empty(lambda line: line.edge.source.owner == index and not line.edge.is_event)
+
+    def lay(self, line: Line) -> None:
+        """Lay the initial tokens of an edge (P7); at a node that is disabled they are discarded (F10)."""
+        for value in line.edge.initial:
+            line.queue.append(Lying(Token(value, 0, self.now, 0), self.next_tick(), line.edge.source.owner))
+        source, target = line.edge.source.owner, line.edge.target.owner
+        shut = target >= 0 and not self.is_enabled(target)
+        if shut or (source >= 0 and not self.is_enabled(source) and not line.edge.is_event):
+            self._empty(lambda one: one is line)
 
     def _empty(self, which: Callable[[Line], bool]) -> None:
         for line in self.lines:

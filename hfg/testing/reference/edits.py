@@ -14,9 +14,8 @@ from hfg.graph.editing import history_of, prepare
 from hfg.graph.editing.changes import Change, EdgeChange, NodeSwap, OptionsChange, ParameterChange, undo_all
 from hfg.graph.editing.commands import decode
 from hfg.testing.reference.calls import Calling
-from hfg.testing.reference.state import Line, Lying, Station, fresh
+from hfg.testing.reference.state import Line, Station, fresh
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of, is_box, whole
-from hfg.token import Token
 from hfg.trace import ParameterSet, TokenDropped, TokenProcessed
 
 __all__ = ["Editing"]
@@ -118,8 +117,7 @@ class Editing(Calling):
             elif id(station) in swapped:
                 self._exchange_node(station)
         for line in new:
-            for value in line.edge.initial:
-                line.queue.append(Lying(Token(value, 0, self.now, 0), self.next_tick(), line.edge.source.owner))
+            self.lay(line)
         for line in lost:
             self._let_go(line)
         here = {id(station) for station in self.stations}

@@ -105,8 +105,7 @@ class ReferenceMachine(Editing):
         """Lay the initial tokens, set up all nodes, trigger `start` (A10)."""
         self.connect_ports()
         for line in self.lines:
-            for value in line.edge.initial:
-                self.lay(line, value)
+            self.lay(line)
         self.make_operators()
         for station in self.stations:
             self.set_up(station)
@@ -115,12 +114,6 @@ class ReferenceMachine(Editing):
         self.trigger(ROOT, "start", activity=1)
         self.settle()
         return self.observed_since(0)
-
-    def lay(self, line: Line, value: Any) -> None:
-        """Lay an initial token (P7)."""
-        from hfg.testing.reference.state import Lying
-
-        line.queue.append(Lying(Token(value, 0, self.now, 0), self.next_tick(), line.edge.source.owner))
 
     def observed_since(self, mark: int) -> list[TraceEvent]:
         """What was seen after the first `mark` events."""
