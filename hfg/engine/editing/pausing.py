@@ -130,6 +130,8 @@ class Pausing:
     def _hold_groups(self, held: bool) -> None:
         for core in self._engine.all_cores():
             core.held = held
+            for region in core.regions if held else ():
+                region.interrupt()
         for group in self._engine.groups.values():
             group.held = held
 

@@ -23,7 +23,7 @@ def _is_plain(worker: Worker) -> bool:
         and kind is not None
         and worker.scope is None
         and _nobody_looks(worker)
-        and not worker.group.threaded
+        and not (worker.group.threaded and (worker.is_async or worker.listeners))  # which is for the loop to look at
         and isinstance(worker.group.policy, Fifo)
         and not options.max_duration_s
         and not worker.gates_over

@@ -25,7 +25,7 @@ from types import CodeType, CoroutineType, FrameType
 from typing import Any
 
 from hfg.engine.fusion.schedule import Schedule
-from hfg.engine.fusion.writing import Wave, write_wave
+from hfg.engine.fusion.writing import Wave, Writer, write_wave
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
 from hfg.engine.rules import agenda, calls, ending, errors, firing
@@ -61,6 +61,7 @@ class Region:
       step: what the head's step is while the region lasts.
       armed: everything inside rests, or a wave runs.
       running: a wave is under way.
+      flags: not empty: the wave under way ends behind its present call.
     """
 
     def __init__(self, schedule: Schedule, respecialise: Callable[[Worker], None]) -> None:
@@ -68,6 +69,7 @@ class Region:
         self.order = order = schedule.order
         self.head = head = order[0]
         self.core = head.core
+        self.flags: list[str] = self.core.flags
         self.entries: tuple[Any, ...] = head.live_inputs
         self.held_entries = tuple(edge for edge in self.entries if type(edge) is not EventEdge and edge.sequential)
         self.inner = [edge for out in schedule.outs for edge, _, to in out if to is not None]
@@ -92,11 +94,14 @@ class Region:
         for worker in order:
             worker.region = self
         self.core.regions.add(self)
-        self._plain = write_wave(self, measured=False)
+        self._plain = self._write(measured=False)
         metered = all(worker.meter is not None for worker in order)  # one that an edit has added has none at first
-        self._measured: Wave | None = write_wave(self, measured=True) if metered else None
+        self._measured: Wave | None = self._write(measured=True) if metered else None
         self._wave = self._measured or self._plain
         self.step = self._wave.step
+
+    def _write(self, *, measured: bool) -> Wave:
+        return write_wave(self, Writer(self, measured))
 
     # --- armed or not -----------------------------------------------------------------------------------------------
 
@@ -130,15 +135,24 @@ class Region:
     def disturb(self, worker: Worker) -> None:
         """A member does not rest any more; of the head only its next wave asks."""
         if self.running:
-            self.core.flags.append("disturbed")
+            self.flags.append("disturbed")
         elif worker is not self.head:
             self.disarm()
+
+    def interrupt(self) -> None:
+        """The run is paused, or over: let the wave under way end behind its present call."""
+        if self.running:
+            self.flags.append("interrupted")
+
+    def abandon(self) -> Worker:
+        """A wave on the loop always comes back."""
+        return self.head
 
     def dissolve(self) -> None:
         """Its members are nodes like any others from here on; from within a wave, from its end on."""
         if self.running:
             self.doomed = True
-            self.core.flags.append("dissolved")
+            self.flags.append("dissolved")
             return
         self.disarm()
         if self in self.core.regions:
@@ -220,7 +234,7 @@ class Region:
         if self.detached is not None:
             self.detached = None
             return result  # of the coroutine that has waited, so that it comes back as its firing's
-        if not self.core.flags:
+        if not self.flags:
             self._note_exit(k)
         worker = self.materialise(k, found)
         if k not in self.schedule.called:
@@ -279,7 +293,7 @@ class Region:
         for j in range(k):
             self._count(j, found)
             for edge, output, to in self.schedule.outs[j]:
-                if to is None:
+                if to is None or (to > k and not edge.live):  # one end was disabled meanwhile: it goes nowhere (F10)
                     continue
                 edge.sent += 1
                 if to <= k:
@@ -345,7 +359,7 @@ class Region:
             worker, missing = self.order[j], 0
             for edge, _, to in self.schedule.outs[j]:
                 if to is not None:
-                    edge.held = (to >= k or not done[to]) and edge not in silent_calls
+                    edge.held = edge.live and (to >= k or not done[to]) and edge not in silent_calls
                 missing += edge.held
             worker.outputs.missing = missing
             worker.held = missing > 0
@@ -404,5 +418,5 @@ class Region:
         if worker.slot_edges or not self.is_calling(worker):  # (what a slot handler may not do is for others to say)
             return False
         worker.speaks = self.doomed = True
-        self.core.flags.append("speaks")
+        self.flags.append("speaks")
         return True

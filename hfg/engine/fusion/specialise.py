@@ -11,6 +11,7 @@ from hfg.engine.fusion.members import is_plain_and_fed, lives_by_its_slots
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import schedule
 from hfg.engine.fusion.slots import calls_step
+from hfg.engine.fusion.threads import SOONER_IN_THREADS, ThreadRegion
 from hfg.engine.fusion.waiting import waiting_step
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import firing
@@ -49,7 +50,8 @@ def _step_of(worker: Worker) -> Step:
 def _until_warm(worker: Worker, alone: Step) -> Step:
     """What it does alone, until the node has fired so often that fusing pays; then a region behind it."""
     core = worker.core
-    left = core.fuse_after
+    threaded = worker.group.threaded
+    left = core.fuse_after // SOONER_IN_THREADS if threaded else core.fuse_after
 
     def step(worker: Worker) -> None:
         nonlocal left
@@ -63,7 +65,10 @@ def _until_warm(worker: Worker, alone: Step) -> Step:
             and worker.region is None
         ):
             found = schedule(worker)
-            worker.step = alone if found is None else Region(found, specialise).step
+            if found is None or (threaded and len(found.order) == 1):  # in a thread that is one job a wave as it is
+                worker.step = alone
+            else:
+                worker.step = (ThreadRegion if threaded else Region)(found, specialise).step
             worker.step(worker)
         else:
             alone(worker)

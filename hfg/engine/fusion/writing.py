@@ -31,7 +31,7 @@ from hfg.token import NO_MESSAGE, Token
 if TYPE_CHECKING:
     from hfg.engine.fusion.region import Region
 
-__all__ = ["Wave", "write_wave"]
+__all__ = ["Wave", "Writer", "write_wave"]
 
 _EXCEPTIONAL = frozenset({Token, CoroutineType})
 """Results that do not simply leave: a token passed on, code that is still to be awaited."""
@@ -55,15 +55,21 @@ class Wave(NamedTuple):
     code: CodeType
 
 
-def write_wave(region: Region, *, measured: bool) -> Wave:
-    """Write, compile and bind the wave of a region; `measured`: each call tells the member's meter how long it took."""
-    writer = _Writer(region, measured)
+def write_wave(region: Region, writer: Writer, *, to: Any = None) -> Wave:
+    """Compile and bind what is written for a region.
+
+    Args:
+      region: whose members are called.
+      writer: of the text.
+      to: what the wave turns to when it is over, and at its exits; the region, unless it runs elsewhere.
+    """
+    measured = writer.measured
     text = writer.write()
     name = f"<hfg region {next(_numbers)}> from {region.head.path}"  # (linecache passes over what ends with ">")
     _show(name, text, writer.calls, [worker.path for worker in region.order])
     names: dict[str, Any] = {}
     exec(_renamed(_compiled(text), name), names)
-    bound = names["build"](region, _Names(region, measured), *_TOOLS)
+    bound = names["build"](to or region, _Names(region, measured), *_TOOLS)
     return Wave(bound[0], writer.calls, bound[1].__code__)
 
 
@@ -78,7 +84,7 @@ class _Names:
         self.head = region.head
         self.now = core.now
         self.epoch = host.epoch
-        self.flags = core.flags
+        self.flags = region.flags
         self.queue = region.head.group.policy
         self.ready = host._ready_groups
         self.entries = region.entries
@@ -158,7 +164,7 @@ def _show(name: str, text: str, calls: dict[int, int], paths: list[str]) -> None
         linecache.cache.pop(oldest, None)
 
 
-class _Writer:
+class Writer:
     """Writes the text of one wave; `calls` says afterwards which line calls which member."""
 
     def __init__(self, region: Region, measured: bool) -> None:
@@ -188,9 +194,15 @@ class _Writer:
 
     def _is_single(self, worker: Worker) -> bool:
         """What it gives back is the value of its one output, or nothing."""
-        return not worker.slot_edges and not _speaks(worker) and worker.type.result in ("none", "single")
+        return not worker.slot_edges and not self._speaks(worker) and worker.type.result in ("none", "single")
+
+    def _speaks(self, worker: Worker) -> bool:
+        """Whether its code triggers or sends by itself, so that the worker has to say that it runs."""
+        kind = worker.type
+        return worker.speaks or (not worker.silent_code and (bool(kind.events) or kind.result == "fields"))
 
     def say(self, text: str, call: int | None = None) -> None:
+        """Write a line; `call`: the member whose code it calls."""
         self.lines.append("    " * self.indent + text)
         if call is not None:
             self.calls[len(self.lines)] = call
@@ -230,7 +242,7 @@ class _Writer:
         for k, worker in enumerate(self.order):
             if k or not self.is_generator:
                 say(f"f{k} = names.calls[{k}]")
-            if _speaks(worker) or k in self.called:
+            if self._speaks(worker) or k in self.called:
                 say(f"w{k} = names.workers[{k}]")
             elif not self.single[k]:
                 say(f"split{k} = names.splits[{k}]")
@@ -397,8 +409,8 @@ class _Writer:
     def _call(self, k: int, call: str, *, within: bool = False) -> None:
         """Call a member, look at what it gives back, and let that leave."""
         worker = self.order[k]
-        if _speaks(worker):
-            self.say(f"core.speaker = w{k}; w{k}.busy = 'firing'; w{k}.stamp = stamp")
+        if self._speaks(worker):
+            self._announce(k)
         if self.measured:
             self.say("began = monotonic()")
         if worker.is_async:
@@ -417,6 +429,10 @@ class _Writer:
         else:
             self.say(f"if v{k}_0 is not None or flags{self._detached(k)}: return region.leave({k}, locals())")
         self._put(k)
+
+    def _announce(self, k: int) -> None:
+        """What the member's code sends by itself is to find that the worker runs."""
+        self.say(f"core.speaker = w{k}; w{k}.busy = 'firing'; w{k}.stamp = stamp")
 
     def _detached(self, k: int) -> str:
         return " or region.detached is not None" if self.order[k].is_async else ""
@@ -443,7 +459,7 @@ class _Writer:
     def _spread_out(self, k: int) -> None:
         """Several outputs, or sent by the code itself."""
         say, worker = self.say, self.order[k]
-        if _speaks(worker):
+        if self._speaks(worker):
             say(f"if flags or w{k}.right: return region.leave({k}, locals())")
         else:
             say(f"if flags: return region.leave({k}, locals())")
@@ -452,7 +468,7 @@ class _Writer:
             say(f"if values is None: return region.leave({k}, locals())")
         else:
             say(f"if r{k} is not None: return region.leave({k}, locals())")
-        if _speaks(worker):
+        if self._speaks(worker):
             say(f"w{k}.busy = ''; w{k}.stamp = None")
         for output in range(len(worker.out_names)):
             say(f"v{k}_{output} = values[{output}]")
@@ -492,9 +508,3 @@ class _Writer:
         say("return region.over(done)")
         self.indent = 1
         say("return (step, waves)" if self.is_async else "return (wave, wave)")
-
-
-def _speaks(worker: Worker) -> bool:
-    """Whether its code triggers or sends by itself, so that the worker has to say that it runs."""
-    kind = worker.type
-    return worker.speaks or (not worker.silent_code and (bool(kind.events) or kind.result == "fields"))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
@@ -51,6 +51,12 @@ class Region(Protocol):
 
     def speaks(self, worker: Worker) -> bool:
         """A member's code sends by itself: whether a fused call of it is under way."""
+
+    def interrupt(self) -> None:
+        """Let the wave under way end behind its present call."""
+
+    def abandon(self) -> Worker:
+        """The wave under way does not come back: whose call it is in."""
 
     def dissolve(self) -> None:
         """Its members are nodes like any others from here on."""
@@ -117,6 +123,15 @@ class Code(Protocol):
         done: Callable[[Any, BaseException | None], None],
     ) -> None:
         """Run a node's code where it belongs; `done(result, error)` follows, at once or later on the loop."""
+
+    def execute_wave(
+        self,
+        workers: Sequence[Worker],
+        call: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        done: Callable[[Any, BaseException | None], None],
+    ) -> None:
+        """Run code of several nodes of a thread group, one after the other; `done` follows even if the run is over."""
 
     def execute_aside(
         self, worker: Worker, call: Callable[..., Any], done: Callable[[Any, BaseException | None], None]

@@ -11,7 +11,7 @@ import contextlib
 import contextvars
 import inspect
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from types import CoroutineType
 from typing import Any, Protocol
@@ -173,7 +173,23 @@ class CodeRunner:
         carrier = worker.carrier
         return over
 
-    def _in_thread(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+    def execute_wave(
+        self, workers: Sequence[Worker], call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
+    ) -> None:
+        """See `core.Code`."""
+        job = self._in_thread(workers[0], call, arguments, done, always=True)
+        for worker in workers:
+            worker.job = job
+
+    def _in_thread(
+        self,
+        worker: Worker,
+        call: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        done: Done,
+        *,
+        always: bool = False,
+    ) -> Job:
         group: Any = worker.group
         closing = self.core.over
         self.begin(worker)
@@ -185,7 +201,7 @@ class CodeRunner:
             self._is_back(worker)
             if self.core.over:
                 self.came_back.set()
-            if not self.core.over or closing:
+            if not self.core.over or closing or always:
                 done(job.result, job.error)
             if worker.core.inside is not None:
                 worker.core.inside.look_later()
@@ -203,6 +219,7 @@ class CodeRunner:
         else:
             self._limit(worker)
         group.submit(worker_job)
+        return worker_job
 
     def _is_back(self, worker: Worker) -> None:
         """Its code is over, or given up."""
@@ -267,8 +284,8 @@ class CodeRunner:
         self.aside.add(task)
         task.add_done_callback(self.aside.discard)
 
-    def interrupt(self, worker: Worker) -> None:
-        """See `core.Code`."""
+    def interrupt(self, worker: Worker, *, amid: Worker | None = None) -> None:
+        """See `core.Code`; `amid`: whose call it is, if that is another node's of its region."""
         if not worker.in_flight:
             return
         job = worker.job
@@ -277,7 +294,8 @@ class CodeRunner:
         if group.threaded:
             job.owner = lambda _job: None
             self._hold_no_more(job)
-            group.abandon(f'"{worker.path}", firing {worker.firings}', job)
+            amid = amid or worker
+            group.abandon(f'"{amid.path}", firing {amid.firings}', job)
         else:
             carrier, worker.carrier = worker.carrier, None
             self.given_up.add(carrier)

@@ -486,6 +486,8 @@ class Engine:
         self.ended_how = (outcome, error)
         self.core.over = True
         self.core.flags.append("over")
+        for region in self.core.regions:
+            region.interrupt()
         self.ended_at = self.now()
         for worker in self.all_workers():
             worker.core.over = True

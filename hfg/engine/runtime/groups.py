@@ -204,6 +204,10 @@ class ThreadGroup(Group):
             )
         lane.send(call)
 
+    def thread_id(self) -> int:
+        """Of the thread that is at work; 0 if there is none yet."""
+        return 0 if self._lane is None else self._lane.thread.ident or 0
+
     def abandon(self, what: str, job: Job) -> None:
         """X2: the job under way does not come back; the group goes on in a new thread."""
         if self.fair is not None:

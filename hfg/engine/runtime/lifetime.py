@@ -342,9 +342,13 @@ class Lifetime:
             await self._until_back(lambda: any(worker.in_flight for worker in busy))
         seconds = time.monotonic() - begun
         left = [worker for worker in busy if worker.in_flight]
+        stuck = []
         for worker in left:  # others of its thread group have their teardown in a new thread
-            code.interrupt(worker)
-        return {worker: NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds)) for worker in left}
+            region = worker.region
+            amid = region.abandon() if region is not None and region.running else worker
+            code.interrupt(worker, amid=amid)
+            stuck.append(amid)
+        return {worker: NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds)) for worker in stuck}
 
     async def _tear_down_one(self, worker: Worker) -> NodeError | None:
         engine = self._engine

@@ -1,0 +1,369 @@
+"""Regions of a thread group: a whole wave is one job of the group's thread, one hand-over instead of one a hop.
+
+The head's step, on the loop, takes the tokens; the thread calls the members one after the other, as `writing` has it,
+with values in locals; and back on the loop what has crossed the border is put, or the side exit is gone through. While
+the wave is under way all members are busy: whoever wants one of them waits until it is not, and makes the wave end
+behind its present call, so that nobody waits longer than for one firing.
+
+What crosses the border amid a wave leaves when its firing is over (F3), so that neighbours in other groups work at the
+same time; what the last member sends comes along with the wave.
+
+Stands on `region` and `writing`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import partial
+from types import FrameType
+from typing import Any, NamedTuple
+
+from typing_extensions import override
+
+from hfg.engine.fusion.region import Region
+from hfg.engine.fusion.schedule import Schedule
+from hfg.engine.fusion.writing import Wave, Writer, write_wave
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules import ending, errors, firing
+from hfg.engine.rules.agenda import consider, freed, idle_again, let_follow, note_start, queue, unplace
+from hfg.engine.rules.releasing import release
+from hfg.engine.rules.sending import put
+from hfg.errors import EndOfStream
+from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.token import NO_MESSAGE
+
+__all__ = ["SOONER_IN_THREADS", "ThreadRegion"]
+
+SOONER_IN_THREADS = 12
+"""By so much earlier than on the loop a region pays: a hand-over costs as much as that many calls."""
+
+_SLICE_S = 0.005  # how long a source may go on in its thread before the loop hears of it
+
+_Sending = tuple[int, float, tuple[Any, ...]]
+"""The member, the stamp, and a value for each of its edges over the border; None is NO_MESSAGE."""
+
+
+class _Left(NamedTuple):
+    """A wave has ended behind the call of member k: what that gave back or raised, and all that the locals hold."""
+
+    k: int | None
+    found: dict[str, Any]
+    result: Any = None
+    error: BaseException | None = None
+
+
+class _InThread:
+    """What the text of a wave turns to in the thread; the loop looks at it when the wave is back."""
+
+    def __init__(self, region: ThreadRegion) -> None:
+        self.order = region.order
+        self.silent = [0] * len(region.order)
+        self.spread = [0] * len(region.order)
+        self.sent: list[_Sending] = []  # what is to be put when the wave is back
+        self._region = region
+        self._group: Any = region.head.group
+
+    def sends(self, k: int, stamp: float, values: tuple[Any, ...]) -> None:
+        """The firing of member k is over, others follow."""
+        self._group.signal(partial(self._region.put_border, k, stamp, values))
+
+    def sends_last(self, k: int, stamp: float, values: tuple[Any, ...]) -> None:
+        """The last firing is over."""
+        self.sent.append((k, stamp, values))
+
+    def over(self, done: int) -> int:
+        """So many waves have run to their end."""
+        return done
+
+    def leave(self, k: int, found: dict[str, Any]) -> _Left:
+        """Something about the firing of member k is not plain."""
+        return _Left(k, found, found[f"r{k}"] if f"r{k}" in found else found[f"v{k}_0"])
+
+    def caught(self, error: BaseException, found: dict[str, Any]) -> _Left:
+        """Which call has raised is told by its line."""
+        traceback: Any = error.__traceback__
+        return _Left(self._region.called_at(traceback.tb_lineno), found, None, error)
+
+
+class ThreadRegion(Region):
+    """A head and those that fire behind it in one wave, in the thread of their group.
+
+    Attributes:
+      flags: not empty: the wave under way ends behind its present call; the thread looks at it.
+    """
+
+    def __init__(self, schedule: Schedule, respecialise: Callable[[Worker], None]) -> None:
+        self._thread: Any = None
+        super().__init__(schedule, respecialise)
+        self.step = self._fire
+        self._carries = self.head in self.carriers
+        self._speaking = [worker for worker in self.order if not worker.silent_code]
+        self._seeing = [self.head, *(worker for worker in self._speaking if worker is not self.head)]
+        self._over_border = [[edge for edge, _, to in out if to is None] for out in schedule.outs]
+        self._measuring = self._measured is not None
+
+    @override
+    def _write(self, *, measured: bool) -> Wave:
+        if self._thread is None:
+            self.flags = []
+            self._thread = _InThread(self)
+        return write_wave(self, _ThreadWriter(self, measured), to=self._thread)
+
+    def called_at(self, line: int) -> int | None:
+        """Which member the line of the wave calls."""
+        return self._wave.calls.get(line)
+
+    # --- a wave -----------------------------------------------------------------------------------------------------
+
+    def _fire(self, head: Worker) -> None:
+        """Take the tokens and let the thread go on from there."""
+        if (
+            head.special
+            or head.busy
+            or not head.placed
+            or (self._carries and head.active)
+            or not (self._source_is_open() if head.is_source else self._all_plain())
+            or not (self.armed or self.arm())
+        ):
+            self.decline(head)
+            return
+        head.queued = head.placed = False
+        arguments: list[Any] = list(head.unset)
+        tokens = [(edge, firing.take(edge)) for edge in self.entries]
+        for edge, token in tokens:
+            arguments[edge.position] = token.value
+        stamp = self.core.now() if head.is_source else max(token.stamp for _, token in tokens)
+        for worker in self.order:
+            worker.busy = "firing"
+        for worker in self._speaking:
+            worker.stamp = stamp
+        for edge, _ in tokens:
+            if type(edge) is EventEdge:
+                freed(edge)
+            elif not edge.sequential:
+                release((edge,))
+        if head.paced:
+            note_start(head, head.options.max_rate_hz)
+        self._wave = (self._measured if self._measuring else None) or self._plain
+        self.flags.clear()
+        self.running = True
+        self.core.code.execute_wave(self._seeing, self._wave.step, (head, stamp, *arguments), self._back)
+
+    def _source_is_open(self) -> bool:
+        return self.head.type.process_kind != "generator" or self.head.generator is not None
+
+    def _all_plain(self) -> bool:
+        """Each entry holds a token, and none of them moves activity."""
+        if self.head.inputs.missing:
+            return False
+        for edge in self.entries:
+            if type(edge) is SyncEdge:
+                if edge.token.activity:  # type: ignore[union-attr]  # no input is missing
+                    return False
+            elif not edge.live or edge.queue[0].activity:
+                return False
+        return True
+
+    def put_border(self, k: int, stamp: float, values: tuple[Any, ...]) -> None:
+        """What member k has sent over the border is on its way, if that is still there."""
+        core = self.core
+        since = len(core.followers)
+        for edge, value in zip(self._over_border[k], values, strict=True):
+            if edge.live:
+                put(edge, NO_MESSAGE if value is None else value, 0, stamp)
+        let_follow(core, since)
+        if self.head.outputs.missing:
+            unplace(self.head)
+
+    def _back(self, outcome: int | _Left, error: BaseException | None) -> None:
+        """The wave is over, or has ended behind one of its calls; on the loop."""
+        if error is not None:
+            raise error  # a fault of ours
+        self._rest()
+        if self.core.over:
+            self._too_late(outcome)
+            return
+        sent, self._thread.sent = self._thread.sent, []
+        for sending in sent:
+            self.put_border(*sending)
+        if isinstance(outcome, _Left):
+            self._exit(outcome)
+        else:
+            self._over(outcome)
+
+    def _rest(self) -> None:
+        """Nobody's code is under way any more; all but the head may be had."""
+        for worker in self.order[1:]:
+            worker.busy = ""
+        for worker in self._speaking:
+            worker.stamp = None
+            worker.right = False
+            if worker is not self.head:  # whose own was the one in flight
+                worker.job = None
+                worker.node._active = worker.active
+        thread = self._thread
+        if any(thread.silent) or any(thread.spread):
+            for number in range(len(self.order)):
+                self.silent[number] += thread.silent[number]
+                self.spread[number] += thread.spread[number]
+                thread.silent[number] = thread.spread[number] = 0
+
+    def _over(self, done: int) -> None:
+        head = self.head
+        self.running = False
+        self.waves += done
+        if head.outputs.missing:
+            unplace(head)
+            head.held = True
+            head.taken = self.held_entries
+        elif self.held_entries:
+            if not self.flags:  # those behind it free its outputs, and by that it lets go of what it took
+                head.busy = ""
+                if head.placed:
+                    queue(head)
+                else:
+                    consider(head)
+            release(self.held_entries)
+        if self.flags:  # which were raised too late for this wave
+            self.disarm()
+        if self._measuring and all(worker.meter.left <= 0 for worker in self.order):
+            self._measuring = False
+        self._end()
+        idle_again(head)
+
+    def _end(self) -> None:
+        """Those who have come to a member while it was busy have their turn."""
+        if self.doomed:
+            self.dissolve()
+        if self.flags:
+            for worker in self.order[1:]:
+                if not worker.busy:
+                    idle_again(worker)
+
+    def _exit(self, left: _Left) -> None:
+        """The firing under way ends as any other, and what is behind it goes the interpreted way."""
+        k, error, head = left.k, left.error, self.head
+        if k is None:
+            self.running = False
+            assert error is not None
+            raise error  # a fault of ours
+        if error is None and not self.flags:
+            self._note_exit(k)
+        head.busy = ""
+        worker = self.materialise(k, left.found)
+        if head.outputs.missing:
+            unplace(head)
+        if error is None:
+            firing.complete_firing(worker, left.result)
+        elif worker.is_source and isinstance(error, StopIteration | EndOfStream):
+            ending.source_ended(worker)
+        else:
+            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+        self._end()
+        if worker is not head and not head.busy:
+            idle_again(head)
+
+    @override
+    def materialise(self, k: int, found: dict[str, Any]) -> Worker:
+        worker = super().materialise(k, found)
+        self.core.speaker = None  # nobody's code runs on the loop
+        return worker
+
+    def _too_late(self, outcome: int | _Left) -> None:
+        """The run is over: nobody hears of it, but it is counted."""
+        if not isinstance(outcome, _Left):
+            self.running = False
+            self.waves += outcome
+        elif outcome.k is not None:
+            self.materialise(outcome.k, outcome.found)
+
+    # --- from outside -----------------------------------------------------------------------------------------------
+
+    @override
+    def measure_on(self) -> None:
+        self._measuring = self._measured is not None
+
+    @override
+    def speaks(self, worker: Worker) -> bool:
+        """What is sent amid a wave finds its worker busy; so this is none of it."""
+        return False
+
+    @override
+    def abandon(self) -> Worker:
+        """The wave under way does not come back: whose call it is in; those before it have fired."""
+        group: Any = self.head.group
+        frame = self._frame(sys._current_frames().get(group.thread_id()))
+        k = self._wave.calls.get(frame.f_lineno, 0) if frame is not None else 0
+        self._rest()
+        if frame is None:
+            self.running = False
+            return self.head
+        return self.materialise(k, dict(frame.f_locals))
+
+    def _frame(self, frame: FrameType | None) -> FrameType | None:
+        while frame is not None and frame.f_code is not self._wave.code:
+            frame = frame.f_back
+        return frame
+
+
+class _ThreadWriter(Writer):
+    """Writes a wave that is called in the thread: the loop has taken the tokens, and puts what crosses the border."""
+
+    def __init__(self, region: Region, measured: bool) -> None:
+        super().__init__(region, measured)
+        self.loops = self.real and self.is_source and not self.head.paced and not self.has_border
+
+    @override
+    def _speaks(self, worker: Worker) -> bool:
+        return not worker.silent_code  # all members are busy, so its code may send: look whether it has
+
+    @override
+    def _entrance(self) -> None:
+        arguments = [f"a{at}" for at in range(len(self.head.unset))]
+        self.say(f"def wave({', '.join(['worker', 'stamp', *arguments])}):")
+        self.indent = 2
+        self._nonlocal()
+        self.say("done = 0")
+        if self.is_generator:
+            self.say("generator = worker.generator")
+        if self.loops:
+            self.say(f"until = monotonic() + epoch + {_SLICE_S}")
+
+    @override
+    def _head(self) -> None:
+        if self.is_source:
+            if self.loops:
+                self.say("stamp = monotonic() + epoch")
+            self._call(0, "next(generator)" if self.is_generator else "f0()")
+        else:
+            self._call(0, f"f0({', '.join(f'a{at}' for at in range(len(self.head.unset)))})")
+
+    @override
+    def _announce(self, k: int) -> None:
+        pass  # all members say so from the beginning of the wave on
+
+    @override
+    def _spread_out(self, k: int) -> None:
+        say, outputs = self.say, self.order[k].out_names
+        say(f"if flags: return region.leave({k}, locals())")
+        if outputs:
+            say(f"values = values_of(region, {k}, r{k})", k)
+            say(f"if values is None: return region.leave({k}, locals())")
+        else:
+            say(f"if r{k} is not None: return region.leave({k}, locals())")
+        for output in range(len(outputs)):
+            say(f"v{k}_{output} = values[{output}]")
+
+    @override
+    def _put(self, k: int) -> None:
+        values = [f"v{k}_{output}" for _, output, to in self.outs[k] if to is None]
+        if values:
+            sends = "sends" if k < len(self.order) - 1 else "sends_last"
+            self.say(f"region.{sends}({k}, stamp, ({', '.join(values)},))")
+
+    @override
+    def _end_of_wave(self) -> None:
+        self.say("done += 1")
+        if self.loops:
+            self.say("if queue or flags or worker.blocked or stamp > until: break")
