@@ -99,6 +99,22 @@ def test_a_source_goes_on_in_its_thread_while_nobody_waits_for_it(jobs: list[str
     assert len(jobs) < 10_000
 
 
+@pytest.mark.rule("F11", "R6")
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_head_with_a_rate_keeps_to_its_grid(inside: bool, jobs: list[str]) -> None:
+    def stamps(fast: bool) -> list[float]:
+        graph, sink = work_group(), KeepTokens()
+        source = graph.add(numbers(count=10), max_rate_hz=4.0, group="work" if inside else None)
+        graph.connect(chain(graph, source.out, forward(), scale()), graph.add(sink).value)
+        run(graph, fast=fast)
+        return [token.stamp for token in sink.tokens]
+
+    assert stamps(fast=True) == [number / 4 for number in range(10)]
+    fused = len(jobs)
+    assert stamps(fast=False) == [number / 4 for number in range(10)]
+    assert fused < len(jobs) - fused
+
+
 @pytest.mark.rule("T5", "R6")
 def test_values_stamps_and_numbers_are_those_of_single_firings() -> None:
     def tokens(fast: bool) -> list[hfg.Token[Any]]:
