@@ -300,7 +300,7 @@ class Writer:
             self._nonlocal()
         say("done = 0")
         if self.is_generator:
-            say("generator = worker.generator")
+            say("generator = getattr(worker.generator, 'measured', worker.generator)  # a wave measures by itself")
         if self.is_source and self.loops:
             say("until = core.until")
 

@@ -261,19 +261,19 @@ def _stepped(coroutine: Any, busy: list[float]) -> Generator[Any, Any, Any]:
 
 
 class _Drawn(Iterator[Any]):
-    """A generator whose steps are measured."""
+    """A generator whose steps are measured; `measured` is the generator itself, for those who measure by themselves."""
 
     def __init__(self, meter: Meter, generator: Any) -> None:
         self._meter = meter
-        self._generator = generator
+        self.measured = generator
         self.close = getattr(generator, "close", lambda: None)
 
     def __next__(self) -> Any:
         if self._meter.left <= 0:
-            return next(self._generator)
+            return next(self.measured)
         began = monotonic()
         try:
-            return next(self._generator)
+            return next(self.measured)
         finally:
             self._meter.took(monotonic() - began)
 
