@@ -348,7 +348,7 @@ def test_on_the_machines_clock_waiting_is_looked_at_now_and_then() -> None:
 
     statistics = asyncio.run(main())
     source = statistics.nodes["source"]
-    assert source.busy.count == 16
+    assert source.busy.count in (15, 16)  # the firing that ends it is measured only where it is interpreted
     assert 0 < source.waiting["rate"] <= statistics.duration_s
     assert statistics.nodes["end"].latency.max_s < 1.0
 
