@@ -9,6 +9,7 @@
     nodes          small deterministic node types
     reference      the oracle: the rules as a machine of permitted moves
     conformance    replay the trace of a run on the oracle
+    waves          the same, and that waves go depth first (R2)
     pytest_plugin  fixtures and the `rule` mark
 
 Sees all of hfg; nothing of hfg sees it. `strategies` needs hypothesis and is imported when it is used.
