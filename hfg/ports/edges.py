@@ -8,9 +8,10 @@ here. Stands on `token`; never waits.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Literal
 
+from hfg.errors import EngineInternalError
 from hfg.token import Token
 
 __all__ = ["BufferEdge", "Edge", "EventEdge", "Overflow", "SyncEdge"]
@@ -94,6 +95,20 @@ class Edge:
         self.handler: Callable[[Any], Any] | None = None
         self.tap: Callable[[Token[Any]], None] | None = None
 
+    def check_invariants(self) -> None:
+        """Between two steps of the run certain things hold of every edge.
+
+        Raises:
+          EngineInternalError: one of them does not.
+        """
+        for holds, relation in self._relations():
+            if not holds:
+                raise EngineInternalError(f'edge "{self.label}": {relation}')
+
+    def _relations(self) -> Iterator[tuple[bool, str]]:
+        """What holds of it between two steps."""
+        raise NotImplementedError
+
 
 class SyncEdge(Edge):
     """From an output, one place (P4).
@@ -130,6 +145,9 @@ class SyncEdge(Edge):
     def contents(self) -> list[Token[Any]]:
         """What lies on it, without taking it."""
         return [] if self.token is None else [self.token]
+
+    def _relations(self) -> Iterator[tuple[bool, str]]:
+        yield self.token is None or self.held, "a token lies on it that counts as processed (F5)"
 
 
 class _QueueEdge(Edge):
@@ -197,6 +215,11 @@ class BufferEdge(_QueueEdge):
         """Whether it holds more than there is room for, so that its producer waits."""
         return len(self.queue) + self.working > self.room
 
+    def _relations(self) -> Iterator[tuple[bool, str]]:
+        yield len(self.queue) + self.working <= self.capacity, f"it holds more than {self.capacity} tokens (P4, P7)"
+        yield self.held == self.crowded or not self.live, "its producer waits though there is room, or not though none"
+        yield self.sequential or not self.working, "what is pipelined is processed when it is taken (F5)"
+
 
 class EventEdge(_QueueEdge):
     """From an event: a first-in first-out queue with a capacity and an overflow policy (P5).
@@ -250,3 +273,10 @@ class EventEdge(_QueueEdge):
     def overflows(self) -> bool:
         """Whether one more token is one too many for a policy that drops or refuses (P5)."""
         return self.overflow != "wait" and len(self.queue) >= self.capacity and not self.end_sent
+
+    def _relations(self) -> Iterator[tuple[bool, str]]:
+        holds_back = self.overflow == "wait" and len(self.queue) >= self.capacity
+        yield holds_back or not self.full, "it holds its source back and is not full (F8)"
+        yield self.full or not holds_back or not self.live, "it is full and does not hold its source back (F8)"
+        if self.overflow != "wait" and not self.end_sent:
+            yield len(self.queue) <= max(self.capacity, len(self.initial)), f"it holds more than {self.capacity} (P5)"

@@ -298,6 +298,8 @@ class Edits:
             find_again(edited)
         for worker in come:
             core.upstairs.idle_again(worker)
+        if engine.settings.check_all:
+            engine.check_invariants()
 
     def _switched(self, changes: Sequence[Change]) -> _Switched:
         """The nodes, then the subgraphs, that are enabled or disabled, and which of both in the end."""

@@ -30,7 +30,7 @@ from hfg.engine.model.core import PENDING
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
 from hfg.engine.rules import agenda, calls, ending, errors, firing
 from hfg.engine.rules.releasing import release
-from hfg.errors import EndOfStream
+from hfg.errors import EndOfStream, EngineInternalError
 from hfg.ports.edges import EventEdge
 from hfg.token import NO_MESSAGE, Token
 
@@ -124,6 +124,26 @@ class Region:
             edge.waits = self.head
         self.armed = True
         return True
+
+    def check_invariants(self) -> None:
+        """While it is armed everything inside rests, and what has left it counts at the head.
+
+        Raises:
+          EngineInternalError: it does not.
+        """
+        if not self.armed or self.running:
+            return
+        for k, worker in enumerate(self.order):
+            if k and not _rests(worker, k in self.schedule.called):
+                raise EngineInternalError(f'node "{worker.path}": its region is armed, but it does not rest')
+        for edge in self.inner:
+            if edge.token is not None or edge.held:
+                raise EngineInternalError(f'edge "{edge.label}": its region is armed, but a token is on it')
+        for edge in self.border:
+            if edge.waits is not self.head:
+                raise EngineInternalError(
+                    f'edge "{edge.label}": its region is armed, but the head does not answer for it'
+                )
 
     def disarm(self) -> None:
         """The interpreted way goes on: write down what finished waves still wait for, where that way looks for it."""

@@ -8,14 +8,14 @@ are behind `Host`, which `run` implements. Stands on floors 0-4 and knows no asy
 from __future__ import annotations
 
 import itertools
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import RunningEvent, Worker
-from hfg.errors import HfgError
+from hfg.errors import EngineInternalError, HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.ports.events import EventPort
 from hfg.token import Token
@@ -63,6 +63,9 @@ class Region(Protocol):
 
     def measure_on(self) -> None:
         """What was measured has been read: measure the next waves."""
+
+    def check_invariants(self) -> None:
+        """While it is armed everything inside rests."""
 
     def settle_counts(self) -> None:
         """Let the members' counts say what the waves so far have done."""
@@ -275,6 +278,45 @@ class Core:
                 region.disarm()
         for listeners in self.listeners:
             listeners.settle_counts()
+
+    def check_invariants(self) -> None:
+        """Between two steps of the run certain things hold of all of it: nodes, edges, regions, and between them.
+
+        Raises:
+          EngineInternalError: one of them does not.
+        """
+        if self.over:
+            return
+        held: Counter[Worker] = Counter()
+        full: Counter[Worker] = Counter()
+        for edge in self.edges:
+            edge.check_invariants()
+            if isinstance(edge, EventEdge):
+                full[edge.source] += edge.full
+            else:
+                held[edge.waits] += edge.held
+        for worker in self.workers:
+            worker.check_invariants()
+            worker.outputs.check_invariants(held[worker], f'outputs of "{worker.path}"')
+            if worker.full_edges != full[worker]:
+                raise EngineInternalError(f'node "{worker.path}": {full[worker]} of its queues are full (F8)')
+            if worker.region is not None and worker.region not in self.regions:
+                raise EngineInternalError(f'node "{worker.path}": its region is gone')
+        for region in self.regions:
+            region.check_invariants()
+        self._check_queues()
+        if self.followers or self.returned or self.drained or self.late is not None:
+            raise EngineInternalError("a sending is not over: who follows, or what was returned or drained, is left")
+        for scope in self.scopes:
+            if scope.watched and scope not in self.dirty_scopes and scope.active != scope.derive():
+                raise EngineInternalError(f'subgraph "{scope.path}": its activity is not that of its inside (G2)')
+
+    def _check_queues(self) -> None:
+        """Who is queued stands in the run queue of its group, once, and nobody else does."""
+        standing = Counter(worker for group in {worker.group for worker in self.workers} for worker in group.policy)
+        for worker in self.workers:
+            if standing[worker] != worker.queued:
+                raise EngineInternalError(f'node "{worker.path}": it stands {standing[worker]} times in its run queue')
 
     def number_workers(self) -> int:
         """Give a number that no worker of this run has yet."""

@@ -10,8 +10,9 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
+from hfg.errors import EngineInternalError
 from hfg.ports.barrier import Barrier
-from hfg.ports.edges import Edge
+from hfg.ports.edges import Edge, EventEdge
 
 if TYPE_CHECKING:
     from hfg.engine.model.core import Core, Region
@@ -337,6 +338,52 @@ class Worker:
         """Whether its event `timeout` has an edge or a subscriber (docs/semantics.md, "quiet")."""
         event = self.events.get("timeout")
         return event is not None and bool(event.edges or (event.port is not None and event.port._observers))
+
+    def check_invariants(self) -> None:
+        """Between two steps of the run certain things hold of every worker, whatever its region has fused.
+
+        Raises:
+          EngineInternalError: one of them does not.
+        """
+        for holds, relation in self._relations():
+            if not holds:
+                raise EngineInternalError(f'node "{self.path}": {relation}')
+        if not self.blocked & (ENDED | TORN_DOWN):  # who has ended waits for nothing any more (F12)
+            missing = sum(1 for edge in self.live_inputs if not edge.untaken)
+            self.inputs.check_invariants(missing, f'inputs of "{self.path}"')
+
+    def _relations(self) -> Iterator[tuple[bool, str]]:
+        """What holds of it between two steps."""
+        may_fire = not (self.blocked or self.inputs.missing or self.outputs.missing)
+        may_call = bool(self.calls) and not self.blocked & CALLS_BLOCKED
+        rests = self.busy == ""
+        yield may_fire or not self.placed, "its firing has a place, but F1 does not hold"
+        if rests and self.core.started and not self.is_boundary_output:
+            yield self.placed or not may_fire, "F1 holds, but its firing has no place"
+            yield self.queued or not (self.placed or may_call), "it may move, but does not stand in its run queue"
+        yield not self.calls or self.ahead <= len(self.calls) or not self.placed, "more calls stand before its firing"
+        if rests:
+            yield self.stamp is None and not self.right, "it rests, but has the stamp or the right of a firing (T5, A3)"
+            yield self.written is None, "it rests, but what a firing wrote has not left (F3)"
+            yield self.call_edge is None, "it rests, but is amid a slot call"
+            yield not self.follows or self.queued, "it is to go next, but for nothing (R2)"
+        yield self.outputs.missing > 0 or not self.held, "it holds its inputs for outputs that are free (F5)"
+        yield bool(self.blocked & ENDED) or not self.pending_end, "END is to follow, but it has not ended (F4)"
+        yield bool(self.blocked & ENDED) or self.deferred is None, "modifiers wait for its END, but it has not ended"
+        yield bool(self.full_edges) == bool(self.blocked & FULL), "held back by a full queue that is none (F8)"
+        yield self.rate_timer is None or bool(self.blocked & RATE), "a rate's timer runs, but no rate holds it (F11)"
+        waiting = sum(edge.untaken for edge in self.called_by())
+        yield (
+            waiting == len(self.calls or ()),
+            f"{waiting} tokens lie before its slots, for {len(self.calls or ())} calls",
+        )
+
+    def called_by(self) -> Iterator[Any]:
+        """Each edge whose tokens wait for a call: into a slot, or a signal into a parameter (P8)."""
+        yield from self.slot_edges
+        for edge in self.in_edges:
+            if edge.target_kind == "parameter" and type(edge) is EventEdge:
+                yield edge
 
     def inputs_ready(self) -> bool:
         """Whether all its inputs hold a token that nobody has taken."""

@@ -186,6 +186,7 @@ def send_end(worker: Worker) -> None:
         _put_outputs(worker, [end] * len(worker.out_edges))
         let_follow(core, since)
         worker.stamp = None
+        worker.right = False  # no firing or call goes on that could use it: the next slot call must not (A3)
         _sent(core)
         if core.trace is not None:
             core.trace(NodeEnded(core.now(), worker.path))

@@ -24,7 +24,7 @@ from hfg.engine.rules import quiet
 from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime.callbacks import Callbacks
 from hfg.engine.runtime.code import CodeRunner, answer
-from hfg.engine.runtime.groups import Dispatching, LoopGroup, SideGroup, ThreadGroup
+from hfg.engine.runtime.groups import CheckedTurn, Dispatching, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.runtime.settings import Settings
 from hfg.engine.runtime.upstairs import Deciders
 from hfg.engine.runtime.virtual import VirtualTimeLoop
@@ -190,7 +190,20 @@ class Engine:
                 groups[name] = LoopGroup(name, policy, clock)
             else:
                 groups[name] = SideGroup(name, policy, clock, self._ready_groups, self.core.flags)
+            if settings.check_all or settings.debug:
+                groups[name].take = CheckedTurn(
+                    groups[name], self.check_invariants if settings.check_all else None
+                ).take
         return groups
+
+    def check_invariants(self) -> None:
+        """Ask for the invariants of everything in the run.
+
+        Raises:
+          EngineInternalError: one of them does not hold.
+        """
+        for core in self.all_cores():
+            core.check_invariants()
 
     def on_loop(self) -> bool:
         """Whether the caller is on the run's own thread."""

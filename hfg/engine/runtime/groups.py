@@ -19,7 +19,7 @@ from hfg.engine.model.policies import Policy
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 
-__all__ = ["Dispatching", "Job", "LoopGroup", "SideGroup", "ThreadGroup"]
+__all__ = ["CheckedTurn", "Dispatching", "Job", "LoopGroup", "SideGroup", "ThreadGroup"]
 
 
 _DISPATCH_STEPS = 16  # how much one group may do on the loop before others have their turn
@@ -54,6 +54,32 @@ class _Turn:
             worker.step(worker)
         finally:
             self._group.charge(worker, self._clock() - began)
+
+
+class CheckedTurn:
+    """Stands for the worker whose turn it is where the invariants are asked for after every step.
+
+    In debug mode those of the worker itself; of all there is in the tests of the semantics.
+    """
+
+    def __init__(self, group: Group, of_all: Callable[[], None] | None) -> None:
+        self._take = group.take
+        self._of_all = of_all
+        self._turn: Any = None
+
+    def take(self) -> CheckedTurn:
+        """Give out what is to be stepped next."""
+        self._turn = self._take()
+        return self
+
+    def step(self, _: CheckedTurn) -> None:
+        """Step it, then ask."""
+        turn = self._turn
+        turn.step(turn)
+        if self._of_all is not None:
+            self._of_all()
+        elif isinstance(turn, Worker) and not turn.core.over:
+            turn.check_invariants()
 
 
 class SideGroup(LoopGroup):

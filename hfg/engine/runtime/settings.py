@@ -7,7 +7,10 @@ from typing import TypedDict
 from hfg.errors import UsageError
 from hfg.trace import Consumer
 
-__all__ = ["FUSE_AFTER", "RunOptions", "Settings"]
+__all__ = ["CHECK_ALL", "FUSE_AFTER", "RunOptions", "Settings"]
+
+CHECK_ALL = False
+"""Whether runs ask after every step for the invariants of all their nodes and edges; the tests of the semantics do."""
 
 FUSE_AFTER = 250
 """Firings of a head before its region is fused: forming one costs about as much as they save."""
@@ -51,6 +54,7 @@ class Settings:
         if seed is not None and type(seed) is not int:
             raise UsageError(f"seed must be a whole number, got {seed!r}")
         self.debug = debug
+        self.check_all = CHECK_ALL
         self.policy = policy
         self.seed = seed
         self.trace = trace
