@@ -95,6 +95,31 @@ class Edge:
         self.handler: Callable[[Any], Any] | None = None
         self.tap: Callable[[Token[Any]], None] | None = None
 
+    def number(self) -> int:
+        """One more token is put on it: this is its number (T5)."""
+        self.sent += 1
+        return self.sent
+
+    def count_dropped(self) -> None:
+        """A token of it went nowhere."""
+        self.dropped += 1
+
+    def count_drained(self) -> None:
+        """A token of it was processed without a firing (F12)."""
+        self.drained += 1
+
+    def end(self, ended: bool) -> None:
+        """Whether END is what the consumer has taken from it last (F4)."""
+        self.ended = ended
+
+    def begin_afresh(self) -> None:
+        """The consumer begins afresh; who has said END to an optional input has said it (F4)."""
+        self.ended = self.ended and not self.mandatory
+
+    def enliven(self, live: bool) -> None:
+        """Whether both its ends are enabled."""
+        self.live = live
+
     def check_invariants(self) -> None:
         """Between two steps of the run certain things hold of every edge.
 
@@ -126,6 +151,33 @@ class SyncEdge(Edge):
         self.token: Token[Any] | None = None
         self.held = False
         self.sequential = True
+
+    def put(self, token: Token[Any]) -> None:
+        """Lay the one token on it that there is a place for; it counts as unprocessed (P4).
+
+        Raises:
+          EngineInternalError: the place is taken.
+        """
+        if self.token is not None or self.held:
+            raise EngineInternalError(f'a second token on synchronous edge "{self.label}"')
+        self.token = token
+        self.held = True
+
+    def take(self) -> Token[Any]:
+        """Take the token from it; its place stays occupied until `release` (F5)."""
+        token, self.token = self.token, None
+        assert token is not None
+        return token
+
+    def release(self) -> bool:
+        """The token is processed; whether its producer has waited for that."""
+        held, self.held = self.held, False
+        return held
+
+    def strip(self, changed: Callable[[Token[Any]], Token[Any]]) -> None:
+        """Give what lies on it another modifier."""
+        if self.token is not None:
+            self.token = changed(self.token)
 
     @property
     def untaken(self) -> int:
@@ -164,6 +216,26 @@ class _QueueEdge(Edge):
         self.queue: deque[Token[Any]] = deque()
         self.initial = initial
         self.deepest = len(initial)
+
+    def lay(self, token: Token[Any]) -> None:
+        """Put a token behind all others."""
+        queue = self.queue
+        queue.append(token)
+        if len(queue) > self.deepest:
+            self.deepest = len(queue)
+
+    def begin(self, stamp: float) -> None:
+        """The run, or the edge, begins: its initial tokens lie on it (P7)."""
+        self.queue.extend(Token(value, 0, stamp, 0) for value in self.initial)
+
+    def take(self) -> Token[Any]:
+        """Take the oldest token."""
+        return self.queue.popleft()
+
+    def strip(self, changed: Callable[[Token[Any]], Token[Any]]) -> None:
+        """Give what lies on it other modifiers."""
+        for position, token in enumerate(self.queue):
+            self.queue[position] = changed(token)
 
     @property
     def untaken(self) -> int:
@@ -204,6 +276,35 @@ class BufferEdge(_QueueEdge):
         self.sequential = False
         self.working = False
         self.held = False
+
+    def put(self, token: Token[Any]) -> bool:
+        """Put a token behind all others; whether the producer has to wait (P4, P7).
+
+        Raises:
+          EngineInternalError: the producer waits already.
+        """
+        if self.held:
+            raise EngineInternalError(f'one token too many on synchronous edge "{self.label}"')
+        self.lay(token)
+        self.held = self.crowded
+        return self.held
+
+    def take(self) -> Token[Any]:
+        """Take the oldest token; a sequential one keeps its place until `release` (F5)."""
+        self.working = self.sequential
+        return self.queue.popleft()
+
+    def release(self) -> bool:
+        """What was taken is processed; whether its producer has waited for that and goes on."""
+        self.working = False
+        if not self.held or self.crowded:
+            return False
+        self.held = False
+        return True
+
+    def go_on_working(self, working: bool) -> None:
+        """The consumer finishes what it has taken, though its edge is empty now (F10)."""
+        self.working = working
 
     @property
     def capacity(self) -> int:
@@ -269,6 +370,34 @@ class EventEdge(_QueueEdge):
         self.pipeline: Callable[[Token[Any]], None] | None = None
         self.complete: Callable[[], None] | None = None
         self.renew: Callable[[], None] | None = None
+
+    def fill(self) -> bool:
+        """F8: whether it has just become full, so that its source starts nothing new."""
+        if self.overflow == "wait" and not self.full and len(self.queue) >= self.capacity and self.live:
+            self.full = True
+            return True
+        return False
+
+    def free(self) -> bool:
+        """F8: whether it was full and is not any more."""
+        if self.full and len(self.queue) < self.capacity:
+            self.full = False
+            return True
+        return False
+
+    def grow(self) -> None:
+        """F8: one more place."""
+        self.capacity += 1
+        self.grown += 1
+
+    def say_end(self) -> None:
+        """F13: END is put on it, once; what comes later is dropped."""
+        self.end_sent = True
+
+    def take_complete(self) -> Callable[[], None] | None:
+        """What tells the operators that no more comes, to be called once (P9)."""
+        complete, self.complete = self.complete, None
+        return complete
 
     def overflows(self) -> bool:
         """Whether one more token is one too many for a policy that drops or refuses (P5)."""

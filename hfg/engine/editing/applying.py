@@ -19,7 +19,7 @@ from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
 from hfg.engine.rules import lifecycle, wiring
 from hfg.engine.rules.activity import rest
-from hfg.engine.rules.agenda import block, note_full
+from hfg.engine.rules.agenda import note_full
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.modifiers import discard, touch
 from hfg.engine.rules.releasing import release
@@ -127,7 +127,7 @@ class _Applying:
         for worker in found.gone:
             worker.blocked |= TORN_DOWN | REMOVED
             worker.pending_end = False
-            block(worker, REMOVED)
+            worker.block(REMOVED)
             if worker.queued:
                 worker.group.policy.remove(worker)
                 worker.queued = False

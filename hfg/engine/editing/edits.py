@@ -196,7 +196,7 @@ class Edits:
             worker = plan.make_worker(engine.core, said, engine.groups)
             come.append(worker)
             self._lifetime.carry(worker)
-            worker.busy = "setup"
+            worker.be_busy("setup")
             self._turns.wait_for((worker,))
             await self._hook(worker, lifecycle.set_up)
             self._lifetime.came(worker)
@@ -244,8 +244,8 @@ class Edits:
             await self._to_its_end(self._become_again(begun))
             raise
         for worker, _ in begun:
-            lifecycle.not_ended(worker)
-            worker.blocked &= ~(ENDED | UNREADY)
+            worker.not_ended()
+            worker.allow(ENDED | UNREADY)
 
     async def _become_again(self, begun: list[tuple[Worker, Any]]) -> None:
         """Put the nodes back that were to be replaced; one that cannot be set up again ends the run."""

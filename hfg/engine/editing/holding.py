@@ -64,8 +64,7 @@ class Held:
             self._free.append(worker)
             over()
             return
-        worker.busy = "edit"
-        worker.disturb()
+        worker.be_busy("edit")
         self._held[worker] = over
         if len(self._held) == len(self._workers):
             if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hfg.engine.fusion.schedule import asks_who_hears
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules.agenda import freed, note_start
+from hfg.engine.rules.agenda import freed
 from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import put
@@ -136,8 +136,8 @@ def _put_heard(listeners: Any, value: Any, stamp: float) -> None:
         put(edge, value, 0, stamp)
 
 
-_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, note_start, _put_heard, _take_queued, _values)
-_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, note_start, put_heard, take_queued, values_of"
+_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, _put_heard, _take_queued, _values)
+_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, put_heard, take_queued, values_of"
 
 
 @functools.lru_cache(maxsize=512)
@@ -291,7 +291,7 @@ class Writer:
         say("region.running = True")
         say("core.speaker = worker")
         if self.head.paced:
-            say("note_start(worker, worker.options.max_rate_hz)")
+            say("worker.note_start(worker.options.max_rate_hz)")
         if self.is_async:
             say("return start(waves(worker))")
             self.indent = 1

@@ -81,6 +81,22 @@ class Scope:
             edge for worker in inside for edge in (*worker.in_edges, *worker.slot_edges) if edge.source in inside
         ]
 
+    def look(self) -> bool:
+        """Derive its activity anew; whether it has changed."""
+        before, self.active = self.active, self.derive()
+        return self.active != before
+
+    def tell(self) -> bool:
+        """Its events tell its activity now; gives it back."""
+        self.told = self.active
+        return self.active
+
+    def watch(self) -> None:
+        """Somebody cares about its activity: it is derived from now on."""
+        self.watched = True
+        self.find_inner_edges()
+        self.active = self.told = self.derive()
+
     def derive(self) -> bool:
         """Whether an inner node is active, or a token with +1 lies untaken inside or was drained and has yet to act.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from hfg.errors import EngineInternalError
 from hfg.ports.barrier import Barrier
-from hfg.ports.edges import Edge, EventEdge
+from hfg.ports.edges import Edge, EventEdge, SyncEdge
 
 if TYPE_CHECKING:
     from hfg.engine.model.core import Core, Region
@@ -30,6 +30,7 @@ __all__ = [
     "RATE",
     "REMOVED",
     "RESTING",
+    "SAME_MOMENT_S",
     "STARTING",
     "TORN_DOWN",
     "UNREADY",
@@ -56,6 +57,8 @@ CALLS_BLOCKED: Final = FULL | BACKOFF | TORN_DOWN
 
 AMID_NOTHING: Final = ("", "edit", "over")  # values of Worker.busy: automatic events leave at once (A9)
 
+SAME_MOMENT_S: Final = 1e-9  # times that differ by less are one: sums of floats do
+
 NOTHING: Final[dict[str, Any]] = {}  # shared by the many that have none; never written
 
 
@@ -75,6 +78,48 @@ class RunningEvent:
     def label(self) -> str:
         """Its path, as traces name it."""
         return f"{self.worker.path}.{self.name}" if self.worker.path else self.name
+
+
+class Shape:
+    """What the wiring of a worker says about each of its firings, found once.
+
+    Attributes:
+      sequential: inputs whose tokens are processed when its outputs are (F5).
+      pipelined: those whose tokens are when it has taken them.
+      plain: a firing without markers is a call of its function with what lies on its inputs, and nothing else.
+      direct: the arguments of that call are the values, as they lie there.
+      single: what the call gives back is the value of its one output.
+      outgoing: where that is put, slots first (F9).
+      gives: activity may leave by one of those edges (A3).
+    """
+
+    __slots__ = ("direct", "gives", "outgoing", "pipelined", "plain", "sequential", "single")
+
+    def __init__(self, worker: Worker) -> None:
+        edges, kind = worker.live_inputs, worker.type
+        synchronous = [edge for edge in edges if type(edge) is not EventEdge]
+        self.sequential = tuple(edge for edge in synchronous if edge.sequential)
+        self.pipelined = tuple(edge for edge in synchronous if not edge.sequential)
+        self.plain = (
+            kind is not None
+            and worker.process is not None
+            and all(type(edge) is SyncEdge and edge.target_kind == "input" for edge in edges)
+            and not any(edge.ended for edge in worker.in_edges)
+            and not (worker.gates_over or worker.paced)
+        )
+        self.direct = (
+            self.plain
+            and worker.iteration is None
+            and kind.process_kind in ("function", "async")
+            and [edge.position for edge in edges] == list(range(len(worker.unset)))
+            and not any(worker.wants_token)
+        )
+        self.single = (
+            kind is not None and kind.result == "single" and len(worker.out_edges) == 1 and not worker.core.debug
+        )
+        outgoing = worker.out_edges[0] if self.single else ()
+        self.outgoing = tuple(sorted(outgoing, key=lambda edge: edge.target_kind != "slot"))
+        self.gives = any(edge.active for edge in outgoing)
 
 
 class Worker:
@@ -181,6 +226,7 @@ class Worker:
         "room_waiters",
         "scope",
         "scopes",
+        "shape",
         "silent",
         "silent_code",
         "slot_edges",
@@ -190,7 +236,6 @@ class Worker:
         "step",
         "taken",
         "ticket",
-        "tokens",
         "type",
         "unfit",
         "unset",
@@ -200,6 +245,8 @@ class Worker:
         "wired_out",
         "written",
     )
+
+    # --- made -------------------------------------------------------------------------------------------------------
 
     def __init__(self, core: Core, index: int, path: str, node: Any, options: Any, group: Group) -> None:
         self.core = core
@@ -271,7 +318,6 @@ class Worker:
         self.active = False
         self.right = False
         self.stamp: float | None = None
-        self.tokens: list[Any] = []
         self.taken: tuple[Any, ...] = ()
         self.held = False  # its inputs are released when its outputs are processed (F5 sequential)
         self.written: list[Any] | None = None
@@ -300,6 +346,8 @@ class Worker:
         self.active_timer: Any = None
         self.gate_next = float("-inf")  # when its last firing began, for a throttling gate
 
+        self.shape = Shape(self)  # what follows from the wiring for each firing; set by `rewire`
+
         # counts
         self.firings = 0
         self.silent = 0
@@ -309,10 +357,414 @@ class Worker:
         self.calls_failed = 0
         self.restarts = 0
 
-    def disturb(self) -> None:
-        """Something about it is not as it is at rest: if its firings are fused, they are not from here on."""
+    # --- its place in the agenda and in the run queue (F1, F9, R2) ---------------------------------------------------
+
+    def enqueue(self) -> None:
+        """Stand in the run queue, once; who is busy looks for itself when that is over."""
+        if not self.queued and not self.busy:
+            self.queued = True
+            self.push(self)
+
+    def enqueue_next(self) -> None:
+        """Stand in front of all others in the run queue; if it has a firing and a call, both go next."""
+        self.queued = True
+        self.follows = bool(self.calls and self.placed)
+        self.push_next(self)
+        self.core.followed += 1
+
+    def follow(self) -> None:
+        """Go next when the sending is over; behind an earlier call if it stands in the queue for one (F9).
+
+        What is busy is not enabled by what it gets now, but by the end of what it does (F1).
+        """
+        if self.queued:
+            self.follows = True
+        elif not self.busy:
+            self.queued = True
+            self.core.followers.append(self)
+
+    def follow_no_more(self) -> None:
+        """What stood in front of it is over: whether it goes next is decided now."""
+        self.follows = False
+
+    def dequeued(self) -> None:
+        """Its group has given it out: it is its turn."""
+        self.queued = False
+
+    def leave_queue(self) -> None:
+        """Do not stand in the run queue, whoever is in front."""
+        if self.queued:
+            self.group.policy.remove(self)
+            self.queued = False
+
+    def take_place(self) -> None:
+        """The next firing is enabled: it comes behind the calls that wait already (F9, D1)."""
+        self.placed = True
+        self.ahead = len(self.calls) if self.calls else 0
+
+    def lose_place(self) -> None:
+        """What F1 asks for holds no more; a rate goes on holding what it holds."""
+        self.placed = False
+
+    def unplace(self) -> None:
+        """The same, and no timer that would give a place."""
+        self.placed = False
+        if self.rate_timer is not None:
+            self.rate_over()
+
+    # --- what keeps it from moving (F1) ------------------------------------------------------------------------------
+
+    def block(self, reason: int) -> None:
+        """Let no firing start; its place in the agenda is lost (D1), and it does not rest: no wave may take that so."""
+        self.blocked |= reason
         if self.region is not None:
             self.region.disturb(self)
+        if reason == FULL:
+            self.placed = False  # a rate goes on holding it, and is to be over before a queue grows (F8)
+        else:
+            self.unplace()
+
+    def allow(self, reasons: int) -> bool:
+        """Take reasons away; whether one of them held. Who calls this sees to it that the worker goes on."""
+        held = self.blocked & reasons
+        self.blocked &= ~reasons
+        return bool(held)
+
+    def wait_for_rate(self, when: float, over: Callable[[], None]) -> None:
+        """F11: nothing starts before `when`."""
+        self.blocked |= RATE
+        self.rate_timer = self.core.host.call_at(when, over)
+
+    def rate_over(self) -> None:
+        """The rate holds it no more: its time has come, or what it would have let start is gone."""
+        timer, self.rate_timer = self.rate_timer, None
+        self.blocked &= ~RATE
+        if timer is not None:
+            timer.cancel()
+
+    def note_start(self, rate_hz: float) -> None:
+        """F11: a firing starts now; the next one may in the next period of the grid that the first one began.
+
+        Each place of the grid is found from its beginning, so that errors of floats never add up.
+        """
+        now = self.core.now()
+        if self.grid_start is None:
+            self.grid_start = now
+        period = int((now - self.grid_start + SAME_MOMENT_S) * rate_hz)
+        self.next_period = max(self.next_period, period) + 1  # (a clock as large as the date has fewer digits)
+        self.next_start = self.grid_start + self.next_period / rate_hz
+
+    def note_gated_start(self, when: float) -> None:
+        """A11: an idle rate counts from here; minus infinity: from the next firing."""
+        self.gate_next = when
+
+    def queue_full(self) -> None:
+        """F8: one more queue of its events is full."""
+        self.full_edges += 1
+        self.core.full_edges += 1
+        self.block(FULL)
+
+    def queue_free(self) -> bool:
+        """F8: one less; whether none is left. Code that waits for room is told."""
+        self.full_edges -= 1
+        self.core.full_edges -= 1
+        if self.full_edges:
+            return False
+        self.room_for_all()
+        return True
+
+    def room_for_all(self) -> None:
+        """Tell code that waits for room behind the worker's events."""
+        waiters, self.room_waiters = self.room_waiters, None
+        for waiter in waiters or ():
+            waiter()
+
+    def when_room(self, waiter: Callable[[], None]) -> None:
+        """Tell this waiter when no queue behind the worker's events is full."""
+        if self.room_waiters is None:
+            self.room_waiters = []
+        self.room_waiters.append(waiter)
+
+    def code_waits_for_room(self, how_many: int) -> None:
+        """F8: so much more of its own code awaits `trigger_wait`."""
+        self.waiting_room += how_many
+        self.core.waiting_room += how_many
+
+    # --- what is under way (F3, F9, X2) -----------------------------------------------------------------------------
+
+    def be_busy(self, doing: str) -> None:
+        """Something is under way; if its firings are fused, they are not from here on."""
+        self.busy = doing
+        if self.region is not None:
+            self.region.disturb(self)
+
+    def rest(self) -> None:
+        """Nothing is under way any more."""
+        self.busy = ""
+
+    def begin_firing(self) -> None:
+        """A firing begins: what it takes, and when that was made, is still to be seen."""
+        self.placed = False
+        self.busy = "firing"
+        self.firings += 1
+        self.ticket += 1
+        self.special = False
+
+    def took(self, edges: tuple[Any, ...], stamp: float) -> None:
+        """The firing has taken its tokens.
+
+        Args:
+          edges: those whose tokens are processed when its outputs are (F5 sequential).
+          stamp: of what it sends (T5).
+        """
+        self.taken = edges
+        self.stamp = stamp
+
+    def fire_silently(self) -> None:
+        """F4(2): the firing under way is silent."""
+        self.silent += 1
+
+    def write(self, position: int, entry: Any) -> None:
+        """The firing has written to one output; it leaves when the firing is over."""
+        if self.written is None:
+            self.written = [None] * len(self.out_edges)
+        self.written[position] = entry
+
+    def be_over(self) -> None:
+        """The firing or call is over, but for what it releases."""
+        self.busy = "over"
+
+    def keep_generator(self, generator: Any) -> None:
+        """What a source draws its next values from; None: it has ended, or begins at its next firing."""
+        self.generator = generator
+
+    def count_end_firing(self) -> None:
+        """The firing under way is the one with which it ends."""
+        self.end_firings += 1
+
+    def count_failure(self, *, of_call: bool = False) -> None:
+        """Its code has failed, in a slot call or elsewhere (X1)."""
+        if of_call:
+            self.calls_failed += 1
+        else:
+            self.failed += 1
+
+    def begin_restart(self) -> None:
+        """X1: it is torn down, and set up after a pause."""
+        self.restarts += 1
+        self.block(BACKOFF)
+
+    def time_backoff(self, timer: Any) -> None:
+        """X1: when this timer is over it is set up again; None: it is over."""
+        self.backoff_timer = timer
+
+    def be_up(self, up: bool) -> None:
+        """Whether its setup has begun and its teardown has not."""
+        self.is_up = up
+
+    def enable_itself(self, enabled: bool) -> bool:
+        """Whether it is enabled itself, whatever is around it; gives back whether that is new."""
+        before, self.own_enabled = self.own_enabled, enabled
+        return before != enabled
+
+    def take_written(self) -> list[Any] | None:
+        """What the firing has written leaves now, or never."""
+        written, self.written = self.written, None
+        return written
+
+    def begin_call(self, edge: Any, stamp: float) -> None:
+        """A slot call begins, for the oldest token of the edge."""
+        self.busy = "call"
+        self.call_number += 1
+        self.ticket += 1
+        self.call_edge = edge
+        self.stamp = stamp
+
+    def take_call(self) -> Any:
+        """Whose token waits longest for a slot call: its turn has come."""
+        assert self.calls is not None
+        if self.placed and self.ahead:
+            self.ahead -= 1
+        return self.calls.popleft()
+
+    def expect_call(self, edge: Edge) -> None:
+        """The newest token of the edge waits for a slot call (F9)."""
+        if self.calls is None:
+            self.calls = deque()
+        self.calls.append(edge)
+
+    def forget_call(self, edge: Edge) -> None:
+        """The call of the edge's oldest token will not come: the token was dropped."""
+        assert self.calls is not None
+        position = self.calls.index(edge)
+        del self.calls[position]
+        if position < self.ahead:
+            self.ahead -= 1
+
+    def end_call(self) -> Any:
+        """The call is over, but for what it releases; gives back the edge that it took from."""
+        edge, self.call_edge = self.call_edge, None
+        self.busy = "over"
+        return edge
+
+    def end_firing(self) -> tuple[Any, ...]:
+        """The firing is over, but for what it releases; gives back the edges to be released now, if any.
+
+        While its outputs are not free it holds them, and `outputs_free` gives them back (F5).
+        """
+        self.busy = "over"
+        self.written = None
+        if self.outputs.missing:
+            self.held = True
+            return ()
+        return self.taken
+
+    def outputs_free(self) -> tuple[Any, ...]:
+        """All that it has sent is processed: gives back the edges that are released by that."""
+        if not self.held:
+            return ()
+        self.held = False
+        return self.taken
+
+    def release_early(self, edges: tuple[Any, ...] | None = None) -> tuple[Any, ...]:
+        """What it has taken is processed before its outputs are: from these edges, or from all; gives them back."""
+        released = self.taken if edges is None else edges
+        self.taken = tuple(edge for edge in self.taken if edge not in released)
+        return released
+
+    def leave(self) -> None:
+        """The firing or call is behind it: no right of A3, and the present is the stamp of what it sends."""
+        self.right = False
+        self.stamp = None
+
+    def give_up_firing(self) -> None:
+        """X2: what its code still brings is too late."""
+        self.ticket += 1
+
+    def mark_special(self) -> None:
+        """Its next firing is not an ordinary one: a marker lies before it."""
+        self.special = True
+
+    # --- activity (A3, A5, A9) ----------------------------------------------------------------------------------------
+
+    def become(self, active: bool) -> None:
+        """A(v) := active; who fuses its firings looks whether activity would move now."""
+        self.active = active
+        if self.region is not None:
+            self.region.disturb(self)
+
+    def keep_right(self, right: bool) -> None:
+        """A3: whether it may still carry activity that A5 took earlier in the firing or call under way."""
+        self.right = right
+
+    def expect_event(self, name: str, value: Any) -> None:
+        """An automatic event has arisen; it leaves with the others, in their order (A9)."""
+        if self.events_due is None:
+            self.events_due = []
+        self.events_due.append((name, value))
+
+    def take_events(self) -> list[tuple[str, Any]]:
+        """The automatic events that have arisen, to be sent now."""
+        due, self.events_due = self.events_due, None
+        return due or []
+
+    def defer(self, modifier: int) -> None:
+        """F12: a modifier that was drained acts behind the worker's own END."""
+        assert self.deferred is not None
+        self.deferred.append(modifier)
+
+    def defer_none(self) -> None:
+        """A14: what was drained brings no activity any more."""
+        if self.deferred:
+            self.deferred = [0] * len(self.deferred)
+
+    def take_deferred(self) -> list[int]:
+        """Its END has been sent, or never will be: what was drained acts now."""
+        deferred, self.deferred = self.deferred, None
+        return deferred or []
+
+    def time_activity(self, timer: Any) -> None:
+        """A12: how long it has been active is measured by this timer from now on, or not at all; the last is over."""
+        if self.active_timer is not None:
+            self.active_timer.cancel()
+        self.active_timer = timer
+
+    def active_long_enough(self) -> None:
+        """A12: the timer has come to its end."""
+        self.active_timer = None
+
+    # --- its end, and beginning afresh (F4, F10, F12, X1) -------------------------------------------------------------
+
+    def end(self, *, given_up: bool = False) -> None:
+        """From here on it fires no more, and what comes is drained (F12); `given_up`: it will not say END (R5)."""
+        self.block(ENDED)
+        self.deferred = []
+        self.given_up = self.given_up or given_up
+        for edge in self.in_edges:
+            edge.source.changed()  # whose short ways do not look whether what they send is drained
+
+    def promise_end(self, stamp: float | None) -> None:
+        """END follows as soon as the outputs are free; with this stamp (T5)."""
+        self.end_stamp = stamp
+        self.pending_end = True
+
+    def send_end_now(self) -> None:
+        """END is sent, as a sending of its own."""
+        self.pending_end = False
+        self.stamp = self.end_stamp
+
+    def not_ended(self) -> None:
+        """It starts afresh: it has not ended, nor have the inputs that it must have, nor have its events."""
+        self.pending_end = self.given_up = False
+        self.deferred = None
+        for edge in self.in_edges:
+            edge.begin_afresh()
+        for edge in self.event_edges():
+            if edge.renew is not None and edge.complete is None:
+                edge.renew()
+
+    def limit(self, timer: Any) -> None:
+        """X2: the firing may take as long as this timer."""
+        self.limit_timer = timer
+
+    def in_time(self) -> None:
+        """What had a time limit is over in time."""
+        timer, self.limit_timer = self.limit_timer, None
+        if timer is not None:
+            timer.cancel()
+
+    def out_of_time(self) -> None:
+        """X2: what had a time limit has taken longer."""
+        self.limit_timer = None
+        self.ticket += 1
+
+    def when_idle(self, callback: Callable[[], None]) -> None:
+        """Call back when nothing is under way, before the next firing or call."""
+        if self.on_idle is None:
+            self.on_idle = []
+            self.changed()
+        self.on_idle.append(callback)
+
+    def let_others(self) -> None:
+        """What waits until it is not busy has its turn, as long as that does not make it busy."""
+        while self.on_idle and not self.busy:
+            self.on_idle.pop(0)()
+        if not self.on_idle and self.on_idle is not None:
+            self.on_idle = None
+            self.changed()
+
+    def rewire(self, live_inputs: tuple[Any, ...]) -> None:
+        """What it waits for, and what it sends on, is derived anew from the liveness of its edges."""
+        self.live_inputs = live_inputs
+        self.out_edges = tuple(tuple(edge for edge in edges if edge.live) for edges in self.wired_out)
+        self.inputs.count(sum(1 for edge in live_inputs if not edge.untaken))
+        if self.inputs.missing:
+            self.unplace()
+        self.shape = Shape(self)
+
+    def changed(self) -> None:
+        """Its wiring, or somebody's interest in it, is another: how it does its next piece of work is chosen anew."""
+        self.core.upstairs.choose_step(self)
 
     def is_on_fast_path(self) -> bool:
         """Whether a call of its code is under way that `busy` does not tell, by a fast path."""

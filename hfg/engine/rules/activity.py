@@ -13,11 +13,12 @@ import msgspec
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Scope
-from hfg.engine.model.worker import AMID_NOTHING, RATE, RESTING, Worker
-from hfg.engine.rules.agenda import block, consider, must_wait
+from hfg.engine.model.worker import AMID_NOTHING, RESTING, Worker
+from hfg.engine.rules.agenda import consider, must_wait
 from hfg.engine.rules.modifiers import automatic, set_active, touch
 from hfg.engine.rules.sending import flush_automatic, tell, trigger
 from hfg.engine.rules.sources import judge_sources
+from hfg.token import Token
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
 
@@ -53,23 +54,21 @@ def _call_hook(worker: Worker, name: str) -> None:
 
 def _time_out_later(worker: Worker, active: bool) -> None:
     """A12: the time runs from the change from 0 to 1; the timer counts only if the event leads somewhere."""
-    if worker.active_timer is not None:
-        worker.active_timer.cancel()
-        worker.active_timer = None
     limit = worker.active_for_s
+    worker.time_activity(None)
     if active and limit is not None:
         core = worker.core
         leads = worker.timeout_leads_somewhere()
-        worker.active_timer = core.host.call_at(core.now() + limit, lambda: _time_out(worker), counts=leads)
+        worker.time_activity(core.host.call_at(core.now() + limit, lambda: _time_out(worker), counts=leads))
 
 
 def _time_out(worker: Worker) -> None:
-    worker.active_timer = None
+    worker.active_long_enough()
     event = worker.events.get("timeout")
     if event is None:
         return
     trigger(event, stamp=worker.core.now(), extend_right=False)
-    worker.right = False  # behind the sending, which may have given it (A3)
+    worker.keep_right(False)  # behind the sending, which may have given it (A3)
     scopes_changed(worker.core)
     if worker.busy in AMID_NOTHING:  # else after the firing (A9)
         flush_automatic(worker)
@@ -86,19 +85,16 @@ def gate_changed(gates: Any) -> None:
 def rest(worker: Worker) -> None:
     """Let a source rest, or go on, as its gates say now."""
     if worker.rate_timer is not None:
-        worker.rate_timer.cancel()
-        worker.rate_timer = None
-        worker.blocked &= ~RATE
+        worker.rate_over()
     if any(gate.idle_rate_hz is None and not gate.state.active for gate in worker.gates_over):
         if not worker.blocked & RESTING:
-            block(worker, RESTING)
+            worker.block(RESTING)
             judge_sources(worker.core)
         return
-    if worker.blocked & RESTING:
-        worker.blocked &= ~RESTING
+    if worker.allow(RESTING):
         judge_sources(worker.core)  # those that were futile beside it work on, like this one
     if worker.placed and must_wait(worker):  # throttled from now on (D7)
-        worker.placed = False
+        worker.lose_place()
     else:
         consider(worker)
 
@@ -118,11 +114,11 @@ def scopes_changed(core: Core) -> None:
         core.dirty_scopes.remove(scope)
         if scope.told == scope.active:
             continue
-        scope.told = active = scope.active
+        active = scope.tell()
         owner = scope.worker
         assert owner is not None
         # the scope's worker shows A(subgraph), but nothing is transferred by itself
-        owner.active = active
+        owner.become(active)
         owner.node._active = active
         automatic(owner, "activated" if active else "deactivated")
         _time_out_later(owner, active)
@@ -131,9 +127,7 @@ def scopes_changed(core: Core) -> None:
 
 def _look_at(scope: Scope) -> None:
     """Derive A(subgraph); what it gates follows at once."""
-    active = scope.derive()
-    if active != scope.active:
-        scope.active = active
+    if scope.look():
         gate_changed(scope.gates)
 
 
@@ -159,19 +153,19 @@ def deactivate_inside(scope: Scope, cause: Literal["sent", "slot"]) -> None:
 
 def _forget(worker: Worker) -> None:
     """Take the right of A3, and what the tokens that were drained are to do (F12)."""
-    worker.right = False
-    if worker.deferred:
-        worker.deferred = [0] * len(worker.deferred)
+    worker.keep_right(False)
+    worker.defer_none()
 
 
 def _strip(edge: Any, *, also_taking: bool) -> None:
     """Set the modifiers of what lies on an edge to 0 (A14): those of +1, also those of -1."""
-    queue = edge.queue if hasattr(edge, "queue") else [edge.token] if edge.token is not None else []
-    for position, token in enumerate(queue):
+
+    def stripped(token: Token[Any]) -> Token[Any]:
         if token.activity > 0 or (also_taking and token.activity):
-            queue[position] = msgspec.structs.replace(token, activity=0)
-    if not hasattr(edge, "queue") and queue:
-        edge.token = queue[0]
+            return msgspec.structs.replace(token, activity=0)
+        return token
+
+    edge.strip(stripped)
 
 
 def reset_activity(core: Core) -> None:

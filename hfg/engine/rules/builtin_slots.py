@@ -28,7 +28,7 @@ def run(worker: Worker, name: str, token: Token[Any], then: Callable[[], None]) 
         set_active(worker, True, "slot")
         then()
     elif name == "deactivate":
-        worker.right = False
+        worker.keep_right(False)
         set_active(worker, False, "slot")
         then()
     elif name == "enable":

@@ -20,21 +20,9 @@ __all__ = ["await_call", "call", "finish_call", "refuse_coroutine", "set_paramet
 def call(worker: Worker) -> None:
     """Take the oldest waiting slot token and run its handler (F9)."""
     core = worker.core
-    assert worker.calls is not None
-    edge = worker.calls.popleft()
-    if worker.placed and worker.ahead:
-        worker.ahead -= 1
-    if type(edge) is SyncEdge:
-        token = edge.token
-        edge.token = None
-        assert token is not None
-    else:
-        token = edge.queue.popleft()
-    worker.busy = "call"
-    worker.call_number += 1
-    worker.ticket += 1
-    worker.call_edge = edge
-    worker.stamp = token.stamp
+    edge = worker.take_call()
+    token = edge.take()
+    worker.begin_call(edge, token.stamp)
     name = edge.port_name
     if core.trace is not None:
         now = core.now()
@@ -110,13 +98,10 @@ def finish_call(worker: Worker, outcome: Any) -> None:
     flush_automatic(worker)
     if core.trace is not None:
         core.trace(CallEnded(core.now(), worker.path, worker.call_number, outcome))
-    worker.busy = "over"
-    edge = worker.call_edge
-    worker.call_edge = None
+    edge = worker.end_call()
     if type(edge) is SyncEdge and edge.token is None:  # else it is the next one, which a pipelined edge has let in
         release((edge,))
-    worker.right = False
-    worker.stamp = None
+    worker.leave()
     idle_again(worker)
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from hfg.engine.model.worker import DISABLED, ENDED, Worker
-from hfg.engine.rules.agenda import block, cancel_limit, freed, idle_again
+from hfg.engine.model.worker import DISABLED, Worker
+from hfg.engine.rules.agenda import freed, idle_again
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import flush_automatic, put_outputs, send_end
 from hfg.ports.edges import EventEdge
@@ -21,8 +21,8 @@ __all__ = ["drain_left", "end", "source_ended"]
 
 def source_ended(worker: Worker) -> None:
     """F2: the generator returned or the code raised EndOfStream; what the firing wrote before stays unsent."""
-    worker.generator = None  # nothing is left to close
-    worker.written = None
+    worker.keep_generator(None)  # nothing is left to close
+    worker.take_written()
     end(worker, (), ())
 
 
@@ -31,21 +31,18 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
     core = worker.core
     for edge, token in zip(edges, tokens, strict=True):
         if type(token.value) is not Marker:
-            edge.dropped += 1
+            edge.count_dropped()
             if core.trace is not None:
                 core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
-    worker.end_firings += 1
-    block(worker, ENDED)
-    for edge in worker.in_edges:  # what comes now is drained: the short ways of those before it do not look
-        core.upstairs.choose_step(edge.source)
-    worker.deferred = []
-    cancel_limit(worker)
+    worker.count_end_firing()
+    worker.end()
+    worker.in_time()
     drain_left(worker.in_edges)
     hook = worker.node._hook("end") if worker.node is not None else None
     if hook is None:
         _ended(worker, None, None)
         return
-    worker.busy = "ending"
+    worker.be_busy("ending")
     core.code.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
 
 
@@ -61,11 +58,11 @@ def drain_left(edges: Sequence[Any]) -> None:
         worker: Worker = edge.target
         core = worker.core
         for token in edge.clear():
-            edge.drained += 1
+            edge.count_drained()
             if core.trace is not None:
                 core.trace(TokenDrained(core.now(), edge.label, token))
             if token.activity and worker.deferred is not None:
-                worker.deferred.append(token.activity)
+                worker.defer(token.activity)
     for edge in drained:
         if type(edge) is EventEdge:
             freed(edge)
@@ -74,32 +71,28 @@ def drain_left(edges: Sequence[Any]) -> None:
 
 def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
     core = worker.core
-    worker.busy = "firing"
+    worker.be_busy("firing")
     if error is None and result is not None:
         error = TypeError(f"end() gave back {result!r:.80}, but it writes with send(): self.out.send(...)")
     if error is not None:
-        worker.written = None
+        worker.take_written()
         worker.core.upstairs.fail(worker, "end()", error, answer=False)
-    written = worker.written
-    worker.written = None
+    written = worker.take_written()
     wrote = written is not None and any(entry is not None for entry in written)
     if wrote:
         put_outputs(worker, written)
     flush_automatic(worker)
     if core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended"))
-    worker.busy = "over"
-    taken = worker.taken
-    worker.taken = ()
-    release(taken)
-    worker.end_stamp = worker.stamp
-    worker.right = False  # the firing is over; END is not part of it (A3)
+    worker.be_over()
+    release(worker.release_early())
+    stamp = worker.stamp
+    worker.leave()  # the firing is over; END is not part of it (A3)
     if worker.given_up:  # amid a firing, and that is over now: nobody is left who would hear END (R5)
-        worker.deferred = None
+        worker.take_deferred()
     elif worker.outputs.missing and not worker.blocked & DISABLED:
-        worker.pending_end = True
+        worker.promise_end(stamp)
     else:
+        worker.promise_end(stamp)
         send_end(worker)
-    worker.right = False
-    worker.stamp = None
     idle_again(worker)

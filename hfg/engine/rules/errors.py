@@ -9,7 +9,6 @@ from typing import Any
 
 from hfg.engine.model.worker import BACKOFF, Worker
 from hfg.engine.rules import calls, firing, lifecycle
-from hfg.engine.rules.agenda import block
 from hfg.engine.rules.modifiers import automatic, report_error
 from hfg.engine.rules.sending import flush_automatic, put_outputs
 from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit, in_words
@@ -35,13 +34,13 @@ def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> No
     if isinstance(error, QueueLimit):
         worker.core.host.finish("failed", error)
         return
-    worker.failed += 1
+    worker.count_failure()
     apply_policy(worker, as_node_error(worker, what, error), answer=answer)
 
 
 def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
     """A slot call has failed: it owes no outputs, so with every policy but `stop` it is only counted."""
-    worker.calls_failed += 1
+    worker.count_failure(of_call=True)
     problem = as_node_error(worker, f"slot {slot}, call {worker.call_number}", error)
     policy = _policy(worker, problem)
     report_error(worker, problem.what, in_words(error), policy)
@@ -67,7 +66,7 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any 
     if restarts and worker.restarts >= worker.options.restart_limit:
         policy = "stop"
     report_error(worker, problem.what, in_words(problem.__cause__ or problem), policy)
-    worker.written = None
+    worker.take_written()
     if policy == "stop":
         core.host.finish("failed", problem)
         return
@@ -76,8 +75,7 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any 
     if answer and policy != "disable":
         put_outputs(worker, None)
     if restarts:
-        worker.restarts += 1
-        block(worker, BACKOFF)
+        worker.begin_restart()
     if answer:
         firing.finish_firing(worker, "failed")
     elif then is not None:
@@ -92,13 +90,12 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any 
 
 def time_out(worker: Worker) -> None:
     """X2: the firing has taken longer than `max_duration_s`: it is given up, its late result ignored."""
-    worker.limit_timer = None
+    worker.out_of_time()
     limit = worker.options.max_duration_s
     what = f"firing {worker.firings}"
-    worker.ticket += 1
     worker.core.code.interrupt(worker)
     problem = FiringTimeout(worker.path, what, f"it took longer than max_duration_s = {limit:g} s and was given up")
-    worker.failed += 1
+    worker.count_failure()
     apply_policy(worker, problem, answer=True)
 
 

@@ -12,16 +12,16 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.activity.rules import asked_for
-from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, UNREADY, Worker
-from hfg.engine.rules.agenda import SAME_MOMENT_S, cancel_limit, consider, freed, idle_again, note_start, unplace
+from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, SAME_MOMENT_S, UNREADY, Worker
+from hfg.engine.rules.agenda import consider, freed, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
 from hfg.engine.rules.ending import end, source_ended
 from hfg.engine.rules.modifiers import automatic, derive_scopes, receive, touch
 from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import flush_automatic, put_outputs
+from hfg.engine.rules.sending import flush_automatic, put_outputs, put_value
 from hfg.engine.rules.wiring import rewire
 from hfg.errors import EndOfStream, UsageError
-from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
+from hfg.ports.edges import EventEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringStarted, TokenTaken
 from hfg.types import accepts, describe
@@ -29,9 +29,13 @@ from hfg.types import accepts, describe
 __all__ = ["complete_firing", "finish_firing", "fire", "merge", "step", "take", "when_done", "write"]
 
 
+_OF_ITS_OWN_KIND = frozenset({Token, CoroutineType})
+"""What a function may give back that does not simply leave: a token passed on, code that is still to be awaited."""
+
+
 def step(worker: Worker) -> None:
     """Do the next piece of work on the agenda of a worker that was taken from its run queue."""
-    worker.queued = False
+    worker.dequeued()
     if worker.busy:
         return
     calls = worker.calls
@@ -48,17 +52,15 @@ def _ask_ready(worker: Worker) -> None:
     """F1: the node's own `ready()` is asked last."""
     hook = worker.ready_hook
     assert hook is not None
-    worker.busy = "asking"
+    worker.be_busy("asking")
 
     def answered(ready: Any, error: BaseException | None) -> None:
-        worker.busy = ""
+        worker.rest()
         if isinstance(error, EndOfStream) and worker.is_source and worker.placed:
-            worker.busy = "firing"
-            worker.firings += 1
+            worker.begin_firing()
             source_ended(worker)
         elif error is not None:  # no answer is no: else it would be asked, and fail, without end
-            worker.placed = False
-            worker.blocked |= UNREADY
+            worker.block(UNREADY)
             worker.core.upstairs.fail(worker, "ready()", error, answer=False)
             if not worker.busy:  # else its restart has begun
                 idle_again(worker, asked=True)
@@ -67,8 +69,7 @@ def _ask_ready(worker: Worker) -> None:
         elif ready and worker.placed:  # an edit was faster, and asks to be before the firing
             idle_again(worker)
         elif worker.placed:
-            worker.placed = False
-            worker.blocked |= UNREADY
+            worker.block(UNREADY)
             idle_again(worker, asked=True)
         else:
             idle_again(worker)
@@ -79,17 +80,15 @@ def _ask_ready(worker: Worker) -> None:
 def fire(worker: Worker) -> None:
     """Take one token from every live input and decide by F4 what becomes of them."""
     core = worker.core
-    worker.placed = False
-    worker.busy = "firing"
-    worker.firings += 1
-    worker.ticket += 1
-    worker.special = False
+    shape = worker.shape
+    if shape.plain and not worker.special and core.trace is None:
+        _fire_plainly(worker)
+        return
+    worker.begin_firing()
     edges = worker.live_inputs
     tokens = [take(edge) for edge in edges]
-    worker.tokens = tokens
-    worker.taken = tuple(edge for edge in edges if type(edge) is not EventEdge and edge.sequential)
     now = core.now()
-    worker.stamp = now if worker.is_source else _newest_stamp(tokens, now)
+    worker.took(shape.sequential, now if worker.is_source else _newest_stamp(tokens, now))
     modifiers = [token.activity for token in tokens if token.activity]
     kind = _kind(worker, edges, tokens)
     if core.trace is not None:
@@ -104,27 +103,65 @@ def fire(worker: Worker) -> None:
         elif not edge.sequential:
             release((edge,))
     if modifiers:
-        if worker.scopes:
-            touch(core, worker.scopes)
-        receive(worker, modifiers)
-        derive_scopes(core)
+        _receive(worker, modifiers)
     _set_parameters(worker, edges, tokens)
     if kind == "end":
         end(worker, edges, tokens)
     elif kind == "silent":
-        worker.silent += 1
+        worker.fire_silently()
         _place_next(worker)
         put_outputs(worker, None)
         finish_firing(worker, "silent")
     else:
         options = worker.options
         if options.max_rate_hz:
-            note_start(worker, options.max_rate_hz)
-        worker.gate_next = now
+            worker.note_start(options.max_rate_hz)
+        worker.note_gated_start(now)
         if worker.paced:
-            unplace(worker)  # what an input that has ended gave a place to is held by the rate from now on
+            worker.unplace()  # what an input that has ended gave a place to is held by the rate from now on
         _place_next(worker)
         _run_process(worker, edges, tokens)
+
+
+def _fire_plainly(worker: Worker) -> None:
+    """The same where the wiring leaves nothing to decide (`Shape.plain`) and no marker lies before the worker.
+
+    All that is taken are values, one for each input, so the function is run (F4); nobody listens.
+    """
+    worker.begin_firing()
+    shape, inputs = worker.shape, worker.inputs
+    tokens = []
+    for edge in worker.live_inputs:
+        tokens.append(edge.take())
+        inputs.expect()
+    if tokens:
+        stamp = tokens[0].stamp
+        for token in tokens:
+            if token.stamp > stamp:
+                stamp = token.stamp
+    else:
+        stamp = worker.core.now()
+    worker.took(shape.sequential, stamp)
+    if shape.pipelined:
+        release(shape.pipelined)
+    for token in tokens:
+        if token.activity:
+            _receive(worker, [one.activity for one in tokens if one.activity])
+            break
+    if worker.calls is not None:
+        _place_next(worker)
+    if shape.direct:
+        worker.core.code.execute(worker, worker.process, [token.value for token in tokens], when_done(worker))  # type: ignore[arg-type]
+    else:
+        _run_process(worker, worker.live_inputs, tokens)
+
+
+def _receive(worker: Worker, modifiers: Sequence[int]) -> None:
+    """A6: what a firing has taken acts, and by that on the subgraphs around."""
+    if worker.scopes:
+        touch(worker.core, worker.scopes)
+    receive(worker, modifiers)
+    derive_scopes(worker.core)
 
 
 def _place_next(worker: Worker) -> None:
@@ -135,20 +172,12 @@ def _place_next(worker: Worker) -> None:
 
 def take(edge: Any) -> Token[Any]:
     """Remove the oldest token (rule F3); its place is freed by the caller once the firing is on record."""
-    barrier = edge.target.inputs
-    if type(edge) is SyncEdge:
-        token: Any = edge.token
-        edge.token = None
-        barrier.missing += 1
-    else:
-        token = edge.queue.popleft()
-        if type(edge) is BufferEdge:
-            edge.working = edge.sequential
-        if not edge.queue:
-            barrier.missing += 1
-        elif type(edge.queue[0].value) is Marker:
-            edge.target.special = True
-    return token  # type: ignore[no-any-return]
+    token: Token[Any] = edge.take()
+    if not edge.untaken:
+        edge.target.inputs.expect()
+    elif type(edge.queue[0].value) is Marker:
+        edge.target.mark_special()
+    return token
 
 
 def _newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
@@ -162,7 +191,7 @@ def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) ->
     end = silent = has_value = has_mandatory = False
     for edge, token in zip(edges, tokens, strict=True):
         value = token.value
-        edge.ended = value is END
+        edge.end(value is END)
         if value is END:
             end = end or edge.mandatory
         elif value is NO_MESSAGE:
@@ -249,7 +278,7 @@ def _open(worker: Worker, step: Callable[[Any], Any]) -> Any:
             f"it is annotated as an iterator but gave back {type(iterator).__name__}, not one; write `yield` in it, or "
             "`return iter(...)`"
         )
-    worker.generator = iterator
+    worker.keep_generator(iterator)
     return step(iterator)
 
 
@@ -276,14 +305,17 @@ def complete_firing(worker: Worker, result: Any) -> None:
         # a plain function has called an async one, or a generator has yielded a call of one
         worker.core.code.drive(worker, result, when_done(worker))
         return
-    try:
-        if type(result) is CoroutineType:
-            raise refuse_coroutine(worker, result)
-        written = merge(worker, result)
-    except Exception as error:
-        worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
-        return
-    put_outputs(worker, written)
+    if worker.shape.single and worker.written is None and type(result) not in _OF_ITS_OWN_KIND:
+        put_value(worker, result)
+    else:
+        try:
+            if type(result) is CoroutineType:
+                raise refuse_coroutine(worker, result)
+            written = merge(worker, result)
+        except Exception as error:
+            worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
+            return
+        put_outputs(worker, written)
     if "processed" in worker.events:
         automatic(worker, "processed")
     finish_firing(worker, "done")
@@ -349,9 +381,7 @@ def write(worker: Worker, position: int, value: Any, activity: int | None, stamp
         )
     if value is None:
         return
-    if worker.written is None:
-        worker.written = [None] * len(worker.out_edges)
-    if worker.written[position] is not None:
+    if worker.written is not None and worker.written[position] is not None:
         raise UsageError(
             f'output "{path}" was written twice in one firing: it takes one token, merge the values or use an event'
         )
@@ -359,26 +389,22 @@ def write(worker: Worker, position: int, value: Any, activity: int | None, stamp
         activity = asked_for(activity, value.activity)
         stamp = value.stamp if stamp is None else stamp
         value = value.value
-    worker.written[position] = (value, activity, stamp)
+    worker.write(position, (value, activity, stamp))
 
 
 def finish_firing(worker: Worker, outcome: Any) -> None:
     """The automatic events follow (A9), then the firing is over and releases what it took (F5)."""
     core = worker.core
-    cancel_limit(worker)
-    flush_automatic(worker)
+    if worker.limit_timer is not None:
+        worker.in_time()
+    if worker.events_due is not None:
+        flush_automatic(worker)
     if core.trace is not None:
         if outcome == "done" and worker.blocked & DISABLED:
             outcome = "abandoned"  # disabled meanwhile, with a subgraph around it: its outputs went nowhere (F10)
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, outcome))
-    worker.busy = "over"
-    taken = worker.taken
-    worker.written = None
-    worker.tokens = []
-    if worker.outputs.missing:
-        worker.held = True
-    elif taken:
-        release(taken)
-    worker.right = False
-    worker.stamp = None
+    released = worker.end_firing()
+    if released:
+        release(released)
+    worker.leave()
     idle_again(worker)

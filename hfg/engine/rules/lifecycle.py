@@ -11,7 +11,7 @@ from typing import Any
 
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, ENDED, REMOVED, TORN_DOWN, Worker
 from hfg.engine.rules import wiring
-from hfg.engine.rules.agenda import block, consider, unblock
+from hfg.engine.rules.agenda import consider, unblock
 from hfg.engine.rules.modifiers import derive_scopes, discard
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import send_end, telling_behind
@@ -27,7 +27,6 @@ __all__ = [
     "discard_initial",
     "enable",
     "enable_around",
-    "not_ended",
     "nothing",
     "reset",
     "restart",
@@ -47,8 +46,7 @@ def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], Non
     """Do it when the node's firing or call under way is over, and let none begin meanwhile (F9, F10)."""
 
     def begin() -> None:
-        worker.busy = "setup"
-        worker.disturb()
+        worker.be_busy("setup")
         action(worker, over)
 
     def over() -> None:
@@ -58,10 +56,7 @@ def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], Non
     if not worker.busy and not worker.is_on_fast_path():
         begin()
         return
-    if worker.on_idle is None:
-        worker.on_idle = []
-        worker.core.upstairs.choose_step(worker)  # the short ways do not look whether somebody waits
-    worker.on_idle.append(begin)
+    worker.when_idle(begin)
 
 
 def _run_hook(worker: Worker, name: str, then: Then) -> None:
@@ -86,7 +81,7 @@ def set_up(worker: Worker, then: Then) -> None:
     if worker.node is None:
         then(None)
         return
-    worker.is_up = True  # from here on, for `teardown` follows a setup that fails half-way too
+    worker.be_up(True)  # from here on, for `teardown` follows a setup that fails half-way too
     try:
         worker.node._reset_states()
     except Exception as error:  # a default that cannot be copied, a factory that fails
@@ -103,8 +98,9 @@ def tear_down(worker: Worker, then: Then) -> None:
     if worker.node is None or not worker.is_up:
         then(None)
         return
-    worker.is_up = False
-    generator, worker.generator = worker.generator, None
+    worker.be_up(False)
+    generator = worker.generator
+    worker.keep_generator(None)
 
     def closed(_result: Any, error: BaseException | None) -> None:
         if error is not None:
@@ -123,11 +119,11 @@ def tear_down(worker: Worker, then: Then) -> None:
 
 def disable(worker: Worker) -> None:
     """F10: discard what lies on its edges, and let producers neither send to it nor wait for it."""
-    worker.own_enabled = False
+    worker.enable_itself(False)
     if worker.blocked & DISABLED:
         return
     core = worker.core
-    block(worker, DISABLED)
+    worker.block(DISABLED)
     if core.trace is not None:
         core.trace(NodeEnabled(core.now(), worker.path, False))
     _settle_disabled([worker])
@@ -138,13 +134,13 @@ def disable_around(workers: Iterable[Worker]) -> None:
     """A subgraph around them is disabled; their own flags stay (G2)."""
     newly = [worker for worker in workers if not worker.blocked & DISABLED]
     for worker in newly:
-        block(worker, DISABLED)
+        worker.block(DISABLED)
     _settle_disabled(newly)
 
 
 def enable_around(owner: Worker) -> None:
     """The subgraphs around the worker of one are enabled; it has nothing to set up."""
-    owner.blocked &= ~DISABLED
+    owner.allow(DISABLED)
     wiring.refresh(owner)
 
 
@@ -164,13 +160,13 @@ def _settle_disabled(workers: Sequence[Worker]) -> None:
             for edge in (*incoming, *outgoing):
                 discard(edge, "disabled")
             # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
-            worker.taken = ()
+            worker.release_early()
             release([edge for edge in incoming if type(edge) is not EventEdge])
             for edge in (edge for edge in outgoing if edge in untaken):
                 working = type(edge) is BufferEdge and edge.working
                 release((edge,))
                 if working:
-                    edge.working = True
+                    edge.go_on_working(True)
         for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
             if worker.pending_end and worker.busy in AMID_NOTHING:
                 send_end(worker)
@@ -190,7 +186,7 @@ def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> 
     In the back-off of a restart that sets it up, when it is over.
     """
     core = worker.core
-    itself, worker.own_enabled = not worker.own_enabled, True
+    itself = worker.enable_itself(True)
     if not worker.blocked & DISABLED or not all(scope.enabled for scope in worker.around):
         then()
         return
@@ -199,8 +195,8 @@ def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> 
         if not worker.own_enabled or not all(scope.enabled for scope in worker.around):
             then()  # disabled again meanwhile
             return
-        worker.blocked &= ~(DISABLED | ENDED)
-        not_ended(worker)
+        worker.allow(DISABLED | ENDED)
+        worker.not_ended()
         if itself and core.trace is not None:  # else the subgraph around it was, and that is told
             core.trace(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
@@ -236,22 +232,11 @@ def _afresh(worker: Worker, then: Callable[[], None]) -> None:
         tear_down(worker, down)
 
 
-def not_ended(worker: Worker) -> None:
-    """The node starts afresh: it has not ended, nor have the inputs that it must have, nor have its events."""
-    worker.pending_end = worker.given_up = False
-    worker.deferred = None
-    for edge in worker.in_edges:
-        edge.ended = edge.ended and not edge.mandatory  # who has said END to an optional input has said it (F4)
-    for edge in worker.event_edges():
-        if edge.renew is not None and edge.complete is None:
-            edge.renew()
-
-
 def reset(worker: Worker, then: Callable[[], None]) -> None:
     """The slot `reset`: teardown, setup, not ended; tokens and A(v) stay (A9)."""
 
     def up() -> None:
-        not_ended(worker)
+        worker.not_ended()
         unblock(worker, ENDED)
         wiring.refresh(worker)
         judge_sources(worker.core)
@@ -271,7 +256,7 @@ def restart(worker: Worker, backoff_s: float) -> None:
         tear_down(worker, lambda _error: then())
 
     def rested() -> None:
-        worker.backoff_timer = None
+        worker.time_backoff(None)
         when_idle(worker, up, nothing)
 
     def up(worker: Worker, then: Callable[[], None]) -> None:
@@ -284,10 +269,10 @@ def restart(worker: Worker, backoff_s: float) -> None:
         if error is not None:
             core.host.finish("failed", error)
         elif not worker.blocked & TORN_DOWN:
-            worker.blocked &= ~BACKOFF  # before those that wait have their turn: they may enable or reset it
+            worker.allow(BACKOFF)  # before those that wait have their turn: they may enable or reset it
             then()
 
     def rest() -> None:
-        worker.backoff_timer = core.after(backoff_s, rested)
+        worker.time_backoff(core.after(backoff_s, rested))
 
     when_idle(worker, down, rest)

@@ -12,7 +12,7 @@ from hfg.activity.rules import after_receipt
 from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import REMOVED, Worker
-from hfg.engine.rules.agenda import freed, remove_call, unplace
+from hfg.engine.rules.agenda import freed
 from hfg.engine.rules.listening import may_listen
 from hfg.ports.edges import Edge, EventEdge
 from hfg.token import Token
@@ -44,8 +44,7 @@ def set_active(worker: Worker, active: bool, cause: Any) -> None:
     """A(v) := active, and everything that follows a change."""
     if worker.active == active:
         return
-    worker.active = active
-    worker.disturb()
+    worker.become(active)
     if active and worker.listened is not None:
         may_listen(worker)
     core = worker.core
@@ -79,9 +78,7 @@ def derive_scopes(core: Core) -> None:
 def automatic(worker: Worker, name: str, value: Any = None) -> None:
     """An automatic event has arisen; it leaves after the firing or call under way, or at the next flush."""
     if name in worker.events:
-        if worker.events_due is None:
-            worker.events_due = []
-        worker.events_due.append((name, value))
+        worker.expect_event(name, value)
 
 
 def discard(edge: Any, reason: Any) -> None:
@@ -94,10 +91,10 @@ def discard(edge: Any, reason: Any) -> None:
         drop(edge, token, reason)
     if edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge):
         for _ in tokens:
-            remove_call(target, edge)
+            target.forget_call(edge)
     elif edge in target.live_inputs:
-        target.inputs.missing += 1
-        unplace(target)
+        target.inputs.expect()
+        target.unplace()
     if type(edge) is EventEdge:
         freed(edge)
 
@@ -112,7 +109,7 @@ def drop(edge: Edge, token: Token[Any], reason: Any) -> None:
 
 def count_dropped(edge: Edge, token: Token[Any], reason: Any) -> None:
     """Count a token that goes nowhere; what becomes of its activity is the caller's affair."""
-    edge.dropped += 1
+    edge.count_dropped()
     core: Core = edge.target.core
     if core.trace is not None:
         core.trace(TokenDropped(core.now(), edge.label, token, reason))

@@ -22,7 +22,7 @@ from hfg.engine.model.worker import (
     UNWIRED,
     Worker,
 )
-from hfg.engine.rules.agenda import block, freed, must_wait
+from hfg.engine.rules.agenda import freed, must_wait
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.modifiers import derive_scopes, receive
 from hfg.engine.rules.sending import enqueue, put_outputs
@@ -70,8 +70,7 @@ def grow(core: Core) -> bool:
             ),
         )
         return True
-    edge.capacity += 1
-    edge.grown += 1
+    edge.grow()
     if core.trace is not None:
         core.trace(QueueGrown(core.now(), edge.label, edge.capacity))
     freed(edge)
@@ -105,7 +104,7 @@ def complete_operators(core: Core) -> bool:
 
 def complete_edge(edge: EventEdge) -> bool:
     """Complete the operators of one edge; whether anything came out."""
-    complete, edge.complete = edge.complete, None
+    complete = edge.take_complete()
     if complete is None:
         return False
     before = edge.sent
@@ -131,10 +130,10 @@ def end_events(core: Core) -> bool:
     feeds = [feed for feed in core.feeds if not feed.blocked & ENDED and not feed.outputs.missing]
     now = core.now()
     for edge in edges:
-        edge.end_sent = True
+        edge.say_end()
         enqueue(edge, END, 0, now)
     for feed in feeds:
-        feed.blocked |= ENDED
+        feed.block(ENDED)
         put_outputs(feed, [(END, None, None)])
     return bool(edges or feeds)
 
@@ -158,15 +157,10 @@ def give_up(core: Core) -> bool:
         if source.blocked & FUTILE and not source.blocked & ENDED and any(edge.untaken for edge in _joined(source))
     ]
     for source in given_up:
-        block(source, ENDED)
-        source.given_up = True
-        source.deferred = []
-        for edge in source.in_edges:
-            core.upstairs.choose_step(edge.source)
+        source.end(given_up=True)
     for source in given_up:
         drain_left([edge for edge in _joined(source) if edge.untaken])  # what it works on is its firing's affair
-        modifiers, source.deferred = source.deferred, None
-        for modifier in modifiers or ():  # there is no END of its own for which they would wait
+        for modifier in source.take_deferred():  # there is no END of its own for which they would wait
             receive(source, (modifier,))
     derive_scopes(core)
     return bool(given_up)

@@ -11,7 +11,7 @@ from typing import Any
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules.agenda import consider, freed
 from hfg.engine.rules.sending import send_end
-from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
+from hfg.ports.edges import EventEdge
 from hfg.token import Token
 from hfg.trace import TokenProcessed, TokenTaken
 
@@ -30,29 +30,21 @@ def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
     stack: list[Any] = list(reversed(edges))
     while stack:
         edge = stack.pop()
-        if type(edge) is BufferEdge:
-            edge.working = False
-            if edge.crowded:
-                continue
-        if not edge.held:
+        if not edge.release():
             continue
-        edge.held = False
         producer: Worker = edge.waits
         core = producer.core
         if core.trace is not None and edge not in drained:
             core.trace(TokenProcessed(core.now(), edge.label))
-        outputs = producer.outputs
-        outputs.missing -= 1
-        if not outputs.missing:
-            stack.extend(reversed(outputs_free(producer)))
+        if producer.outputs.arrive():
+            freed_by_that = outputs_free(producer)
+            if freed_by_that:
+                stack.extend(reversed(freed_by_that))
 
 
 def outputs_free(worker: Worker) -> Sequence[Any]:
     """All its tokens are processed: it may go on; gives back the edges that are released by that (F5 sequential)."""
-    released: Sequence[Any] = ()
-    if worker.held:
-        worker.held = False
-        released = worker.taken
+    released = worker.outputs_free()
     if worker.outputs.waiters is not None:
         worker.outputs.notify()
     if worker.pending_end and worker.busy in ("", "edit"):
@@ -65,15 +57,10 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
 def take_from_reader(worker: Worker) -> Token[Any]:
     """Take the token that lies before a reader; its place is free at once."""
     edge = worker.live_inputs[0]
-    token: Token[Any]
-    if isinstance(edge, SyncEdge):
-        token = edge.token  # type: ignore[assignment]  # the caller has seen that one lies there
-        edge.token = None
-    else:
-        token = edge.queue.popleft()
+    token: Token[Any] = edge.take()
     if not edge.untaken:
-        worker.inputs.missing += 1
-    worker.placed = False
+        worker.inputs.expect()
+    worker.lose_place()
     core = worker.core
     if core.trace is not None:
         core.trace(TokenTaken(core.now(), edge.label, token))

@@ -12,15 +12,25 @@ from typing import Any
 from hfg.activity.rules import asked_for, leaving
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import AMID_NOTHING, ENDED, RunningEvent, Worker
-from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full, remove_call, unplace
+from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full
 from hfg.engine.rules.listening import listens, may_listen
 from hfg.engine.rules.modifiers import count_dropped, derive_scopes, drop, give_back, receive, set_active, touch
-from hfg.errors import EngineInternalError, QueueOverflow
+from hfg.errors import QueueOverflow
 from hfg.ports.edges import Edge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, TokenSent
 
-__all__ = ["enqueue", "flush_automatic", "put", "put_outputs", "send_end", "tell", "telling_behind", "trigger"]
+__all__ = [
+    "enqueue",
+    "flush_automatic",
+    "put",
+    "put_outputs",
+    "put_value",
+    "send_end",
+    "tell",
+    "telling_behind",
+    "trigger",
+]
 
 
 Written = Sequence[tuple[Any, int | None, float | None] | None] | None
@@ -38,6 +48,28 @@ def put_outputs(worker: Worker, written: Written) -> None:
     _put_outputs(worker, written)
     let_follow(core, since)
     _sent(core)
+
+
+def put_value(worker: Worker, value: Any) -> None:
+    """The same for a value without modifier and stamp of its own on the one output of a worker (`Shape.single`)."""
+    shape, core = worker.shape, worker.core
+    if worker.listeners or (shape.gives and (worker.active or worker.right)):
+        put_outputs(worker, [(value, None, None)] if value is not None else None)
+        return
+    since = len(core.followers)
+    stamp = worker.stamp
+    if stamp is None:
+        stamp = core.now()
+    if value is None:
+        value = NO_MESSAGE
+    for edge in shape.outgoing:
+        put(edge, value, 0, stamp)
+    if worker.outputs.missing and (worker.placed or worker.rate_timer is not None):
+        worker.unplace()
+    if len(core.followers) > since:
+        let_follow(core, since)
+    if core.returned or core.drained or core.dirty_scopes:
+        _sent(core)
 
 
 def _put_outputs(worker: Worker, written: Written) -> None:
@@ -68,8 +100,8 @@ def _put_outputs(worker: Worker, written: Written) -> None:
         put(edge, value, modifier, own_stamp)
     for edge, value, modifier, own_stamp in for_inputs:
         put(edge, value, modifier, own_stamp)
-    if worker.outputs.missing:
-        unplace(worker)
+    if worker.outputs.missing and (worker.placed or worker.rate_timer is not None):
+        worker.unplace()
     if carried:
         _activity_left(worker)
 
@@ -82,17 +114,17 @@ def _activity_left(worker: Worker) -> None:
     if not worker.active:
         return  # what it gave was none of its own (A4), or left before (A3)
     if worker.scope is not None:  # by its events it leaves everything inside (G2)
-        worker.active = worker.node._active = False
+        worker.become(False)
+        worker.node._active = False
         worker.core.upstairs.deactivate_inside(worker.scope, "sent")
     else:
-        worker.right = worker.stamp is not None  # in a firing or call
+        worker.keep_right(worker.stamp is not None)  # in a firing or call
         set_active(worker, False, "sent")
 
 
 def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
     """Put one token on a synchronous edge."""
-    edge.sent = number = edge.sent + 1
-    token = Token(value, modifier, stamp, number)
+    token = Token(value, modifier, stamp, edge.number())
     target: Worker = edge.target
     core = target.core
     if core.trace is not None:
@@ -105,34 +137,25 @@ def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
             return
         if modifier > 0 and target.listened is not None:
             may_listen(target)
-        edge.token = token
-        edge.held = True
-        edge.waits.outputs.missing += 1
+        edge.put(token)
+        edge.waits.outputs.expect()
         add_call(target, edge)
     elif target.blocked & ENDED:
         _drain(edge, token)
         return
     elif type(edge) is SyncEdge:
-        if edge.token is not None or edge.held:
-            raise EngineInternalError(f'a second token on synchronous edge "{edge.label}"')
-        edge.token = token
-        edge.held = True
-        edge.waits.outputs.missing += 1
+        edge.put(token)
+        edge.waits.outputs.expect()
         if type(value) is Marker:
-            target.special = True
+            target.mark_special()
         arrived(edge)
     else:
-        if edge.held:
-            raise EngineInternalError(f'one token too many on synchronous edge "{edge.label}"')
-        edge.queue.append(token)
-        edge.deepest = max(edge.deepest, len(edge.queue))
-        if edge.crowded:
-            edge.held = True
-            edge.waits.outputs.missing += 1
+        if edge.put(token):
+            edge.waits.outputs.expect()
         elif core.trace is not None:
             core.trace(TokenProcessed(core.now(), edge.label))
         if type(value) is Marker:
-            target.special = True
+            target.mark_special()
         if len(edge.queue) == 1:
             arrived(edge)
     if modifier > 0 and target.scopes:
@@ -145,12 +168,12 @@ def _drain(edge: Edge, token: Token[Any]) -> None:
     core = target.core
     into_slot = edge.target_kind == "slot"
     if not into_slot:
-        edge.drained += 1
+        edge.count_drained()
     if core.trace is not None:
         core.trace(TokenDrained(core.now(), edge.label, token))
     if token.activity:
         if target.deferred is not None and not into_slot:
-            target.deferred.append(token.activity)
+            target.defer(token.activity)
             if target.scopes:
                 touch(core, target.scopes)
         else:
@@ -178,20 +201,18 @@ def _sent(core: Core) -> None:
 def send_end(worker: Worker) -> None:
     """END leaves on all outputs; from here the node, which is amid nothing, is over (F4, F12)."""
     core = worker.core
-    worker.pending_end = False
     end = (END, None, None)
     with telling_behind(core):
-        worker.stamp = worker.end_stamp
+        worker.send_end_now()
         since = len(core.followers)
         _put_outputs(worker, [end] * len(worker.out_edges))
         let_follow(core, since)
-        worker.stamp = None
-        worker.right = False  # no firing or call goes on that could use it: the next slot call must not (A3)
+        worker.leave()  # no firing or call goes on that could use it: the next slot call must not (A3)
         _sent(core)
         if core.trace is not None:
             core.trace(NodeEnded(core.now(), worker.path))
-        deferred, worker.deferred = worker.deferred, None
-        for modifier in deferred or ():
+        deferred = worker.take_deferred()
+        for modifier in deferred:
             receive(worker, (modifier,))
         if deferred and worker.scopes:
             touch(core, worker.scopes)
@@ -293,8 +314,7 @@ def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
 
 def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
     """Put one token into the queue of an event edge, by its policy (P5, F8)."""
-    edge.sent = number = edge.sent + 1
-    token = Token(value, modifier, stamp, number)
+    token = Token(value, modifier, stamp, edge.number())
     target: Worker = edge.target
     core = target.core
     if core.trace is not None:
@@ -319,18 +339,17 @@ def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
         if edge.overflow == "drop_newest":
             drop(edge, token, "overflow")
             return
-        drop(edge, edge.queue.popleft(), "overflow")
+        drop(edge, edge.take(), "overflow")
         if not into_input:
-            remove_call(target, edge)
+            target.forget_call(edge)
         elif not edge.queue:  # for the input nothing has changed: it still holds a token
-            edge.queue.append(token)
+            edge.lay(token)
             return
-    edge.queue.append(token)
-    edge.deepest = max(edge.deepest, len(edge.queue))
+    edge.lay(token)
     note_full(edge)
     if into_input:
         if type(value) is Marker:
-            target.special = True
+            target.mark_special()
         if len(edge.queue) == 1:
             arrived(edge)
     else:
@@ -369,8 +388,7 @@ def telling_behind(core: Core) -> Iterator[None]:
 def flush_automatic(worker: Worker) -> None:
     """A9: the automatic events follow as sendings of their own, in the order they arose (D3)."""
     while worker.events_due:
-        due, worker.events_due = worker.events_due, None
-        for name, value in due:
+        for name, value in worker.take_events():
             event = worker.events.get(name)
             if event is not None:
                 trigger(event, value, stamp=worker.core.now(), extend_right=False)  # T5: automatic signals: now

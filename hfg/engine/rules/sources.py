@@ -11,7 +11,7 @@ from typing import Any
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import DISABLED, ENDED, FUTILE, RESTING, Worker
-from hfg.engine.rules.agenda import block, unblock
+from hfg.engine.rules.agenda import unblock
 from hfg.ports.edges import EventEdge
 
 __all__ = ["joins", "judge_sources"]
@@ -26,7 +26,7 @@ def judge_sources(core: Core) -> None:
     for source in core.sources:
         if core.futile and source in left:
             if not source.blocked & FUTILE:
-                block(source, FUTILE)
+                source.block(FUTILE)
         else:
             unblock(source, FUTILE)
 

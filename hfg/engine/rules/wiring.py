@@ -10,7 +10,7 @@ from typing import Any
 
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import DISABLED, UNWIRED, Worker
-from hfg.engine.rules.agenda import block, consider, note_full, unplace
+from hfg.engine.rules.agenda import consider, note_full
 from hfg.engine.rules.listening import find_listeners
 from hfg.ports.edges import EventEdge
 
@@ -31,10 +31,10 @@ def refresh(worker: Worker) -> None:
     """Derive anew what is live around a worker: it and its neighbours."""
     touched = {worker.index: worker}
     for edge in worker.edges_in():
-        edge.live = is_live(edge)
+        edge.enliven(is_live(edge))
         touched[edge.source.index] = edge.source
     for edge in worker.all_out_edges():
-        edge.live = is_live(edge)
+        edge.enliven(is_live(edge))
         touched[edge.target.index] = edge.target
     for edge in (*worker.edges_in(), *worker.event_edges()):
         if type(edge) is EventEdge:
@@ -49,7 +49,7 @@ def refresh_via(scope: Scope) -> None:
         return
     for edge in scope.worker.core.edges:
         if scope in edge.via:
-            edge.live = is_live(edge)
+            edge.enliven(is_live(edge))
             if type(edge) is EventEdge:
                 note_full(edge)
             rewire(edge.source)
@@ -58,8 +58,6 @@ def refresh_via(scope: Scope) -> None:
 
 def rewire(worker: Worker) -> None:
     """Derive what a worker waits for and sends on from the liveness of its edges; its step is chosen anew."""
-    worker.out_edges = tuple(tuple(edge for edge in edges if edge.live) for edges in worker.wired_out)
-    find_listeners(worker)
     live = []
     for edge in worker.in_edges:
         if edge.ended and not edge.untaken:
@@ -71,9 +69,8 @@ def rewire(worker: Worker) -> None:
                 live.append(edge)
         elif edge.live:
             live.append(edge)
-    worker.live_inputs = tuple(live)
-    missing = sum(1 for edge in live if not edge.untaken)
-    worker.inputs.missing = missing
+    worker.rewire(tuple(live))
+    find_listeners(worker)
     fed = {edge.port_name for edge in live if edge.target_kind == "input"}
     ended = {edge.port_name for edge in worker.in_edges if edge.ended}
     wired = worker.process is not None and all(name in fed or name in ended for name in worker.mandatory_ports)
@@ -82,11 +79,9 @@ def rewire(worker: Worker) -> None:
     if worker.process is None and not worker.is_boundary_output:
         wired = False
     if wired or worker.is_boundary_output:
-        worker.blocked &= ~UNWIRED
+        worker.allow(UNWIRED)
     else:
-        block(worker, UNWIRED)
-    if missing:
-        unplace(worker)
-    worker.core.upstairs.choose_step(worker)
+        worker.block(UNWIRED)
+    worker.changed()
     if worker.core.started:
         consider(worker)
