@@ -250,3 +250,31 @@ def test_the_walk_sees_every_way_to_import(tmp_path: Path, line: str, sentence: 
     file = tmp_path / "structure.py"
     file.write_text(line, encoding="utf-8")
     assert sentence in "".join(violations("hfg.graph.graph", file))
+
+
+def fields_of(module: str, name: str) -> set[str]:
+    """Give what a class says in `__slots__` that it keeps."""
+    for one in ast.walk(ast.parse(HFG[module].read_text(encoding="utf-8"))):
+        if isinstance(one, ast.ClassDef) and one.name == name:
+            slots = next(part for part in one.body if isinstance(part, ast.Assign) and "__slots__" in ast.unparse(part))
+            return set(ast.literal_eval(slots.value))
+    raise AssertionError(f"{module} has no class {name}")
+
+
+WORKERS_FIELDS = fields_of("hfg.engine.model.worker", "Worker") - {"path", "index"}
+"""(Many things have a path or an index.)"""
+EDGES_FIELDS = {"token", "held", "sent", "dropped", "drained", "ended", "live", "working", "deepest", "full", "grown"}
+
+
+@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.engine.rules")])
+def test_the_rules_change_nodes_and_edges_by_the_names_of_their_transitions(module: str) -> None:
+    """A field that many modules write is kept in order by none; only listeners count for the edges they stand for."""
+    if module == "hfg.engine.rules.listening":
+        return
+    for one in ast.walk(ast.parse(HFG[module].read_text(encoding="utf-8"))):
+        if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del):
+            is_own = isinstance(one.value, ast.Name) and one.value.id in ("self", "core")
+            foreign = one.attr in WORKERS_FIELDS | EDGES_FIELDS | {"missing"}
+            assert is_own or not foreign, (
+                f"{module}:{one.lineno} writes {ast.unparse(one)}: give its class a transition"
+            )

@@ -410,7 +410,7 @@ class Worker:
         """The same, and no timer that would give a place."""
         self.placed = False
         if self.rate_timer is not None:
-            self.rate_over()
+            self.forget_rate()
 
     # --- what keeps it from moving (F1) ------------------------------------------------------------------------------
 
@@ -436,11 +436,14 @@ class Worker:
         self.rate_timer = self.core.host.call_at(when, over)
 
     def rate_over(self) -> None:
-        """The rate holds it no more: its time has come, or what it would have let start is gone."""
-        timer, self.rate_timer = self.rate_timer, None
+        """The time has come for which a rate held it."""
+        self.rate_timer = None
         self.blocked &= ~RATE
-        if timer is not None:
-            timer.cancel()
+
+    def forget_rate(self) -> None:
+        """What the rate would have let start is gone."""
+        self.rate_timer.cancel()
+        self.rate_over()
 
     def note_start(self, rate_hz: float) -> None:
         """F11: a firing starts now; the next one may in the next period of the grid that the first one began.

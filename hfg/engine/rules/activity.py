@@ -85,7 +85,7 @@ def gate_changed(gates: Any) -> None:
 def rest(worker: Worker) -> None:
     """Let a source rest, or go on, as its gates say now."""
     if worker.rate_timer is not None:
-        worker.rate_over()
+        worker.forget_rate()
     if any(gate.idle_rate_hz is None and not gate.state.active for gate in worker.gates_over):
         if not worker.blocked & RESTING:
             worker.block(RESTING)
