@@ -26,7 +26,7 @@ from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import ending, errors, firing
-from hfg.engine.rules.agenda import consider, freed, idle_again, let_follow, note_start, queue, unplace
+from hfg.engine.rules.agenda import consider, freed, idle_again, let_follow
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import put
 from hfg.errors import EndOfStream
@@ -144,7 +144,7 @@ class ThreadRegion(Region):
             elif not edge.sequential:
                 release((edge,))
         if head.paced:
-            note_start(head, head.options.max_rate_hz)
+            head.note_start(head.options.max_rate_hz)
         self._wave = (self._measured if self._measuring else None) or self._plain
         self.flags.clear()
         self.running = True
@@ -174,7 +174,7 @@ class ThreadRegion(Region):
                 put(edge, NO_MESSAGE if value is None else value, 0, stamp)
         let_follow(core, since)
         if self.head.outputs.missing:
-            unplace(self.head)
+            self.head.unplace()
 
     def _back(self, outcome: int | _Left, error: BaseException | None) -> None:
         """The wave is over, or has ended behind one of its calls; on the loop."""
@@ -214,14 +214,14 @@ class ThreadRegion(Region):
         self.running = False
         self.waves += done
         if head.outputs.missing:
-            unplace(head)
+            head.unplace()
             head.held = True
             head.taken = self.held_entries
         elif self.held_entries:
             if not self.flags:  # those behind it free its outputs, and by that it lets go of what it took
                 head.busy = ""
                 if head.placed:
-                    queue(head)
+                    head.enqueue()
                 else:
                     consider(head)
             release(self.held_entries)
@@ -253,7 +253,7 @@ class ThreadRegion(Region):
         head.busy = ""
         worker = self.materialise(k, left.found)
         if head.outputs.missing:
-            unplace(head)
+            head.unplace()
         if error is None:
             firing.complete_firing(worker, left.result)
         elif worker.is_source and isinstance(error, StopIteration | EndOfStream):

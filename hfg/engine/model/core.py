@@ -270,14 +270,14 @@ class Core:
         """Somebody is about to read how often nodes have fired: fused regions count by waves."""
         for region in self.regions:
             region.settle_counts()
+        for listeners in self.listeners:
+            listeners.settle_counts()
 
     def settle_barriers(self) -> None:
         """Somebody is about to read what nodes wait for: in fused regions the head's barrier stands for all."""
         for region in self.regions:
             if not region.running:
                 region.disarm()
-        for listeners in self.listeners:
-            listeners.settle_counts()
 
     def check_invariants(self) -> None:
         """Between two steps of the run certain things hold of all of it: nodes, edges, regions, and between them.
