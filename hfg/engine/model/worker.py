@@ -36,6 +36,7 @@ __all__ = [
     "UNREADY",
     "UNWIRED",
     "RunningEvent",
+    "Shape",
     "Worker",
 ]
 
