@@ -312,6 +312,8 @@ class Writer:
         say = self.say
         if self.is_source:
             say("stamp = monotonic() + epoch" if self.real else "stamp = now()")
+            if self.loops:  # the slice is over: the pump is to look round, not to come back at once
+                say("if stamp > until and done: flags.append('slice'); break")
             self._call(0, "next(generator)" if self.is_generator else "f0()")
             return
         for number, edge in enumerate(self.entries):
@@ -492,9 +494,7 @@ class Writer:
         if not self.loops:
             return
         stop = ["queue", "ready", "flags", "worker.blocked"]
-        if self.is_source:
-            stop.insert(0, "stamp > until")
-        else:
+        if not self.is_source:
             stop += ["inputs.missing", "worker.special", "entry0.queue[0].activity", "now() > core.until"]
         if self.has_border:
             stop.append("outputs.missing")
