@@ -5,13 +5,14 @@ A failure prints the smallest graph found, as a program. `test_soak.py` does the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 
 import hfg
+from hfg.engine.runtime import settings as run_settings
 from hfg.testing import Divergence, ReferenceReport, graphs, recorder, reference_run, replay, schedules
 from hfg.testing.invariants import broken, of_graph
 from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
@@ -166,3 +167,23 @@ def test_grouping_and_dissolving_change_nothing(seed: int) -> None:
         inside = f"{paths[edge.source[0]]}.{edge.source[2]} -> {paths[edge.target[0]]}.{edge.target[2]}"
         outside = f"{edge.source[0]}.{edge.source[2]} -> {edge.target[0]}.{edge.target[2]}"
         assert boxed.values(inside) == flat.values(outside), f"{outside}\n{plan}"
+
+
+SEEN_TO_FAIL = (201805, 202779, 204777, 209093)  # a place or a following that a fused wave or a lost call left behind
+
+
+@pytest.mark.rule("F1", "F5", "R2")
+@pytest.mark.parametrize("seeds", [SEEN_TO_FAIL, *(range(25 * block, 25 * block + 25) for block in range(8))])
+def test_what_is_fused_from_the_first_firing_on_leaves_all_in_order(
+    seeds: Sequence[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody listens, for nothing is fused then: the invariants that are asked for after every step are the test."""
+    monkeypatch.setattr(run_settings, "FUSE_AFTER", 0)
+    for seed in seeds:
+        plan = random_plan(seed, EVERYTHING)
+        if reference(plan, seed) is None:
+            continue
+        try:
+            hfg.run(plan.build(), clock="virtual")
+        except hfg.errors.RunError:
+            continue

@@ -215,6 +215,8 @@ class Region:
         head, core = self.head, self.core
         if core.followers:
             self._let_follow(self.schedule.followers)
+        if head.placed and (head.outputs.missing or head.inputs.missing):
+            head.unplace()  # what came in while the wave ran gave it a place; F1 does not hold behind the wave
         if head.outputs.missing:
             head.held = True
             head.taken = self.held_entries

@@ -46,6 +46,8 @@ def step(worker: Worker) -> None:
             _ask_ready(worker)
     elif calls and not worker.blocked & CALLS_BLOCKED:
         call(worker)
+    else:
+        worker.follow_no_more()  # what it stood there for was taken from it meanwhile (F10, R4)
 
 
 def _ask_ready(worker: Worker) -> None:
