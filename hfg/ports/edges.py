@@ -35,7 +35,7 @@ class Edge:
       while_active: the slot it leads into listens only while its node is active (T4).
       ended: the consumer has taken END from it and waits for it no more (F4).
       handler: of the slot it leads into, taking the value, where that is all there is to a call; None:
-        the general way.
+        the interpreted way.
       waits: at whose output barrier an unprocessed token of it counts: the source, or the head of the region of the
         source; of no meaning for event edges.
       tap: sees every token that is put on it; None: nobody looks.

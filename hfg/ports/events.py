@@ -31,9 +31,9 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
 
     kind: ClassVar[Kind] = "event"
 
-    # Subscribers in order of subscription; None if nobody ever looked, which is all that a short way asks.
+    # Subscribers in order of subscription; None if nobody ever looked, which is all that a fast path asks.
     _observers: list[abc.ObserverBase[Token[T]]] | None = None
-    _look: Callable[[], None] | None = None  # tells the short way that somebody observes now
+    _look: Callable[[], None] | None = None  # tells the fast path that somebody observes now
     _inner: InnerTarget[T] | None = None
 
     def __init__(self, node: Owner, name: str, type: Any = None) -> None:  # noqa: A002

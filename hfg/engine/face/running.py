@@ -145,7 +145,7 @@ def run(
       begin: called with the run on its loop, before its nodes are set up: the place for `run.tap` and `run.trace`.
       allow_idle: a quiet graph does not end; it waits for subscribers, `stop` or Ctrl-C.
       block_warning_s: after how long a firing on the loop group is warned about; 0 for never.
-      fast: take short ways for common shapes; outcomes do not differ.
+      fast: fuse plain nodes and take fast paths; outcomes do not differ.
 
     Returns:
       How it went; `outcome` is "done", "stopped" or "until".

@@ -158,7 +158,7 @@ def _call_taken(worker: Worker, edge: EventEdge | SyncEdge) -> None:
 
 
 def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None]:
-    """What a port's `trigger` does: the short way for one plain edge into a slot that nobody watches.
+    """What a port's `trigger` does: the fast path for one plain edge into a slot that nobody watches.
 
     Else `sending.trigger`.
     """

@@ -237,7 +237,7 @@ class Core:
         self.pumping = False
         self.futile = False  # the sources left feed only ended nodes (R5)
         self.current: Worker | None = None
-        self.speaker: Worker | None = None  # whose short step runs: what it triggers may take a short way too
+        self.speaker: Worker | None = None  # whose code a fast path runs: what it triggers may take one too
         self.started = False
         self.over = False
         self.holding: Any = None  # what holds nodes for an edit (R4)

@@ -305,7 +305,7 @@ class Worker:
         self.region: Region | None = None  # in which its firings are fused
         self.speaks = False  # its code sends by itself: the region says so before each call
         self.unfit = False  # its firings turned out not to be plain calls
-        self.observed = False  # somebody waits at its barriers: no short ways
+        self.observed = False  # somebody waits at its barriers: no fast paths
         self.watched = False  # activity changes have consequences beyond the flag
         self.is_source = False
         self.is_async = False
@@ -705,7 +705,7 @@ class Worker:
         self.deferred = []
         self.given_up = self.given_up or given_up
         for edge in self.in_edges:
-            edge.source.changed()  # whose short ways do not look whether what they send is drained
+            edge.source.changed()  # whose fast paths do not look whether what they send is drained
 
     def promise_end(self, stamp: float | None) -> None:
         """END follows as soon as the outputs are free; with this stamp (T5)."""

@@ -250,7 +250,7 @@ class Measuring:
             dropped=edge.dropped,
             drained=edge.drained,
             untaken=edge.untaken,
-            deepest=max(edge.deepest, int(edge.sent > edge.dropped + edge.drained)),  # short ways count from two on
+            deepest=max(edge.deepest, int(edge.sent > edge.dropped + edge.drained)),  # fast paths count from two on
             capacity=getattr(edge, "capacity", None),
             grown=getattr(edge, "grown", 0),
         )

@@ -217,7 +217,7 @@ class Taps:
         looks = tuple(self._looks.get(event, ()))
         event.tap = looks if looks or any(edge.tap is not None for edge in event.edges) else None
         if event.tap is not None and event.port is not None and event.port._observers is None:
-            event.port._observe([])  # the short way of `trigger` asks for no more
+            event.port._observe([])  # the fast path of `trigger` asks for no more
 
     # --- finding ----------------------------------------------------------------------------------------------------
 

@@ -1,6 +1,6 @@
 """What a node does next: a firing (rules F1-F4, F9, F11, P6, P8, A6, A11, T5).
 
-The general way; `steps` has shorter ones for the common shapes, which fall back to this one. Stands on `ending` and
+The interpreted way; the wing `fusion` shortens it for plain shapes, and falls back to it. Stands on `ending` and
 `calls`; a node's code is run by the host.
 """
 

@@ -443,7 +443,7 @@ def watch_scope(scope: Scope) -> None:
         member.scopes += (scope,)
         watch(member)
         if member.core.started:
-            rewire(member)  # no short ways
+            rewire(member)  # no fast paths
 
 
 def watch(worker: Worker) -> None:

@@ -52,7 +52,7 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     if relayed:
         host.adopt_event(port)
         return event
-    port.__dict__.pop("trigger", None)  # the short way, if it had one where it ran before (R4)
+    port.__dict__.pop("trigger", None)  # the fast path, if it had one where it ran before (R4)
     if worker.group.threaded:
         port._emit = partial(_from_thread, worker, event)
     elif worker.core.debug:
