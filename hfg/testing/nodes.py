@@ -160,9 +160,11 @@ async def calm(value: int) -> int:
 
 @hfg.node
 async def restless(value: int) -> int:
-    """Wait now and then."""
+    """Wait now and then, or only let others have a turn."""
     if value % 3 == 0:
         await asyncio.sleep(0.003)
+    elif value % 3 == 1:
+        await asyncio.sleep(0)
     return value
 
 

@@ -12,6 +12,9 @@ run queues; outside of one the members look as the rules leave them. What keeps 
 - **side exit**: when a call brings what is not plain (an error, a token, code that waits) or a flag is up, the wave
   ends behind that call: what the locals hold is put on the edges, who is enabled by it in front of the run queue, and
   the firing under way is finished as any other.
+- **give way**: async code that only lets others have a turn (`sleep(0)`) goes on within its wave. Until the wave is
+  over all members are busy, as in a thread: who wants one of them waits, and calls the wave off behind its present
+  call.
 - **dissolve**: whenever wiring or somebody's interest changes, `specialise` is asked, and the region is gone.
 
 Counts follow from the number of waves; who reads them has them settled first. Stands on `schedule` and `writing`.
@@ -61,6 +64,8 @@ class Region:
       step: what the head's step is while the region lasts.
       armed: everything inside rests, or a wave runs.
       running: a wave is under way.
+      amid: "", or "firing" while the wave under way has given way to others and all members are busy.
+      called_off: the wave that has given way ends behind its present call; the flags are cleared meanwhile.
       flags: not empty: the wave under way ends behind its present call.
     """
 
@@ -78,7 +83,10 @@ class Region:
         self.armed = False
         self.running = False
         self.doomed = False
-        self.detached: Any = None  # the wave whose call waits, and goes on as a firing like any other
+        self.amid = ""
+        self.called_off = False
+        self.detached = False  # the call under way waits, and goes on as a firing like any other
+        self._coroutine: Any = None  # of the wave that has waited
         self._after: Callable[[Any, BaseException | None], None] | None = None
         self._lender = next((worker for worker in order if worker.is_async), None)
         self._put_off = self._patience = 0  # waves before one asks again whether it may be armed
@@ -147,7 +155,7 @@ class Region:
 
     def disarm(self) -> None:
         """The interpreted way goes on: write down what finished waves still wait for, where that way looks for it."""
-        if self.armed:
+        if self.armed and not self.running:
             self.armed = False
             self.settle_counts()
             self._write_barriers(len(self.order))
@@ -155,24 +163,36 @@ class Region:
     def disturb(self, worker: Worker) -> None:
         """A member does not rest any more; of the head only its next wave asks."""
         if self.running:
-            self.flags.append("disturbed")
+            self._call_off("disturbed")
         elif worker is not self.head:
             self.disarm()
 
     def interrupt(self) -> None:
         """The run is paused, or over: let the wave under way end behind its present call."""
         if self.running:
-            self.flags.append("interrupted")
+            self._call_off("interrupted")
+
+    def _call_off(self, why: str) -> None:
+        """Let the wave under way end behind its present call."""
+        if self.amid:
+            self.called_off = True
+        else:
+            self.flags.append(why)
 
     def abandon(self) -> Worker:
-        """A wave on the loop always comes back."""
-        return self.head
+        """The wave that has given way does not come back: whose call it is in; those before it have fired."""
+        if not self.amid:
+            return self.head  # a wave on the loop always comes back
+        k, found = self._place()
+        self._rest()
+        self.detached = True
+        return self.materialise(k, found)
 
     def dissolve(self) -> None:
         """Its members are nodes like any others from here on; from within a wave, from its end on."""
         if self.running:
             self.doomed = True
-            self.flags.append("dissolved")
+            self._call_off("dissolved")
             return
         self.disarm()
         if self in self.core.regions:
@@ -213,6 +233,11 @@ class Region:
         self.running = False
         self.waves += done
         head, core = self.head, self.core
+        if self.amid and core.over:
+            return  # nobody hears of it any more
+        gave_way, called_off = bool(self.amid), self.called_off
+        if gave_way:
+            self._rest()
         if core.followers:
             self._let_follow(self.schedule.followers)
         if head.placed and (head.outputs.missing or head.inputs.missing):
@@ -229,7 +254,11 @@ class Region:
         elif self._wave is self._measured and all(worker.meter.left <= 0 for worker in self.order):
             self._wave = self._plain
             head.step = self.step = self._plain.step
-        agenda.consider(head)
+        if gave_way:
+            agenda.idle_again(head)
+            self._go_on(called_off)
+        else:
+            agenda.consider(head)
 
     def measure_on(self) -> None:
         """What was measured has been read: measure the next waves."""
@@ -253,19 +282,23 @@ class Region:
     def leave(self, k: int, found: dict[str, Any]) -> Any:
         """Something about the firing of member k is not plain: what it gave back, or what happened meanwhile."""
         result = found[f"r{k}"] if f"r{k}" in found else found[f"v{k}_0"]
-        if self.detached is not None:
-            self.detached = None
+        if self.detached:
+            self.detached = False
             return result  # of the coroutine that has waited, so that it comes back as its firing's
-        if not self.flags:
+        if not (self.flags or self.called_off):
             self._note_exit(k)
+        gave_way = bool(self.amid)
+        self._rest()
         worker = self.materialise(k, found)
+        if gave_way and self.core.over:
+            return None  # nobody hears of it any more
         if k not in self.schedule.called:
             firing.complete_firing(worker, result)
         elif type(result) is CoroutineType:
             calls.await_call(worker, worker.call_edge.port_name, result)
         else:
             calls.finish_call(worker, "done")
-        self._left()
+        self._left(gave_way)
         return None
 
     def caught(self, error: BaseException, found: dict[str, Any]) -> None:
@@ -274,29 +307,35 @@ class Region:
         Raises:
           BaseException: what is no error of a node (Ctrl-C, and what ends a task or the program).
         """
-        if self.detached is not None:
-            self.detached = None
+        if self.detached:
+            self.detached = False
             raise error
+        gave_way = bool(self.amid)
+        self._rest()
         traceback: Any = error.__traceback__
         k = self._wave.calls.get(traceback.tb_lineno)
         if k is None:
             self.running = False
             raise error  # a fault of ours
         worker = self.materialise(k, found)
+        if gave_way and (self.core.over or isinstance(error, GeneratorExit)):
+            raise error
         if worker.is_source and isinstance(error, StopIteration | EndOfStream):
             ending.source_ended(worker)
         elif isinstance(error, Exception) and k in self.schedule.called:
             errors.fail_call(worker, worker.call_edge.port_name, error)
-        elif isinstance(error, Exception):
+        elif isinstance(error, Exception) or (gave_way and not isinstance(error, KeyboardInterrupt)):
             errors.fail(worker, f"firing {worker.firings}", error, answer=True)
         else:
-            self._left()
+            self._left(gave_way)
             raise error
-        self._left()
+        self._left(gave_way)
 
-    def _left(self) -> None:
+    def _left(self, gave_way: bool = False) -> None:
         if self.doomed:
             self.dissolve()
+        if gave_way and not self.core.over:
+            self._go_on(called_off=True)
 
     def _note_exit(self, k: int) -> None:
         """A member that is hardly ever plain is none: the region forms anew without it."""
@@ -396,21 +435,70 @@ class Region:
 
         A call that really waits becomes a firing like any other; the wave's coroutine stays around it.
         """
+        carrier: Any = self._lender.carrier  # type: ignore[union-attr]  # there is async code
+        self._coroutine = waves
+        if carrier.start(waves, self._late, self._detach) is PENDING and not self.detached:
+            self._give_way()
+
+    def _give_way(self) -> None:
+        """The wave has given way to others: its members are busy until it is over."""
         lender: Any = self._lender
-        if lender.carrier.start(waves, self._late) is not PENDING:
-            return
-        frame = waves.cr_frame
-        found = dict(frame.f_locals)
-        k = self._wave.calls[frame.f_lineno]
+        self.amid = "firing"
+        for worker in self.order:
+            worker.busy = "firing"
+        code = self.core.code
+        code.begin(lender)
+        self._after = code.late(lender, _nothing_more)
+        self.sent_on()
+        self.core.speaker = None
+
+    def sent_on(self) -> None:
+        """What has left the wave that gives way is on its way, and the head waits for it."""
+        if self.core.followers:
+            self._let_follow(self.schedule.followers)
+            self.core.host.kick()
+        if self.head.outputs.missing:
+            self.head.unplace()
+
+    def _detach(self) -> None:
+        """The call under way waits for more than its turn: from here on it is a firing like any other."""
+        lender: Any = self._lender
+        k, found = self._place()
         worker = self.order[k]
+        gave_way = bool(self.amid)
+        if gave_way:
+            self.core.code.end(lender)
+            self._rest()
         lender.carrier, worker.carrier = worker.carrier, lender.carrier  # whoever cancels the node means this code
-        self.detached = waves
+        self.detached = True
         self._note_exit(k)
         self.materialise(k, found)
         code = self.core.code
         code.begin(worker)
         self._after = code.late(worker, firing.when_done(worker))
-        self._left()
+        self._left(gave_way)
+        if gave_way:
+            self.core.host.kick()
+
+    def _place(self) -> tuple[int, dict[str, Any]]:
+        """The member in whose call the wave waits, and what its locals hold."""
+        frame = self._coroutine.cr_frame
+        return self._wave.calls[frame.f_lineno], dict(frame.f_locals)
+
+    def _rest(self) -> None:
+        """The wave does not give way any more: nobody's code is under way but that of the present call, if any."""
+        if self.amid:
+            self.amid = ""
+            self.called_off = False
+            for worker in self.order:
+                worker.busy = ""
+
+    def _go_on(self, called_off: bool) -> None:
+        """Those who have come to a member while it was busy have their turn."""
+        if called_off:
+            for worker in self.order:
+                if not worker.busy:
+                    agenda.idle_again(worker)
 
     def _late(self, result: Any, error: BaseException | None) -> None:
         after, self._after = self._after, None
@@ -442,3 +530,9 @@ class Region:
         worker.speaks = self.doomed = True
         self.flags.append("speaks")
         return True
+
+
+def _nothing_more(result: Any, error: BaseException | None) -> None:
+    """The coroutine of a wave that has given way is over: it has seen to everything itself."""
+    if error is not None:
+        raise error

@@ -373,8 +373,8 @@ class Writer:
         self.indent += 1
         say(f"core.speaker = w{k}; w{k}.busy = 'call'; w{k}.stamp = stamp")
         say(f"r{k} = f{k}({value})", k)
-        say(f"w{k}.busy = ''; w{k}.stamp = None")
-        unusual = f"flags or type(r{k}) in EXCEPTIONAL or w{k}.right or w{k}.events_due"
+        say(f"w{k}.busy = {self._amid()}; w{k}.stamp = None")
+        unusual = f"flags{self._unusual()} or type(r{k}) in EXCEPTIONAL or w{k}.right or w{k}.events_due"
         say(f"if {unusual}: return region.leave({k}, locals())")
         self.indent -= 1
         say(f"else: silent[{k}] += 1")
@@ -422,28 +422,32 @@ class Writer:
             self.say("ended = monotonic()")
             delay = "" if self.is_source and not k else ", ended + epoch - stamp" if self.real else ", now() - stamp"
             if worker.is_async:  # while it waited others ran: that kept nobody busy
-                delay = f"{delay or ', None'}, None if region.detached is None else 0.0"
+                delay = f"{delay or ', None'}, 0.0 if region.detached or region.amid else None"
             self.say(f"took{k}(ended - began{delay})")
         if not self.single[k]:
             self._spread_out(k)
         elif worker.out_names:
             self._guard(k, within)
         else:
-            self.say(f"if v{k}_0 is not None or flags{self._detached(k)}: return region.leave({k}, locals())")
+            self.say(f"if v{k}_0 is not None or flags{self._unusual()}: return region.leave({k}, locals())")
         self._put(k)
 
     def _announce(self, k: int) -> None:
         """What the member's code sends by itself is to find that the worker runs."""
         self.say(f"core.speaker = w{k}; w{k}.busy = 'firing'; w{k}.stamp = stamp")
 
-    def _detached(self, k: int) -> str:
-        return " or region.detached is not None" if self.order[k].is_async else ""
+    def _unusual(self) -> str:
+        return " or region.detached or region.called_off" if self.is_async else ""
+
+    def _amid(self) -> str:
+        """What a member is when its call is over: busy with all others, if the wave gives way."""
+        return "region.amid" if self.is_async else "''"
 
     def _guard(self, k: int, within: bool) -> None:
         say, value = self.say, f"v{k}_0"
-        say(f"if type({value}) is not t{k} or flags{self._detached(k)}:")
+        say(f"if type({value}) is not t{k} or flags{self._unusual()}:")
         self.indent += 1
-        say(f"if flags or type({value}) in EXCEPTIONAL{self._detached(k)}: return region.leave({k}, locals())")
+        say(f"if flags or type({value}) in EXCEPTIONAL{self._unusual()}: return region.leave({k}, locals())")
         say(f"if {value} is not None: t{k} = type({value})")
         if not within and self._silences_all_behind(k) and len(self.order) > k + 1:
             self.over_if_silent.add(k)
@@ -462,16 +466,16 @@ class Writer:
         """Several outputs, or sent by the code itself."""
         say, worker = self.say, self.order[k]
         if self._speaks(worker):
-            say(f"if flags or w{k}.right: return region.leave({k}, locals())")
+            say(f"if flags or w{k}.right{self._unusual()}: return region.leave({k}, locals())")
         else:
-            say(f"if flags: return region.leave({k}, locals())")
+            say(f"if flags{self._unusual()}: return region.leave({k}, locals())")
         if worker.out_names:
             say(f"values = values_of(region, {k}, r{k})", k)
             say(f"if values is None: return region.leave({k}, locals())")
         else:
             say(f"if r{k} is not None: return region.leave({k}, locals())")
         if self._speaks(worker):
-            say(f"w{k}.busy = ''; w{k}.stamp = None")
+            say(f"w{k}.busy = {self._amid()}; w{k}.stamp = None")
         for output in range(len(worker.out_names)):
             say(f"v{k}_{output} = values[{output}]")
 
@@ -486,6 +490,8 @@ class Writer:
                     self.say(f"put_heard(heard{k}_{output}, NO_MESSAGE if {value} is None else {value}, stamp)")
             elif to is None:
                 self.say(f"put(e{k}_{number}, NO_MESSAGE if {value} is None else {value}, 0, stamp)")
+        if self.is_async and (heard or any(to is None for _, _, to in self.outs[k])):
+            self.say("if region.amid: region.sent_on()")
 
     def _end_of_wave(self) -> None:
         """Is there another wave at once? Only if nobody else waits for the group: waves are first in, first out."""
@@ -494,6 +500,7 @@ class Writer:
         if not self.loops:
             return
         stop = ["queue", "ready", "flags", "worker.blocked"]
+        stop += ["region.amid"] if self.is_async else []
         if not self.is_source:
             stop += ["inputs.missing", "worker.special", "entry0.queue[0].activity", "now() > core.until"]
         if self.has_border:

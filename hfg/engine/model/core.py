@@ -147,6 +147,9 @@ class Code(Protocol):
     def begin(self, worker: Worker) -> None:
         """The worker's code waits now."""
 
+    def end(self, worker: Worker) -> None:
+        """The worker's code waits no more."""
+
     def late(
         self, worker: Worker, done: Callable[[Any, BaseException | None], None]
     ) -> Callable[[Any, BaseException | None], None]:

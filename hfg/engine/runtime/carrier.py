@@ -61,7 +61,18 @@ class Carrier:
       waiting: whether a coroutine is under way.
     """
 
-    __slots__ = ("_context", "_coroutine", "_done", "_loop", "_must_cancel", "_outside", "_soon", "_waits_for", "task")
+    __slots__ = (
+        "_context",
+        "_coroutine",
+        "_done",
+        "_loop",
+        "_must_cancel",
+        "_outside",
+        "_soon",
+        "_waits",
+        "_waits_for",
+        "task",
+    )
 
     def __init__(
         self,
@@ -77,6 +88,7 @@ class Carrier:
         self._context = outside.copy() if context is None else context
         self._coroutine: Any = None
         self._done: Done | None = None
+        self._waits: Callable[[], None] | None = None
         self._waits_for: Any = None
         self._must_cancel: asyncio.CancelledError | None = None
         self.task: asyncio.Task[None] = loop.create_task(self._sleep(), name=name, context=self._context)
@@ -91,8 +103,13 @@ class Carrier:
         """Whether a coroutine is under way."""
         return self._coroutine is not None
 
-    def start(self, coroutine: Any, done: Done) -> Any:
+    def start(self, coroutine: Any, done: Done, waits: Callable[[], None] | None = None) -> Any:
         """Run the first step now.
+
+        Args:
+          coroutine: what to run.
+          done: hears of its end if it has waited.
+          waits: called when the coroutine first waits for more than its turn; once.
 
         Returns:
           What the coroutine returned, or `PENDING`: it waits, and `done(result, error)` follows on the loop.
@@ -110,6 +127,7 @@ class Carrier:
             _swap(loop, previous)
         self._coroutine = coroutine
         self._done = done
+        self._waits = waits
         self._wait(waits_for)
         return PENDING
 
@@ -156,6 +174,9 @@ class Carrier:
             return
         if getattr(waits_for, "_asyncio_future_blocking", None):
             waits_for._asyncio_future_blocking = False
+            if self._waits is not None:
+                waits, self._waits = self._waits, None
+                waits()
             self._waits_for = waits_for
             waits_for.add_done_callback(self._wake, context=self._outside)
             if self._must_cancel is not None and waits_for.cancel():

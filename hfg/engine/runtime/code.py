@@ -144,14 +144,18 @@ class CodeRunner:
         worker.in_flight = True
         worker.core.in_flight += 1
 
+    def end(self, worker: Worker) -> None:
+        """See `core.Code`."""
+        worker.in_flight = False
+        worker.core.in_flight -= 1
+
     def late(self, worker: Worker, done: Done) -> Done:
         """See `core.Code`."""
         closing = self.core.over  # a hook of the teardown; what began before the end is not listened to after it
 
         def over(result: Any, error: BaseException | None) -> None:
             if worker.in_flight and (worker.carrier is carrier or carrier is None):
-                worker.in_flight = False
-                worker.core.in_flight -= 1
+                self.end(worker)
             elif carrier in self.given_up:
                 self.given_up.discard(carrier)
                 carrier.drop()  # its task has nothing to do any more
