@@ -20,7 +20,7 @@ from hfg import starting as starting  # before all that takes its time to import
 from hfg import errors
 from hfg.activity import StateMachine
 from hfg.clock import now
-from hfg.engine import Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
+from hfg.engine import PunctualLoop, Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
 from hfg.errors import EndOfStream
 from hfg.functions import node
 from hfg.graph import Graph, Subgraph, commands
@@ -38,6 +38,7 @@ __all__ = [
     "Node",
     "Output",
     "Parameter",
+    "PunctualLoop",
     "Report",
     "Run",
     "State",

@@ -10,7 +10,7 @@ from typing import Any
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.options import Clock
 from hfg.cli.sockets import open_door
-from hfg.engine import Report, Run, VirtualTimeLoop, run_async
+from hfg.engine import PunctualLoop, Report, Run, VirtualTimeLoop, run_async
 from hfg.errors import HfgError, TargetError, UsageError
 from hfg.graph import Graph
 
@@ -64,7 +64,7 @@ def execute(
                     await one
 
     try:
-        with asyncio.Runner(loop_factory=VirtualTimeLoop if clock is Clock.virtual else None) as runner:
+        with asyncio.Runner(loop_factory=VirtualTimeLoop if clock is Clock.virtual else PunctualLoop) as runner:
             return runner.run(main()), None
     except UsageError as error:  # an unknown policy, for example: not the run's fault
         raise TargetError(str(error)) from None

@@ -21,6 +21,7 @@ from hfg.engine.face.running import run, run_async, running
 from hfg.engine.observing.glance import Glance, NodeGlance
 from hfg.engine.observing.report import EdgeReport, NodeReport, Report
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
+from hfg.engine.runtime.punctual import PunctualLoop
 from hfg.engine.runtime.virtual import VirtualTimeLoop
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "NodeGlance",
     "NodeReport",
     "NodeStatistics",
+    "PunctualLoop",
     "Report",
     "Run",
     "Statistics",

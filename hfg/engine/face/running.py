@@ -16,6 +16,7 @@ from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.observing.report import Report
 from hfg.engine.runtime.interrupt import CtrlC
+from hfg.engine.runtime.punctual import PunctualLoop
 from hfg.engine.runtime.settings import RunOptions, Settings
 from hfg.engine.runtime.virtual import VirtualTimeLoop
 from hfg.errors import CheckFailed, GraphError, HfgError, RunError, UsageError
@@ -165,7 +166,7 @@ def run(
         )
     settings = _settings(options, allow_idle=allow_idle)
     _need_clock(clock)
-    factory = VirtualTimeLoop if clock == "virtual" else None
+    factory = VirtualTimeLoop if clock == "virtual" else PunctualLoop
     ctrl_c = CtrlC()
     runner = asyncio.Runner(loop_factory=factory)
     try:
