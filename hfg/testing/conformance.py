@@ -308,9 +308,10 @@ class Replay:
         """The move that may lie behind an event: a step of its node, or one of those that follow from quiet."""
         moves = self.machine.moves()
         node = self._teller(event)
+        steps = [move for move in moves if move.kind in ("go on", "time out") and move.node == node]
+        if steps:
+            return min(steps, key=lambda move: self._strangeness(move, event))
         for move in moves:
-            if move.kind in ("go on", "time out") and move.node == node:
-                return move
             if move.kind == "timer" and (move.node or self._source_of(move.edge)) == node:
                 return move
             if move.kind == "call" and isinstance(event, TokenTaken) and move.edge == event.edge:
@@ -335,6 +336,18 @@ class Replay:
             if move.kind == "timer" and not (move.node and self.machine.times_out(self.machine.paths[move.node])):
                 return move
         return None if self.sees_inside else next((move for move in moves if self._moves_inside(move)), None)
+
+    def _strangeness(self, move: Move, event: TraceEvent) -> tuple[bool, bool]:
+        """Of several firings of one node (F14) the step of which is least likely to be behind the event.
+
+        Signals have the stamp of their firing (T5); what is told of the end of one names it.
+        """
+        if not move.number:
+            return False, False
+        flight = self.machine.under_way(move)
+        number = getattr(event, "number", flight.number)
+        token = getattr(event, "token", None)
+        return number != flight.number, token is not None and abs(token.stamp - flight.stamp) > _SAME_TIME
 
     def _moves_inside(self, move: Move) -> bool:
         """Whether a move belongs to an iterating subgraph, of which nothing more is told than its results."""

@@ -7,11 +7,18 @@ from collections.abc import Iterator
 import pytest
 
 from hfg.engine.runtime import settings as run_settings
+from tests.semantics.readings import Perform, by_engine, by_oracle, under_every_schedule
 
 
 @pytest.fixture(params=[True, False], ids=["fast", "plain"])
 def fast(request: pytest.FixtureRequest) -> bool:
     return bool(request.param)
+
+
+@pytest.fixture(params=[by_engine, by_oracle], ids=["engine", "oracle"])
+def perform(request: pytest.FixtureRequest) -> Perform:
+    """Give what is read off a run; it must be the same under many schedules."""
+    return under_every_schedule(request.param)
 
 
 @pytest.fixture(autouse=True, scope="session")

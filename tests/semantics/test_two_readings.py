@@ -6,7 +6,7 @@ What is expected was counted out on paper from the rules alone, before either wa
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from typing import Any
 
 import pytest
@@ -14,7 +14,7 @@ import reactivex.operators as ops
 
 import hfg
 from hfg import END, NO_MESSAGE
-from hfg.testing import Recorder, recorder, reference_run
+from hfg.testing import Recorder, recorder
 from hfg.testing.nodes import (
     AsyncRelay,
     Doubter,
@@ -29,51 +29,9 @@ from hfg.testing.nodes import (
     sink,
     slow_double,
 )
-from hfg.trace import FiringStarted, RunEnded, TokenSent
+from hfg.trace import RunEnded, TokenSent
 from tests.semantics.nodes import drive, forward
-
-Perform = Callable[..., Recorder]
-
-SEEDS = range(8)
-
-
-def by_engine(graph: hfg.Graph, seed: int) -> Recorder:
-    seen = recorder()
-    try:
-        hfg.run(graph, clock="virtual", policy="random", seed=seed, trace=seen)
-    except hfg.errors.RunError:
-        assert seen.outcome is not None
-    return seen
-
-
-def by_oracle(graph: hfg.Graph, seed: int) -> Recorder:
-    seen = recorder()
-    seen.extend(reference_run(graph, seed=seed, max_moves=5000).events)
-    return seen
-
-
-@pytest.fixture(params=[by_engine, by_oracle], ids=["engine", "oracle"])
-def perform(request: pytest.FixtureRequest) -> Callable[[Callable[[], hfg.Graph], Callable[[Recorder], Any]], Any]:
-    """Give what is read off a run; it must be the same under many schedules."""
-
-    def every_schedule(build: Callable[[], hfg.Graph], read: Callable[[Recorder], Any]) -> Any:
-        found = [read(request.param(build(), seed)) for seed in SEEDS]
-        assert all(one == found[0] for one in found), found
-        return found[0]
-
-    return every_schedule
-
-
-def starts(seen: Recorder, node: str, *, kind: str | None = None) -> list[float]:
-    """When the firings of a node began."""
-    return [
-        round(event.time, 6) for event in seen.of(FiringStarted) if event.node == node and kind in (None, event.kind)
-    ]
-
-
-def signs(seen: Recorder, edge: str) -> list[tuple[Any, int]]:
-    return [(token.value, token.activity) for token in seen.tokens(edge)]
-
+from tests.semantics.readings import signs, starts
 
 # --- F5, F6: pipelined means taken
 

@@ -40,7 +40,7 @@ class Calling(Firing):
             return
         station = self.stations[owner]
         flight = Flight(station, "call", number, "call", lying.token.stamp, slot=name, line=line)
-        station.flight = flight
+        station.flights.append(flight)
         self.receive_activity(owner, [lying.token.activity])
         self.note_places()  # a queue may have room again
         if name in station.type.slots:  # else behind what the automatic slot does (A7)
@@ -77,7 +77,7 @@ class Calling(Firing):
         actions: dict[str, Callable[[], None]] = {
             "enable": lambda: self.enable(index),
             "disable": lambda: self.disable(index),
-            "reset": lambda: self.restart(station),
+            "reset": lambda: self.restart_behind_firings(station),
             "activate": lambda: self.set_active(index, True, "slot"),
             "deactivate": lambda: self.deactivate(index),
         }
@@ -111,7 +111,8 @@ class Calling(Firing):
         self.settle()  # subgraphs around the node come first
         self.flush_changes(station)
         self.observe(CallEnded(self.now, station.path, flight.number, "done" if error is None else "failed"))
-        station.flight, station.unready = None, False
+        station.flights.remove(flight)
+        station.unready = False
         line = flight.line
         if line is not None and not line.edge.is_event and line.unprocessed:
             self.process(line)
@@ -123,7 +124,7 @@ class Calling(Firing):
         failure = NodeError(station.path, what, error)
         self.observe(ErrorRaised(self.now, station.path, what, str(failure), policy))
         if policy == "stop":
-            station.flight = None
+            station.flights = station.firings_under_way
             self.fail_run(failure)
             return False
         return True
@@ -132,8 +133,7 @@ class Calling(Firing):
 
     def deactivate(self, index: int) -> None:
         """Take A(v), and the right of A3 with it."""
-        flight = self.stations[index].flight
-        if flight is not None:
+        for flight in self.stations[index].flights:
             flight.right = False
         self.set_active(index, False, "slot")
 
@@ -152,10 +152,17 @@ class Calling(Firing):
             self.quench(-2 - owner, "slot")
         else:
             for station in self.members_of(owner):
-                if station.flight is None:
+                if not station.flights:
                     self.restart(station)
                 else:
                     station.afterwards = station.afterwards or "reset"
+
+    def restart_behind_firings(self, station: Station) -> None:
+        """Restart it as soon as none of its firings is under way, for its calls do not wait for those (F14)."""
+        if station.firings_under_way:
+            station.afterwards = station.afterwards or "reset"
+        else:
+            self.restart(station)
 
     def restart(self, station: Station) -> None:
         """Teardown, setup, not ended; tokens and A(v) stay. In a back-off that is done when it is over (X1)."""
@@ -199,7 +206,7 @@ class Calling(Firing):
             for station, was in zip(members, before, strict=True):
                 if was or not self.is_enabled(station.leaf.index):
                     continue
-                if is_box(owner) and station.flight is not None:
+                if station.flights if is_box(owner) else station.firings_under_way:
                     station.afterwards = "enable"
                 elif station.resting_until is None:
                     self.tear_down(station)
@@ -235,8 +242,8 @@ class Calling(Firing):
 
     def _silence(self, station: Station) -> None:
         index = station.leaf.index
-        if station.flight is not None and station.flight.what == "firing":
-            station.flight.void = True
+        for flight in station.firings_under_way:
+            flight.void = True
         for line in self.lines:  # nobody waits for what it has taken
             if line.edge.target.owner == index and line.edge.target.name != "enable" and line.unprocessed:
                 self.process(line)

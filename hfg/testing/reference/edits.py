@@ -222,8 +222,8 @@ class Editing(Calling):
         line.queue.clear()
         for station in self.stations:
             station.owed = [one for one in station.owed if one is not line]
-            if station.flight is not None:
-                station.flight.taken = [one for one in station.flight.taken if one is not line]
+            for flight in station.flights:
+                flight.taken = [one for one in flight.taken if one is not line]
 
     def _remove(self, station: Station) -> None:
         if station.active:
@@ -287,7 +287,7 @@ class Editing(Calling):
                 self.process(line)
             else:
                 station.owed.append(line)
-        for line in station.flight.taken if station.flight is not None else ():
+        for line in [line for flight in station.flights for line in flight.taken]:
             if self.is_pipelined(line):
                 self.process(line)
 

@@ -44,7 +44,7 @@ class Firing(RunningCode):
         kind = self.kind_of(station, joined, taken)
         stamp = self.now if station.type.is_source else newest(tokens, self.now)
         flight = Flight(station, "firing", station.firings, kind, stamp, [line for line, _ in taken])
-        station.flight = flight
+        station.flights.append(flight)
         self.observe(FiringStarted(self.now, station.path, flight.number, kind))
         self.receive_activity(index, [token.activity for token in tokens])
         if kind == "process":
@@ -55,7 +55,7 @@ class Firing(RunningCode):
             for line, lying in taken:
                 if not lying.token.is_marker:
                     self.observe(TokenDropped(self.now, line.edge.label, lying.token, "ended"))
-            self.run_end(flight)
+            self.end_behind_others(flight)
         elif failure is not None:
             self.fail_firing(flight, failure)
         elif kind == "silent":
@@ -92,6 +92,16 @@ class Firing(RunningCode):
                     self.process(line)
             taken.append((line, lying))
         return taken
+
+    def would_end(self, index: int) -> bool:
+        """Whether the node's next firing would be its last (F4)."""
+        joined = [line for line in self.lines_joined(index) if self.is_live(line) or self.takes_part(line)]
+        lying = [(line, line.queue[0]) for line in joined if self.takes_part(line) and line.queue]
+        ending = [line for line, first in lying if first.token.value is END]
+        real = [line for line in joined if not line.delay]
+        return any(not self.is_optional(line) for line in ending) or (
+            bool(real) and all(line in ending or line.ended for line in real)
+        )
 
     def kind_of(self, station: Station, joined: list[Line], taken: Taken) -> Literal["process", "silent", "end"]:
         """F4, and A11's silence."""
@@ -137,6 +147,7 @@ class Firing(RunningCode):
     def run_process(self, flight: Flight, taken: Taken) -> None:
         """Run the process function with the values that were taken; what is absent has its default (P6)."""
         station = flight.station
+        flight.parameters = dict(station.node._parameters)
         held = {line.edge.target.name: lying.token for line, lying in taken if line.edge.target.kind == "input"}
         arguments = []
         for name, spec in station.type.inputs.items():
@@ -184,7 +195,7 @@ class Firing(RunningCode):
         """Say what the end of the function means: the end of a source, a failure, or outputs."""
         station = flight.station
         if result is _OVER or (isinstance(error, EndOfStream) and station.type.is_source):
-            self.run_end(flight)
+            self.end_behind_others(flight)
             return
         if error is None:
             try:
@@ -242,9 +253,21 @@ class Firing(RunningCode):
 
     # --- the end of a node
 
+    def end_behind_others(self, flight: Flight) -> None:
+        """F14: `end()` is called when all firings that began before are over and their outputs have left."""
+        flight.kind = "end"
+        if flight.station.firings_under_way == [flight]:
+            self.run_end(flight)
+        else:
+            flight.waits_to_end = True
+
     def run_end(self, flight: Flight) -> None:
         """F4(1): call `end()`; from now on what arrives is drained (F12)."""
         station = flight.station
+        flight.waits_to_end = False
+        if station.ending:  # another firing of a source has ended it already (F14)
+            self.end_firing(flight, "ended")
+            return
         station.ending = True
         station.stamp = flight.stamp
         flight.writes.clear()
@@ -275,9 +298,17 @@ class Firing(RunningCode):
         outcome: Literal["done", "silent", "ended", "failed", "abandoned"],
         failure: NodeError | None = None,
     ) -> None:
+        """The function is over: outputs leave, of a node that allows several firings in their turn (F14)."""
+        flight.over, flight.over_since = (outcome, failure), self.next_tick()
+        if flight.void or not flight.station.is_concurrent:
+            self.leave(flight)
+
+    def leave(self, flight: Flight) -> None:
         """Outputs leave together, then automatic events in the order they arose; then the firing is over."""
         station = flight.station
         index = station.leaf.index
+        assert flight.over is not None
+        (outcome, failure), flight.leaving = flight.over, True
         if not flight.void and (outcome != "ended" or flight.writes):
             self.send(index, self.shipments(flight, outcome), flight)
         if outcome == "done":
@@ -288,7 +319,8 @@ class Firing(RunningCode):
         if flight.void and outcome == "done":
             outcome = "abandoned"
         self.observe(FiringEnded(self.now, station.path, flight.number, outcome))
-        station.flight, station.unready = None, False
+        station.flights.remove(flight)
+        station.unready = False
         station.owed += [line for line in flight.taken if line.unprocessed]
         self.be_idle(station)
 
@@ -297,7 +329,7 @@ class Firing(RunningCode):
         while station.to_set:
             self.set_parameter(station, *station.to_set.pop(0))
         self.settle()
-        if station.afterwards:
+        if station.afterwards and not station.flights:
             station.afterwards = ""
             self.restart(station)
             self.settle()
@@ -316,7 +348,8 @@ class Firing(RunningCode):
             activity: int | None = None
             stamp: float | None = None
             if source.kind == "parameter" and outcome == "done":
-                value = station.node._parameters[source.name]
+                known = flight.parameters if station.is_concurrent else station.node._parameters
+                value = known[source.name]
             elif source.kind == "output" and outcome in ("done", "ended") and source.name in flight.writes:
                 value, activity, stamp = passed_on(*flight.writes[source.name])
             shipments.append(
@@ -329,6 +362,8 @@ class Firing(RunningCode):
         if line.edge.target.owner < 0:
             return False
         options = self.stations[line.edge.target.owner].leaf.options
+        if options.concurrency > 1:
+            return True
         if options.release != "auto":
             return bool(options.release == "pipelined")
         source = line.edge.source.owner
@@ -348,7 +383,7 @@ class Firing(RunningCode):
         policy = "stop" if gives_up else options.on_error
         self.observe(ErrorRaised(self.now, station.path, what, str(failure), policy))
         if policy == "stop":
-            station.flight = None
+            station.flights.remove(flight)
             self.fail_run(failure)
             return
         if options.on_error == "disable":

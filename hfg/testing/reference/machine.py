@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from hfg.errors import QueueLimit, Stalled, UsageError
 from hfg.testing.reference.edits import Editing
-from hfg.testing.reference.state import Line, Station
+from hfg.testing.reference.state import Flight, Line, Station
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
 from hfg.token import END, NO_MESSAGE, Token
@@ -41,6 +41,7 @@ class Move:
         "feed" the graph's input `edge`, "read" the output at the end of `edge` (P10); "wait" until `time`;
         "grow" the queue of `edge`; "give up" sources; "complete" operators; "end events"; "finish" the run.
       outcome: of "finish".
+      number: of "go on" and "time out": which of the node's firings, if several may be under way (F14); else 0.
     """
 
     kind: Literal[
@@ -62,6 +63,7 @@ class Move:
     edge: str = ""
     time: float = 0.0
     outcome: str = ""
+    number: int = 0
 
     def __str__(self) -> str:
         match self.kind:
@@ -77,7 +79,7 @@ class Move:
                 return f'call a slot of "{self.node}" over {self.edge}'
             case "give up" | "complete" | "end events":
                 return self.kind
-        return f'{self.kind} "{self.node}"'
+        return f'{self.kind} "{self.node}"' + (f" in firing {self.number}" if self.number else "")
 
 
 class ReferenceMachine(Editing):
@@ -144,16 +146,16 @@ class ReferenceMachine(Editing):
         return [move for move in self.working_moves() if self.is_owed(move, moot)] or self.quiet_moves(moot)
 
     def is_owed(self, move: Move, moot: Set[int]) -> bool:
-        """Whether others wait for it: not for a firing of a source for ended nodes, whose slots go on, though (R5)."""
+        """Whether others wait for it: not for a firing of a source for ended nodes, whose slots go on, though (R5).
+
+        Nor for the beginning of a last firing that would wait for those before it (F14).
+        """
         index = self.paths.get(move.node, ROOT)
+        if move.kind == "fire" and self.stations[index].flights and self.would_end(index):
+            return False
         if index not in moot:
             return True
-        return move.kind == "call" or (move.kind == "go on" and self.is_calling(index))
-
-    def is_calling(self, index: int) -> bool:
-        """Whether a slot call of the node is under way."""
-        flight = self.stations[index].flight
-        return flight is not None and flight.what == "call"
+        return move.kind == "call" or (move.kind == "go on" and self.stations[index].is_calling)
 
     def working_moves(self, only: Collection[int] | None = None) -> list[Move]:
         """Firings, calls, and what goes on in those under way; of all nodes, or `only` of some."""
@@ -167,24 +169,31 @@ class ReferenceMachine(Editing):
         for index, station in enumerate(self.stations):
             if only is not None and index not in only:
                 continue
-            flight = station.flight
-            if flight is not None:
+            for flight in station.flights:
+                number = flight.number if station.is_concurrent and flight.what == "firing" else 0
                 if self.can_go_on(flight):
-                    found.append(Move("go on", station.path))
+                    found.append(Move("go on", station.path, number=number))
                 limit = station.leaf.options.max_duration_s
-                if (
-                    limit is not None
-                    and flight.what == "firing"
-                    and flight.task is not None
-                    and self.is_over(flight.began + limit)
-                ):
-                    found.append(Move("time out", station.path))
+                if limit is not None and self.is_limited(flight) and self.is_over(flight.began + limit):
+                    found.append(Move("time out", station.path, number=number))
+            if station.flights and not station.is_concurrent:
                 continue
             move = self.next_of(index)
             if move is not None:
                 found.append(move)
             found += self.either_way(index, move)
         return found
+
+    def is_limited(self, flight: Flight) -> bool:
+        """Whether the time limit of its node counts for it (X2)."""
+        return flight.what == "firing" and flight.task is not None and flight.then is not None
+
+    def under_way(self, move: Move) -> Flight:
+        """What a move goes on with."""
+        station = self.stations[self.paths[move.node]]
+        if move.number:
+            return next(one for one in station.firings_under_way if one.number == move.number)
+        return next((one for one in station.flights if one.what == "call"), station.flights[0])
 
     def can_feed(self, name: str) -> bool:
         """Whether the graph's input is free (P10)."""
@@ -205,7 +214,7 @@ class ReferenceMachine(Editing):
             if move.node in paths or (line is not None and line.edge.within in (index, *inside)):
                 return False
         return not any(
-            self.stations[number].flight is not None
+            self.stations[number].flights
             or self.may_fire(number, ignore="timers")
             or self.may_fire(number, ignore="queues")
             for number in inside
@@ -222,25 +231,29 @@ class ReferenceMachine(Editing):
             return None
         station = self.stations[index]
         line = self.next_call(index)
-        held = bool(self.full_lines(index)) or station.resting_until is not None
+        held = bool(self.full_lines(index)) or station.resting_until is not None or station.is_calling
+        fires = station.place is not None and not station.is_busy and self.may_fire(index)
         if line is not None and (station.place is None or line.queue[0].place < station.place):
             return None if held else Move("call", station.path, line.edge.label)
-        if station.place is not None and self.may_fire(index):
+        if fires:
             return Move("fire", station.path)
+        if line is not None and station.is_concurrent and not held:  # its calls wait for no firing (F14)
+            return Move("call", station.path, line.edge.label)
         return None
 
     def either_way(self, index: int, move: Move | None) -> list[Move]:
         """A second move where the order of F9 is open.
 
         Timers of one moment take effect in any order; and the firing of a source for ended nodes may as well rest.
+        Calls of a node that allows several firings wait for none of them (F14).
         """
         station, line = self.stations[index], self.next_call(index)
         if move is None or line is None or station.place is None:
             return []
         same_moment = station.timed is not None and abs(line.queue[0].since - station.timed) <= MOMENT_S
-        if move.kind == "fire" and (same_moment or station.rested):
+        if move.kind == "fire" and (same_moment or station.rested or station.is_concurrent):
             return [Move("call", station.path, line.edge.label)]
-        if move.kind == "call" and same_moment and self.may_fire(index):
+        if move.kind == "call" and same_moment and not station.is_busy and self.may_fire(index):
             return [Move("fire", station.path)]
         return []
 
@@ -255,8 +268,7 @@ class ReferenceMachine(Editing):
         if line is not None:
             return [Move("grow", edge=line.edge.label)]
         busy = any(
-            station.flight is not None and (index not in moot or self.is_calling(index))
-            for index, station in enumerate(self.stations)
+            station.flights and (index not in moot or station.is_calling) for index, station in enumerate(self.stations)
         )
         return [] if busy or self.held_open else [self.closing_move()]
 
@@ -275,22 +287,22 @@ class ReferenceMachine(Editing):
 
     def next_timer(self, without: Set[int] = frozenset()) -> float | None:
         """The next moment at which something could start: rate, gate, back-off, time-out, operator, waiting code."""
-        ignored = {id(self.stations[index].flight) for index in without if not self.is_calling(index)}
+        ignored = {
+            id(flight)
+            for index in without
+            for flight in self.stations[index].flights
+            if not self.stations[index].is_calling
+        }
         times: list[float | None] = [self.loop.next_time(ignored)]
         for index, station in enumerate(self.stations):
             if index in without:
                 continue
-            flight, options = station.flight, station.leaf.options
-            if (
-                flight is not None
-                and flight.what == "firing"
-                and options.max_duration_s is not None
-                and flight.task is not None
-            ):
-                times.append(flight.began + options.max_duration_s)
+            limit = station.leaf.options.max_duration_s
+            if limit is not None:
+                times += [flight.began + limit for flight in station.flights if self.is_limited(flight)]
             if station.resting_until is not None:
                 times.append(station.resting_until)
-            if flight is None and station.place is None and self.may_fire(index, ignore="timers and queues"):
+            if not station.is_busy and station.place is None and self.may_fire(index, ignore="timers and queues"):
                 rests = [station.hold_until]
                 rests += [
                     station.last_function + 1 / rate for rate in self.gates_of(index) if rate and self.is_resting(index)
@@ -307,9 +319,10 @@ class ReferenceMachine(Editing):
         """F8: if only full queues hold nodes back, the smallest of those queues."""
         full: list[Line] = []
         for index, station in enumerate(self.stations):
-            waits = station.flight is not None and station.flight.waiting_for
-            held = station.flight is None and (
-                self.may_fire(index, ignore="queues") or self.next_call(index) is not None
+            waits = any(flight.waiting_for for flight in station.flights)
+            held = (not station.is_busy and self.may_fire(index, ignore="queues")) or (
+                not (station.is_calling if station.is_concurrent else station.flights)
+                and self.next_call(index) is not None
             )
             if waits or (held and station.resting_until is None):
                 full += self.full_lines(index)
@@ -397,14 +410,10 @@ class ReferenceMachine(Editing):
             case "call":
                 self.start_call(index, self.labels[move.edge])
             case "go on":
-                flight = self.stations[index].flight
-                assert flight is not None
-                self.go_on(flight)
+                self.go_on(self.under_way(move))
                 self.settle()
             case "time out":
-                flight = self.stations[index].flight
-                assert flight is not None
-                self.time_out(flight)
+                self.time_out(self.under_way(move))
                 self.settle()
             case "feed":
                 self.feed_once(move.edge)
@@ -477,7 +486,7 @@ class ReferenceMachine(Editing):
                 self.time_activity_out(owner)
             elif owner >= 0:
                 self.stations[owner].resting_until = None
-                self.restart(self.stations[owner])
+                self.restart_behind_firings(self.stations[owner])
         self.settle()
 
     def time_activity_out(self, owner: int) -> None:
@@ -485,8 +494,8 @@ class ReferenceMachine(Editing):
         if owner >= 0:
             station = self.stations[owner]
             station.active_since = None
-            if station.flight is not None:
-                station.flight.right = False
+            for flight in station.flights:
+                flight.right = False
         else:
             self.box_since[-2 - owner] = None
         self.trigger(owner, "timeout")
@@ -538,8 +547,8 @@ class ReferenceMachine(Editing):
     def close(self) -> None:
         """Throw away what is under way; needed only if the run is not taken to its end."""
         for station in self.stations:
-            if station.flight is not None:
-                self.abandon(station.flight)
+            for flight in station.flights:
+                self.abandon(flight)
 
     def fail_run(self, error: BaseException, outcome: str = "failed") -> None:
         """End the run in failure."""
@@ -598,7 +607,7 @@ class ReferenceMachine(Editing):
                 f'"{path}.{parameter}" is an argument of a generator function, which reads it only as it begins; '
                 "reset the node with the same edit, or make it a class and read self." + parameter
             )
-        if station.flight is None:
+        if not (station.is_calling if station.is_concurrent else station.flights):
             self.set_parameter(station, parameter, value)
         else:
             station.to_set.append((parameter, value))
@@ -616,8 +625,8 @@ class ReferenceMachine(Editing):
                 lying.token = Token(lying.token.value, 0, lying.token.stamp, lying.token.sequence)
         for station in self.stations:
             station.drained_modifiers = [0 for _ in station.drained_modifiers]
-            if station.flight is not None:
-                station.flight.right = False
+            for flight in station.flights:
+                flight.right = False
             if station.active:
                 station.active = station.node._active = False
                 station.active_since = None

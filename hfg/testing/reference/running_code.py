@@ -25,6 +25,16 @@ __all__ = ["RunningCode"]
 class RunningCode(Sending):
     """A machine that can run functions, coroutines and iterators of nodes."""
 
+    def __init__(self, graph: Any) -> None:
+        super().__init__(graph)
+        self.in_code: list[Flight] = []  # whose code is running, the innermost last
+
+    def flight_of(self, station: Station) -> Flight | None:
+        """The firing or call that a port of the node speaks for: the one whose code is running (F14)."""
+        if not station.is_concurrent:
+            return station.flight
+        return next((flight for flight in reversed(self.in_code) if flight.station is station), None)
+
     def connect_ports(self) -> None:
         """Let the ports of all nodes speak to this machine."""
         for station in self.stations:
@@ -42,7 +52,7 @@ class RunningCode(Sending):
 
     def _writer(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], None]:
         def write(value: Any, activity: int | None, stamp: float | None) -> None:
-            flight = station.flight
+            flight = self.flight_of(station)
             if flight is None or flight.what != "firing":
                 raise UsageError(f'"{station.path}.{name}" is written outside a firing')
             if name in flight.writes:
@@ -53,7 +63,7 @@ class RunningCode(Sending):
 
     def _trigger_of(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], None]:
         def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
-            flight = station.flight
+            flight = self.flight_of(station)
             if flight is not None and flight.in_thread:
                 flight.signals.append((name, value, activity, stamp))
             else:
@@ -63,8 +73,8 @@ class RunningCode(Sending):
 
     def _waiting_trigger_of(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], Any]:
         async def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
-            self.trigger(station.leaf.index, name, value, activity, stamp, station.flight)
-            flight = station.flight
+            flight = self.flight_of(station)
+            self.trigger(station.leaf.index, name, value, activity, stamp, flight)
             while flight is not None and self.has_no_room(station, name):
                 flight.waiting_for = name
                 await asyncio.sleep(0)
@@ -78,13 +88,16 @@ class RunningCode(Sending):
         return any(line.edge.source.name == name for line in self.full_lines(station.leaf.index))
 
     @contextmanager
-    def amid_code(self) -> Iterator[None]:
+    def amid_code(self, flight: Flight | None = None) -> Iterator[None]:
         """Run user code: in the machine's time and on its loop."""
         reset = current_clock.set(lambda: self.now)
+        self.in_code += [] if flight is None else [flight]
         try:
             with self.loop.entered():
                 yield
         finally:
+            if flight is not None:
+                self.in_code.pop()
             current_clock.reset(reset)
 
     def launch(
@@ -96,7 +109,7 @@ class RunningCode(Sending):
         result: Any = None
         failure: Exception | None = None
         try:
-            with self.amid_code():
+            with self.amid_code(flight):
                 result = function()
         except Exception as error:
             failure = error
@@ -116,6 +129,9 @@ class RunningCode(Sending):
 
     def can_go_on(self, flight: Flight) -> bool:
         """Whether something of the flight can happen without time going by."""
+        if flight.waits_to_end:
+            others = [one for one in flight.station.firings_under_way if not one.waits_to_end]
+            return not others and flight.station.firings_under_way[0] is flight
         if flight.elements is not None:
             return self.is_quiet_inside(flight.station.leaf.index)
         if flight.task is None:
@@ -132,8 +148,15 @@ class RunningCode(Sending):
         """Give the next element inside."""
         raise NotImplementedError
 
+    def run_end(self, flight: Flight) -> None:
+        """Call `end()`."""
+        raise NotImplementedError
+
     def go_on(self, flight: Flight) -> None:
         """Carry the flight on: an element, a signal from its thread, a step of its coroutine, or its end."""
+        if flight.waits_to_end:
+            self.run_end(flight)
+            return
         if flight.elements is not None:
             self.go_on_iterating(flight)
             return
@@ -145,11 +168,8 @@ class RunningCode(Sending):
                 flight.in_thread = False
                 self.land(flight, flight.result, flight.error)
             return
-        reset = current_clock.set(lambda: self.now)
-        try:
+        with self.amid_code(flight):
             self.loop.step(flight)
-        finally:
-            current_clock.reset(reset)
         if flight.task.done() and flight.then is not None:
             task: asyncio.Task[Any] = flight.task
             error = asyncio.CancelledError() if task.cancelled() else task.exception()

@@ -87,8 +87,7 @@ class Sending(State):
                 if lying.token.activity == 1:
                     lying.token = _with(lying.token, activity=0)
         for member in self.structure.boxes[box].members:
-            flight = self.stations[member].flight
-            if flight is not None:
+            for flight in self.stations[member].flights:
                 flight.right = False
             self.stations[member].drained_modifiers = [0 for _ in self.stations[member].drained_modifiers]
             self.set_active(member, False, cause)
@@ -242,7 +241,7 @@ class Sending(State):
             while self.drain_once():
                 pass
             self.note_places()
-            going = self.release_once() or self.end_once() or self.flush_once()
+            going = self.release_once() or self.leave_once() or self.end_once() or self.flush_once()
 
     def drain_once(self) -> bool:
         """Markers into slots, and tokens for nodes that are ending, are processed at once (T4, F12)."""
@@ -296,11 +295,36 @@ class Sending(State):
             line.unprocessed -= 1
             self.note_processed(line)
 
+    def leave_once(self) -> bool:
+        """Outputs of a firing that is over leave in its turn, as soon as those before have been processed (F14)."""
+        for station in self.stations:
+            if any(flight.leaving for flight in station.flights):
+                continue  # behind it
+            firings = station.firings_under_way
+            over = sorted((one for one in firings if one.over is not None), key=lambda one: one.over_since)
+            void = [one for one in over if one.void]  # goes nowhere, so it waits for nobody (F10)
+            if not void and station.leaf.options.ordered and over and over[0] is not firings[0]:
+                over = [one for one in firings[:1] if one.over is not None]
+            if over and self.may_leave(one := (void or over)[0]):
+                self.leave(one)
+                return True
+        return False
+
+    def may_leave(self, flight: Flight) -> bool:
+        """Whether nothing lies where the outputs of the firing go."""
+        says_nothing = flight.void or (flight.over is not None and flight.over[0] == "ended" and not flight.writes)
+        return says_nothing or self.outputs_are_free(flight.station.leaf.index)
+
+    def leave(self, flight: Flight) -> None:
+        """Send the outputs of a firing that is over."""
+        raise NotImplementedError
+
     def end_once(self) -> bool:
         """END follows on all outputs as soon as they are free (F4); then drained modifiers act (F12)."""
         for station in self.stations:
             index = station.leaf.index
-            if station.ending and not station.ended and station.flight is None and self.outputs_are_free(index):
+            busy = station.firings_under_way if station.is_concurrent else station.flights
+            if station.ending and not station.ended and not busy and self.outputs_are_free(index):
                 lines = self.in_order_of_outputs(station)
                 self.put_together(index, [(line, END, None, station.stamp) for line in lines])
                 while self.drain_once():  # the own END too, if it comes round
@@ -330,7 +354,11 @@ class Sending(State):
 
     def flush_once(self) -> bool:
         """Automatic events of changes outside a firing or call; then those of subgraphs (G2)."""
-        waiting = [station for station in self.stations if station.changes and station.flight is None]
+        waiting = [
+            station
+            for station in self.stations
+            if station.changes and not (station.is_calling if station.is_concurrent else station.flights)
+        ]
         if waiting:
             first = min(waiting, key=lambda station: station.changes[0][0])
             _, name, value = first.changes.pop(0)
@@ -378,7 +406,7 @@ class Sending(State):
         line = self.next_call(station.leaf.index)
         return (
             station.place is not None
-            and station.flight is None
+            and not station.flights
             and not station.afterwards
             and (line is None or line.queue[0].place > station.place)
         )

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hfg.errors import EndOfStream
+from hfg.errors import EndOfStream, NodeError
 from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, boundary_of, is_box, whole
 from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
 from hfg.token import END, NO_MESSAGE, Token
@@ -94,6 +94,11 @@ class Flight:
     results: dict[str, list[Any]] = field(default_factory=dict)
     slot: str = ""
     line: Line | None = None  # the edge a slot call took its token from
+    over: tuple[Any, NodeError | None] | None = None  # its outcome, while it waits until its outputs may leave (F14)
+    over_since: int = 0
+    leaving: bool = False
+    waits_to_end: bool = False  # it ends the node as soon as the firings that began before it are over (F14)
+    parameters: dict[str, Any] = field(default_factory=dict)  # as they were when it began
 
 
 @dataclass(eq=False)
@@ -107,7 +112,7 @@ class Station:
     ending: bool = False  # `end()` has been called; END is due
     ended: bool = False
     given_up: bool = False  # by R5: counts as ended, though it has sent no END
-    flight: Flight | None = None
+    flights: list[Flight] = field(default_factory=list)  # what is under way, in the order in which it began
     place: int | None = None  # since when it is enabled for a firing (F9)
     timed: float | None = None  # when, if a timer made it so
     rested: bool = False  # it worked for ended nodes only and may have given its place away
@@ -134,6 +139,38 @@ class Station:
     def path(self) -> str:
         """The node's path."""
         return self.leaf.path
+
+    @property
+    def concurrency(self) -> int:
+        """How many of its firings may be under way at once (F14)."""
+        return int(self.leaf.options.concurrency)
+
+    @property
+    def is_concurrent(self) -> bool:
+        """Whether that is more than one, so that its firings and calls do not exclude each other."""
+        return self.concurrency > 1
+
+    @property
+    def flight(self) -> Flight | None:
+        """What is under way; of several firings the one that began first."""
+        return self.flights[0] if self.flights else None
+
+    @property
+    def firings_under_way(self) -> list[Flight]:
+        """Its firings under way, those that wait until their outputs may leave included (F14)."""
+        return [flight for flight in self.flights if flight.what == "firing"]
+
+    @property
+    def is_calling(self) -> bool:
+        """Whether a slot call is under way."""
+        return any(flight.what == "call" for flight in self.flights)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether no firing may begin, because of what is under way (F1, F14)."""
+        if not self.is_concurrent:
+            return bool(self.flights)
+        return self.is_calling or bool(self.afterwards) or len(self.firings_under_way) >= self.concurrency
 
     @property
     def type(self) -> Any:
@@ -315,6 +352,8 @@ class State:
         station = self.stations[index]
         if not self.is_enabled(index) or station.ending or station.ended:
             return False
+        if station.is_concurrent and any(flight.kind == "end" for flight in station.flights):
+            return False  # the last of its firings has begun
         if station.type.process_kind == "none" and station.leaf.inside is None:
             return False
         if station.type.is_source and not self.started:
