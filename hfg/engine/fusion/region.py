@@ -447,7 +447,7 @@ class Region:
         for worker in self.order:
             worker.busy = "firing"
         code = self.core.code
-        code.begin(lender)
+        lender.set_out()
         self._after = code.late(lender, _nothing_more)
         self.sent_on()
         self.core.speaker = None
@@ -467,14 +467,14 @@ class Region:
         worker = self.order[k]
         gave_way = bool(self.amid)
         if gave_way:
-            self.core.code.end(lender)
+            lender.come_back()
             self._rest()
         lender.carrier, worker.carrier = worker.carrier, lender.carrier  # whoever cancels the node means this code
         self.detached = True
         self._note_exit(k)
         self.materialise(k, found)
         code = self.core.code
-        code.begin(worker)
+        worker.set_out()
         self._after = code.late(worker, firing.when_done(worker))
         self._left(gave_way)
         if gave_way:

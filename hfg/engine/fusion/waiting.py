@@ -116,7 +116,7 @@ def waiting_step(worker: Worker) -> Step:
             leave(None, error)
             return
         if result is PENDING:
-            code.begin(worker)
+            worker.set_out()
         else:
             leave(result, None)
 

@@ -144,12 +144,6 @@ class Code(Protocol):
     def drive(self, worker: Worker, coroutine: Any, done: Callable[[Any, BaseException | None], None]) -> None:
         """Take a coroutine of the worker's code to its end."""
 
-    def begin(self, worker: Worker) -> None:
-        """The worker's code waits now."""
-
-    def end(self, worker: Worker) -> None:
-        """The worker's code waits no more."""
-
     def late(
         self, worker: Worker, done: Callable[[Any, BaseException | None], None]
     ) -> Callable[[Any, BaseException | None], None]:
@@ -320,6 +314,14 @@ class Core:
         for worker in self.workers:
             if standing[worker] != worker.queued:
                 raise EngineInternalError(f'node "{worker.path}": it stands {standing[worker]} times in its run queue')
+
+    def set_out(self) -> None:
+        """Code waits, or runs in a thread: the run is not quiet before it has come back."""
+        self.in_flight += 1
+
+    def come_back(self) -> None:
+        """It is over, or given up."""
+        self.in_flight -= 1
 
     def number_workers(self) -> int:
         """Give a number that no worker of this run has yet."""

@@ -649,6 +649,31 @@ class Worker:
         """Its next firing is not an ordinary one: a marker lies before it."""
         self.special = True
 
+    def set_out(self) -> None:
+        """Its code waits, or runs in a thread, and its outcome comes later."""
+        self.in_flight = True
+        self.core.set_out()
+
+    def take_job(self, job: Any) -> None:
+        """A thread works for it: by this job, perhaps with others of its region."""
+        self.job = job
+
+    def come_back(self) -> None:
+        """Its code is over, or given up; a node that a thread has worked with sees its activity again."""
+        self.in_flight = False
+        self.core.come_back()
+        if self.job is not None:
+            self.leave_job()
+
+    def leave_job(self) -> None:
+        """What the thread did for it is over."""
+        self.job = None
+        self.node._active = self.active
+
+    def be_carried(self, carrier: Any) -> None:
+        """Its coroutines run in this dormant task from now on; None: the next one makes another."""
+        self.carrier = carrier
+
     # --- activity (A3, A5, A9) ----------------------------------------------------------------------------------------
 
     def become(self, active: bool) -> None:

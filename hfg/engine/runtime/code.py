@@ -112,7 +112,8 @@ class CodeRunner:
         """See `core.Code`."""
         carrier = worker.carrier
         if carrier is None:
-            carrier = worker.carrier = self.carrier(worker)
+            carrier = self.carrier(worker)
+            worker.be_carried(carrier)
         self.core.current = worker
         try:
             result = carrier.start(coroutine, self.late(worker, done))
@@ -124,7 +125,7 @@ class CodeRunner:
         if result is not PENDING:
             done(result, None)
             return
-        self.begin(worker)
+        worker.set_out()
         self._limit(worker)
 
     def carrier(self, worker: Worker) -> Carrier:
@@ -137,17 +138,7 @@ class CodeRunner:
         """X2: the firing may not take longer than its limit."""
         options = worker.options
         if options is not None and options.max_duration_s is not None and worker.busy == "firing":
-            worker.limit_timer = self.core.after(options.max_duration_s, lambda: errors.time_out(worker))
-
-    def begin(self, worker: Worker) -> None:
-        """See `core.Code`."""
-        worker.in_flight = True
-        worker.core.in_flight += 1
-
-    def end(self, worker: Worker) -> None:
-        """See `core.Code`."""
-        worker.in_flight = False
-        worker.core.in_flight -= 1
+            worker.limit(self.core.after(options.max_duration_s, lambda: errors.time_out(worker)))
 
     def late(self, worker: Worker, done: Done) -> Done:
         """See `core.Code`."""
@@ -155,7 +146,7 @@ class CodeRunner:
 
         def over(result: Any, error: BaseException | None) -> None:
             if worker.in_flight and (worker.carrier is carrier or carrier is None):
-                self.end(worker)
+                worker.come_back()
             elif carrier in self.given_up:
                 self.given_up.discard(carrier)
                 carrier.drop()  # its task has nothing to do any more
@@ -183,7 +174,7 @@ class CodeRunner:
         """See `core.Code`."""
         job = self._in_thread(workers[0], call, arguments, done, always=True)
         for worker in workers:
-            worker.job = job
+            worker.take_job(job)
 
     def _in_thread(
         self,
@@ -196,13 +187,13 @@ class CodeRunner:
     ) -> Job:
         group: Any = worker.group
         closing = self.core.over
-        self.begin(worker)
+        worker.set_out()
 
         def back(job: Job) -> None:
             if job is not worker_job:
                 return
             group.returned(job)
-            self._is_back(worker)
+            worker.come_back()
             if self.core.over:
                 self.came_back.set()
             if not self.core.over or closing or always:
@@ -211,27 +202,20 @@ class CodeRunner:
                 worker.core.inside.look_later()
 
         worker_job = Job(worker, back, call, arguments, done)
-        worker.job = worker_job
+        worker.take_job(worker_job)
         if isinstance(self.loop, VirtualTimeLoop):
             if not self.holds:
                 self._engine.beside_work = 0
             self.holds += 1
-            worker_job.held = self.loop.hold()
+            hold = self.loop.hold()
+            worker_job.hold(hold)
             limit = worker.options.max_duration_s if worker.busy == "firing" else None
             if limit is not None:
-                worker_job.held.limit(limit, partial(self.context.run, self._given_up, worker))
+                hold.limit(limit, partial(self.context.run, self._given_up, worker))
         else:
             self._limit(worker)
         group.submit(worker_job)
         return worker_job
-
-    def _is_back(self, worker: Worker) -> None:
-        """Its code is over, or given up."""
-        worker.in_flight = False
-        worker.core.in_flight -= 1
-        if worker.job is not None:
-            worker.job = None
-            worker.node._active = worker.active
 
     def hold_no_longer_than(self, seconds: float) -> None:
         """X3: after so many real seconds virtual time goes on without the work that is in threads now."""
@@ -248,7 +232,7 @@ class CodeRunner:
 
     def _came_in(self, job: Job) -> None:
         """Time does not stand still for it any more, and the pump need not wait for it."""
-        job.held = None
+        job.hold(None)
         self.holds -= 1
         self._engine.beside_work = 0
 
@@ -268,7 +252,7 @@ class CodeRunner:
         if type(result) is not CoroutineType:
             done(result, None)
             return
-        self.core.in_flight += 1
+        self.core.set_out()
 
         async def aside() -> None:
             error: BaseException | None = None
@@ -279,7 +263,7 @@ class CodeRunner:
             except BaseException as problem:
                 error = problem
             finally:
-                self.core.in_flight -= 1
+                self.core.come_back()
             if not self.core.over:
                 done(None, error)
                 self._engine.kick()
@@ -293,15 +277,16 @@ class CodeRunner:
         if not worker.in_flight:
             return
         job = worker.job
-        self._is_back(worker)
+        worker.come_back()
         group: Any = worker.group
         if group.threaded:
-            job.owner = lambda _job: None
+            job.disown()
             self._hold_no_more(job)
             amid = amid or worker
             group.abandon(f'"{amid.path}", firing {amid.firings}', job)
         else:
-            carrier, worker.carrier = worker.carrier, None
+            carrier = worker.carrier
+            worker.be_carried(None)
             self.given_up.add(carrier)
             carrier.cancel()
 
@@ -313,18 +298,14 @@ class CodeRunner:
         own = whose_code() is worker  # its own code waits for us, not we for it
         while worker.full_edges and core.started and not core.over:
             waiter: asyncio.Future[None] = self.loop.create_future()
-            if worker.room_waiters is None:
-                worker.room_waiters = []
-            worker.room_waiters.append(partial(answer, waiter, None))
-            worker.waiting_room += own
-            core.waiting_room += own
+            worker.when_room(partial(answer, waiter, None))
+            worker.code_waits_for_room(own)
             self._look_for_room()
             core.host.kick()
             try:
                 await waiter
             finally:
-                worker.waiting_room -= own
-                core.waiting_room -= own
+                worker.code_waits_for_room(-own)
                 self._look_for_room()
 
     def _look_for_room(self) -> None:

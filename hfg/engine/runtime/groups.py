@@ -149,6 +149,29 @@ class Job:
         self.result: Any = None
         self.error: BaseException | None = None
 
+    def begin(self, now: float) -> None:
+        """It is given to a thread, where the time that it takes is shared."""
+        self.began = now
+
+    def run(self) -> None:
+        """In the thread: make the call, and keep what comes of it."""
+        try:
+            self.result = self.call(*self.arguments)
+        except BaseException as error:
+            self.error = error
+
+    def hold(self, held: Any) -> None:
+        """This keeps virtual time from passing until it is back; None: nothing does any more."""
+        self.held = held
+
+    def disown(self) -> None:
+        """Nobody wants to hear of it any more."""
+        self.owner = _nobody
+
+
+def _nobody(_job: Job) -> None:
+    """To whom a job comes back that was given up."""
+
 
 class ThreadGroup(Group):
     """A thread of its own. The loop decides what it does next; results and signals come back in order.
@@ -210,7 +233,7 @@ class ThreadGroup(Group):
             self._lane = _Lane(self.name, self._deliver, self._context.copy())
         self.running += 1
         if self.fair is not None:
-            job.began = self.clock()
+            job.begin(self.clock())
         self._lane.jobs.put(job)
 
     def returned(self, job: Job) -> None:
@@ -240,8 +263,7 @@ class ThreadGroup(Group):
             self.charge(job.worker, self.clock() - job.began)
         lane, self._lane = self._lane, None
         if lane is not None:
-            lane.given_up = True
-            lane.jobs.put(None)
+            lane.give_up()
             self.abandoned.append((what, lane.thread))
         self.running = 0
         if len(self.policy):
@@ -286,12 +308,14 @@ class _Lane:
         if first:
             self._deliver(self._out)
 
+    def give_up(self) -> None:
+        """What its thread still brings is too late; it ends by itself."""
+        self.given_up = True
+        self.jobs.put(None)
+
     def _live(self) -> None:
         self._local.lane = self
         while (job := self.jobs.get()) is not None:
-            try:
-                job.result = job.call(*job.arguments)
-            except BaseException as error:
-                job.error = error
+            job.run()
             self.send(job)
             del job

@@ -151,7 +151,7 @@ class Iteration:
         self._elements = list(zip(*columns, strict=True))
         self._position = 0
         self._results = [[] for _ in self.worker.type.outputs]
-        self.worker.core.code.begin(self.worker)
+        self.worker.set_out()
         self._next()
 
     def _next(self) -> None:
