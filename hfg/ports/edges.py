@@ -31,6 +31,7 @@ class Edge:
       mandatory: whether it feeds a mandatory input (F4's m).
       sent, dropped, drained: counts for the report; `sent` is also the number of the newest token.
       live: whether both ends are enabled (SEMANTICS, "live edge").
+      sequential: what lies on it is processed when the consumer's outputs are, not when it is taken (F5).
       follows: what it enables goes before all else of the group (R2): sequential, within one group, first in first out.
       while_active: the slot it leads into listens only while its node is active (T4).
       ended: the consumer has taken END from it and waits for it no more (F4).
@@ -59,6 +60,7 @@ class Edge:
         "position",
         "segments",
         "sent",
+        "sequential",
         "source",
         "source_port",
         "tap",
@@ -86,6 +88,7 @@ class Edge:
         self.dropped = 0
         self.drained = 0
         self.live = True
+        self.sequential = False
         self.follows = False
         self.ended = False
         self.via: tuple[Any, ...] = ()
@@ -94,6 +97,49 @@ class Edge:
         self.target_port: Any = None
         self.handler: Callable[[Any], Any] | None = None
         self.tap: Callable[[Token[Any]], None] | None = None
+
+    def join(self, source: Any, target: Any) -> None:
+        """It leads from here to there."""
+        self.source = self.waits = source
+        self.target = target
+
+    def enter(self, kind: str, name: str, position: int, mandatory: bool) -> None:
+        """It leads into this input or parameter of its target."""
+        self.target_kind = kind
+        self.port_name = name
+        self.position = position
+        self.mandatory = mandatory
+
+    def enter_slot(self, name: str, handler: Callable[[Any], Any] | None, while_active: bool) -> None:
+        """It leads into this slot of its target."""
+        self.target_kind = "slot"
+        self.port_name = name
+        self.handler = handler
+        self.while_active = while_active
+
+    def stand_for(self, segments: tuple[Any, ...], source_port: Any, target_port: Any, via: tuple[Any, ...]) -> None:
+        """This is what it is in the drawn graph."""
+        self.segments = segments
+        self.source_port = source_port
+        self.target_port = target_port
+        self.via = via
+
+    def be_released(self, *, sequential: bool, follows: bool) -> None:
+        """So the consumer's mode has it, and where both of them run (F5, R2)."""
+        self.sequential = sequential
+        self.follows = follows
+
+    def rename(self, label: str) -> None:
+        """Traces and reports call it so from now on."""
+        self.label = label
+
+    def renumber(self, index: float) -> None:
+        """It comes here in the order of all."""
+        self.index = index
+
+    def carry(self, active: bool) -> None:
+        """Whether it carries activity from now on (A1)."""
+        self.active = active
 
     def number(self) -> int:
         """One more token is put on it: this is its number (T5)."""
@@ -141,10 +187,9 @@ class SyncEdge(Edge):
     Attributes:
       token: the untaken token, or None.
       held: from the sending until it counts as processed (F5): the producer's place is occupied.
-      sequential: processed when the consumer's outputs are, not when the consumer has taken it (F5).
     """
 
-    __slots__ = ("held", "sequential", "token")
+    __slots__ = ("held", "token")
 
     def __init__(self, index: float, label: str, active: bool) -> None:
         super().__init__(index, label, active)
@@ -262,18 +307,15 @@ class BufferEdge(_QueueEdge):
     Attributes:
       queue: untaken tokens.
       room: how many may lie here while the producer goes on: the places of the buffer and the initial tokens.
-      sequential: a token holds its place until the consumer's outputs are processed (F5). Never with initial tokens: a
-        delay ends the wave.
       working: of a sequential one: the consumer has taken a token that is not processed yet.
       held: the producer's newest token counts as unprocessed, for there is no room for it.
     """
 
-    __slots__ = ("held", "room", "sequential", "working")
+    __slots__ = ("held", "room", "working")
 
     def __init__(self, index: float, label: str, active: bool, initial: tuple[Any, ...], buffer: int) -> None:
         super().__init__(index, label, active, initial)
         self.room = len(initial) + buffer
-        self.sequential = False
         self.working = False
         self.held = False
 
@@ -370,6 +412,15 @@ class EventEdge(_QueueEdge):
         self.pipeline: Callable[[Token[Any]], None] | None = None
         self.complete: Callable[[], None] | None = None
         self.renew: Callable[[], None] | None = None
+
+    def pipe(self, feed: Callable[[Token[Any]], None], complete: Callable[[], None] | None) -> None:
+        """P9: tokens go through operators before they lie on it, or to what stands for those at first."""
+        self.pipeline = feed
+        self.complete = complete
+
+    def pipe_afresh_by(self, renew: Callable[[], None]) -> None:
+        """P9: so its operators are connected again, for a node that starts afresh."""
+        self.renew = renew
 
     def fill(self) -> bool:
         """F8: whether it has just become full, so that its source starts nothing new."""

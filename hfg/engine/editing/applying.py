@@ -7,7 +7,7 @@ edges that are gone is given back or counted. Costs what the diff holds. Nothing
 from __future__ import annotations
 
 from bisect import bisect_left, insort
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from hfg.engine.editing.plan_diff import PlanDiff
@@ -15,8 +15,8 @@ from hfg.engine.editing.plan_index import PlanIndex, edge_place, home_of, node_p
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
-from hfg.engine.model.scopes import Scope
-from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, TORN_DOWN, Worker
+from hfg.engine.model.scopes import Gate, Scope
+from hfg.engine.model.worker import DISABLED, ENDED, RATE, REMOVED, RESTING, STARTING, Worker
 from hfg.engine.rules import lifecycle, wiring
 from hfg.engine.rules.activity import rest
 from hfg.engine.rules.agenda import note_full
@@ -33,7 +33,6 @@ from hfg.graph.structure.edge import is_feed
 from hfg.graph.structure.level import level_of
 from hfg.ports.automatic import AUTOMATIC_EVENTS
 from hfg.ports.edges import BufferEdge, EventEdge
-from hfg.token import Token
 from hfg.trace import ActivityLost
 
 __all__ = ["apply"]
@@ -121,17 +120,11 @@ class _Applying:
                 self.core.edges.remove(edge)
                 found.lost.append(edge)
         for edge in found.lost:
-            edge.live = False
+            edge.enliven(False)
             plan.unwire(edge)
-            self.touched |= {edge.source: None, edge.target: None}
+            self._touch_ends(edge)
         for worker in found.gone:
-            worker.blocked |= TORN_DOWN | REMOVED
-            worker.pending_end = False
-            worker.block(REMOVED)
-            if worker.queued:
-                worker.group.policy.remove(worker)
-                worker.queued = False
-            worker.step = _no_step
+            worker.leave_plan()
 
     # --- nodes
 
@@ -147,38 +140,22 @@ class _Applying:
             del index.by_node[old]
             index.by_node[node] = worker
             self._list_source(worker, False)
-            plan.fit(worker, node)
+            worker.fit(node)
             self._list_source(worker, worker.is_source)
-            worker.wired_out = ((),) * len(worker.out_names)
-            worker.handlers, worker.plain_handlers = {}, {}
-            known = (*worker.type.events, *AUTOMATIC_EVENTS)
-            worker.events = {name: event for name, event in worker.events.items() if name in known}
             self.touched[worker] = None
+
+    def _touch_ends(self, edge: Any) -> None:
+        self.touched |= {edge.source: None, edge.target: None}
 
     def _is_refitted(self, edge: Any) -> bool:
         return edge.source in self.refitted or edge.target in self.refitted
 
     def place(self) -> None:
         """Let everybody be where a plan made afresh would have him."""
-        core, index, found = self.core, self.index, self.found
-        for worker in found.boxes_gone:
-            scope = worker.scope
-            assert scope is not None
-            if not scope.enabled:  # without it they stay as disabled as they were (G1)
-                for member in scope.members:
-                    member.own_enabled = False
-        for worker in (*found.gone, *found.placed):
-            self._take_out(worker)
-        for worker in (*found.boxes_gone, *found.boxes_placed):
-            self._take_out_scope(worker)
-        for worker in (*found.gone, *found.boxes_gone):
-            del index.by_node[worker.node]
-            index.order.forget(worker.node)
-        for worker in (*found.gone, *found.boxes_gone, *found.renamed):
-            if core.by_path.get(worker.path) is worker:
-                del core.by_path[worker.path]
+        found = self.found
+        self._take_all_out()
         for worker in (*found.renamed, *found.placed, *found.boxes_placed):
-            worker.path = worker.node._place.path
+            worker.rename(worker.node._place.path)
         boxes = {worker.node: worker for worker in found.boxes_placed} | dict.fromkeys(found.boxes_come)
         for box in sorted(boxes, key=node_place):
             self._put_in_scope(box, boxes[box])
@@ -190,8 +167,26 @@ class _Applying:
             self._regroup(worker, options)
         for worker in self.come:
             if not worker.own_enabled or any(not scope.enabled for scope in worker.around):
-                worker.blocked |= DISABLED
+                worker.block(DISABLED)
         self.touched |= self.elsewhere
+
+    def _take_all_out(self) -> None:
+        """What goes is nowhere any more, and what is to be elsewhere neither, for the moment."""
+        core, index, found = self.core, self.index, self.found
+        for scope in (worker.scope for worker in found.boxes_gone):
+            assert scope is not None
+            for member in scope.members if not scope.enabled else ():
+                member.enable_itself(False)  # without it they stay as disabled as they were (G1)
+        for worker in (*found.gone, *found.placed):
+            self._take_out(worker)
+        for worker in (*found.boxes_gone, *found.boxes_placed):
+            self._take_out_scope(worker)
+        for worker in (*found.gone, *found.boxes_gone):
+            del index.by_node[worker.node]
+            index.order.forget(worker.node)
+        for worker in (*found.gone, *found.boxes_gone, *found.renamed):
+            if core.by_path.get(worker.path) is worker:
+                del core.by_path[worker.path]
 
     def _take_out(self, worker: Worker) -> None:
         core, index = self.core, self.index
@@ -215,7 +210,7 @@ class _Applying:
             insort(scope.members, worker, key=label)
             self.scopes[scope] = None
         self._list_source(worker, worker.is_source)
-        worker.around = around
+        worker.lie_in(around)
         self.elsewhere[worker] = None
 
     def _list_source(self, worker: Worker, is_one: bool) -> None:
@@ -248,28 +243,25 @@ class _Applying:
         if worker is None:
             path = box._place.path
             said = FlatScope(0, path, box, None, self.found.boxes_come[box], [])
-            scope = Scope(0, path, parent)
-            worker = plan.add_scope(core, said, scope, self.groups["loop"])
+            scope, worker = plan.add_scope(core, said, parent, self.groups["loop"])
             index.by_node[box] = worker
         else:
             assert worker.scope is not None
             scope = worker.scope
-            scope.path, scope.parent = worker.path, parent
-            if parent is not None:
-                parent.children.append(scope)
+            scope.move(worker.path, parent)
         core.by_path[worker.path] = worker
         position = bisect_left(index.scopes.items, node_place(box), key=lambda one: node_place(one.node))
         numbering = index.scopes.numbering
         index.scopes.insert(position, worker)
         for one in (worker,) if numbering == index.scopes.numbering else index.scopes.items:
             assert one.scope is not None
-            one.scope.index = index.scopes.label(one)
+            one.scope.renumber(index.scopes.label(one))
         core.scopes.insert(position, scope)
         core.workers.insert(len(index.leaves.items) + position, worker)
         if parent is not None:
-            parent.children.sort(key=lambda one: one.index)
+            parent.children.sort(key=_index)
             self.scopes[parent] = None
-        worker.around = scope.and_around()
+        worker.lie_in(scope.and_around())
         self.scopes[scope] = None
         self.elsewhere[worker] = None
 
@@ -277,48 +269,58 @@ class _Applying:
         """It has another path, and so has all inside it."""
         self.core.by_path[worker.path] = worker
         if worker.scope is not None:
-            worker.scope.path = worker.path
+            worker.scope.rename(worker.path)
         if worker.iteration is not None:
             _rename_inside(worker.iteration.core)
 
     def _regroup(self, worker: Worker, options: Any) -> None:
         """It may run elsewhere from now on."""
-        worker.options = options
+        worker.set_options(options)
         group = self.groups[options.group or "loop"]
         if group is worker.group:
             return
-        if worker.queued:
-            worker.group.policy.remove(worker)
-            worker.queued = False
-        worker.group, worker.push, worker.push_next = group, group.push, group.push_next
+        worker.regroup(group)
         self.touched[worker] = None
         for edge in (*worker.edges_in(), *worker.all_out_edges()):
-            self.touched |= {edge.source: None, edge.target: None}
+            self._touch_ends(edge)
             self._derive_release(edge)
 
     # --- edges
 
     def connect(self) -> list[tuple[Any, FlatEdge]]:
         """Lead new edges where they belong, and let those that stay be what is said about them now."""
-        core, index, found = self.core, self.index, self.found
         relabelled = self._called_otherwise()
-        numbering = index.edges.numbering
-        for edge in found.old:
-            del core.edges[index.edges.remove(edge)]
-            index.forget(edge)
+        for edge in self.found.old:
+            del self.core.edges[self.index.edges.remove(edge)]
+            self.index.forget(edge)
+        ways = self._list_edges()
+        for edge, way, is_new in ways:
+            if is_new or self._is_refitted(edge):
+                plan.wire(edge, way)
+                self._touch_ends(edge)
+            if not is_new:
+                self._say(edge, way)
+        self._lead_in_from_outside()
+        listed = [edge for edge, _, _ in ways]
+        self._label(relabelled, listed)
+        for source in {edge.source: None for edge in listed}:
+            source.sort_outgoing()
+        return [(edge, way) for edge, way, is_new in ways if is_new]
+
+    def _list_edges(self) -> list[tuple[Any, FlatEdge, bool]]:
+        """Let all that were looked at be in their places in the order; gives them, and which of them are new."""
+        core, index = self.core, self.index
         ends = _Ends(core, index, self.groups["loop"])
-        new: list[tuple[Any, FlatEdge]] = []
-        listed = []
+        numbering = index.edges.numbering
+        ways: list[tuple[Any, FlatEdge, bool]] = []
         begin, position = None, 0
-        for way, running in found.ways:
-            if running is None:
+        for way, running in self.found.ways:
+            edge = running
+            if edge is None:
                 edge = plan.make_edge(core, way, ends)
-                new.append((edge, way))
                 self.new_edges.append(edge)
             else:
-                edge = running
-                plan.describe(edge, way)
-                edge.via = ends.scopes_of(way)
+                plan.describe(edge, way, ends)
             if way.segments[0] is not begin:
                 begin = way.segments[0]
                 position = self._spot(begin)
@@ -326,23 +328,17 @@ class _Applying:
             core.edges.insert(position, edge)
             index.note(edge)
             position += 1
-            listed.append(edge)
-        for edge in listed if numbering == index.edges.numbering else index.edges.items:
-            edge.index = index.edges.label(edge)
-        for edge, (way, running) in zip(listed, found.ways, strict=True):
-            if running is None or self._is_refitted(edge):
-                plan.wire(edge, way)
-                self.touched |= {edge.source: None, edge.target: None}
-            if running is not None:
-                self._say(edge, way)
-        for edge in self.core.outside.values() if self.refitted or found.renamed else ():
+            ways.append((edge, way, running is None))
+        for edge in [edge for edge, _, _ in ways] if numbering == index.edges.numbering else index.edges.items:
+            edge.renumber(index.edges.label(edge))
+        return ways
+
+    def _lead_in_from_outside(self) -> None:
+        """Edges from outside the graph lead to the same slots of nodes that are others now, or are called otherwise."""
+        for edge in self.core.outside.values() if self.refitted or self.found.renamed else ():
             if edge.target in self.refitted:
-                plan.lead_in(edge)
-            if edge.target.path:
-                edge.label = f"outside -> {edge.target.path}.{edge.port_name}"
-        self._label(relabelled, listed)
-        self._sort({edge.source: None for edge in listed})
-        return new
+                edge.target.lead_in(edge, "slot", edge.port_name)
+            edge.rename(plan.outside_label(edge.target, edge.port_name))
 
     def _spot(self, begin: Any) -> int:
         """Before which edge of the plan those come that begin with a drawn one."""
@@ -356,7 +352,7 @@ class _Applying:
     def _say(self, edge: Any, way: FlatEdge) -> None:
         """What is said about an edge that stays."""
         if edge.active != way.active:
-            edge.active = way.active
+            edge.carry(way.active)
             self.touched[edge.source] = None
         self._derive_release(edge)
 
@@ -364,32 +360,16 @@ class _Applying:
         """Whether it is released in sequence, which depends on the groups at its ends (F5)."""
         if type(edge) is EventEdge:
             return
-        before, edge.sequential = edge.sequential, plan.is_sequential(edge)
-        edge.follows = plan.follows(edge)
+        before = edge.sequential
+        plan.derive_release(edge)
         target: Worker = edge.target
         if not before or edge.sequential:
             return
         # what it has taken is processed by that (F5)
         if edge in target.taken and (target.held or target.busy in ("firing", "ending")):
-            target.taken = tuple(one for one in target.taken if one is not edge)
-            release((edge,))
+            release(target.release_early((edge,)))
         elif edge is target.call_edge and edge.token is None:
             release((edge,))
-
-    def _sort(self, sources: Iterable[Worker]) -> None:
-        """Let the edges of each source be in order, and the outputs that its parameters have got (P8)."""
-        for worker in sources:
-            worker.wired_out = tuple(tuple(sorted(edges, key=_index)) for edges in worker.wired_out)
-            for event in worker.events.values():
-                event.edges = tuple(sorted(event.edges, key=plan.slots_first))
-            declared = len(worker.type.outputs) if worker.type is not None else len(worker.out_names)
-            if len(worker.out_names) > declared + 1:
-                made = sorted(
-                    zip(worker.out_names[declared:], worker.wired_out[declared:], strict=True),
-                    key=lambda one: one[1][0].index,
-                )
-                worker.out_names = (*worker.out_names[:declared], *(name for name, _ in made))
-                worker.wired_out = (*worker.wired_out[:declared], *(edges for _, edges in made))
 
     # --- labels
 
@@ -424,9 +404,9 @@ class _Applying:
                 label = f"{base} #{number}"
             labels[label] = edge
             if edge.label != label:
-                edge.label = label
+                edge.rename(label)
                 self.named.append(edge)
-                self.touched |= {edge.source: None, edge.target: None}  # fast paths know the label
+                self._touch_ends(edge)  # fast paths know the label
 
     # --- gates
 
@@ -434,40 +414,34 @@ class _Applying:
         """Set gates anew if any may gate others than before (A11); costs by what they gate."""
         core, found = self.core, self.found
         some_moved = self.elsewhere or found.gone or found.boxes_gone or found.swapped
-        if not found.gates and not (core.gates and some_moved):
-            self._watch()
-            return
-        before = {worker: None for gate in core.gates for worker in gate.workers}
-        states = {gate.state: None for gate in core.gates}
-        for worker in before:
-            worker.gates_over = ()
-            worker.paced = bool(worker.options is not None and worker.options.max_rate_hz)
-        for state in states:
-            state.gates = []
-        core.gates = []
-        for gate in _gates_of(self.graph):
-            target, by = self.index.by_node[gate.target], self.index.by_node[gate.by]
-            gated = [target] if target.scope is None else target.scope.members
-            plan.set_gate(core, by.scope or by, gated, gate.idle_rate_hz)
-        for gate in core.gates:
-            states[gate.state] = None
-            for worker in gate.workers:
-                if worker not in before:
-                    worker.gate_next = float("-inf")  # an idle rate counts from the first firing behind the gate
-                    before[worker] = None
-        self.touched |= before
-        for state in states:
-            if isinstance(state, Scope):
-                self.scopes[state] = None
-            else:
-                self.touched[state] = None
+        if found.gates or (core.gates and some_moved):
+            self._set_gates_anew()
         self._watch()
+
+    def _set_gates_anew(self) -> None:
+        core = self.core
+        gated = {worker: None for gate in core.gates for worker in gate.workers}
+        states = {gate.state: None for gate in core.gates}
+        for worker in gated:
+            worker.be_ungated()
+        for state in states:
+            state.forget_gates()
+        core.gates.clear()
+        for drawn in _gates_of(self.graph):
+            target, by = self.index.by_node[drawn.target], self.index.by_node[drawn.by]
+            inside = [target] if target.scope is None else target.scope.members
+            core.gates.append(Gate(by.scope or by, drawn.idle_rate_hz, inside))
+        states |= {gate.state: None for gate in core.gates}
+        for worker in {worker: None for gate in core.gates for worker in gate.workers if worker not in gated}:
+            worker.note_gated_start(float("-inf"))  # an idle rate counts from the first firing behind the gate
+            gated[worker] = None
+        self.touched |= gated
+        self.scopes |= {state: None for state in states if isinstance(state, Scope)}
+        self.touched |= {state: None for state in states if isinstance(state, Worker)}
 
     def _watch(self) -> None:
         """Whose activity somebody cares about, now that nodes are elsewhere, and edges lead from other ports (G2)."""
-        for worker in self.elsewhere:
-            worker.scopes = tuple(scope for scope in worker.around if scope.watched and scope is not worker.scope)
-        for edge in (*self.found.lost, *(edge for edge in self.new_edges)):
+        for edge in (*self.found.lost, *self.new_edges):
             for worker in (edge.source, edge.target):
                 self.scopes |= dict.fromkeys(worker.around)
         gone = {worker.scope for worker in self.found.boxes_gone}
@@ -482,44 +456,32 @@ class _Applying:
 
     def go_on(self, new: list[tuple[Any, FlatEdge]]) -> None:
         """Derive what follows, then let go what lay on edges that are gone."""
-        core, found = self.core, self.found
         for worker in self.come:
-            worker.blocked &= ~STARTING
+            worker.allow(STARTING)
             ports.bind_automatic(worker)
         for edge, _ in new:
-            edge.live = wiring.is_live(edge)
-            if isinstance(edge, BufferEdge | EventEdge) and edge.initial:
-                _lay(edge)
-                lifecycle.discard_initial((edge,))
-                if edge.target.blocked & ENDED:
-                    drain_left((edge,))
+            self._begin(edge)
         self._derive_live()
         touched = [worker for worker in self.touched if not worker.blocked & REMOVED]
-        for worker in touched:
-            self._bind(worker)
-            plan.watch(worker)
-            if worker.active_timer is not None:
-                worker.active_timer.recount(worker.timeout_leads_somewhere())
-        for worker in touched:
-            wiring.rewire(worker)
-            if worker.is_source and (worker.gates_over or worker.blocked & (RESTING | RATE)):
-                rest(worker)
-        with telling_behind(core):
-            for edge in found.lost:
-                discard(edge, "removed")
-                if not isinstance(edge, EventEdge):
-                    release((edge,))
-            for worker in found.gone:
-                if worker.active and worker.scope is None:
-                    core.lost_activity += 1
-                    if core.trace is not None:
-                        core.trace(ActivityLost(core.now(), worker.path))
-            touch(core, [scope for scope in self.scopes if scope.watched])
+        self._derive_anew(touched)
+        with telling_behind(self.core):
+            self._let_go()
         for worker in touched:
             if not worker.busy:
                 flush_automatic(worker)
         lifecycle.disable_around(worker for worker in touched if any(not scope.enabled for scope in worker.around))
-        judge_sources(core)
+        judge_sources(self.core)
+
+    def _begin(self, edge: Any) -> None:
+        """An edge begins: if it has initial tokens, they lie on it now (P7)."""
+        edge.enliven(wiring.is_live(edge))
+        if isinstance(edge, BufferEdge | EventEdge) and edge.initial:
+            edge.begin(self.core.now())
+            if isinstance(edge, EventEdge):
+                note_full(edge)
+            lifecycle.discard_initial((edge,))
+            if edge.target.blocked & ENDED:
+                drain_left((edge,))
 
     def _derive_live(self) -> None:
         """Edges are live or not by the subgraphs around their ends and on their way."""
@@ -529,8 +491,34 @@ class _Applying:
         for edge in edges:
             live = wiring.is_live(edge)
             if live != edge.live:
-                edge.live = live
-                self.touched |= {edge.source: None, edge.target: None}
+                edge.enliven(live)
+                self._touch_ends(edge)
+
+    def _derive_anew(self, touched: list[Worker]) -> None:
+        """What they wait for, what they send on, and what somebody wants to know of them."""
+        for worker in touched:
+            self._bind(worker)
+            worker.watch()
+            if worker.active_timer is not None:
+                worker.active_timer.recount(worker.timeout_leads_somewhere())
+        for worker in touched:
+            wiring.rewire(worker)
+            if worker.is_source and (worker.gates_over or worker.blocked & (RESTING | RATE)):
+                rest(worker)
+
+    def _let_go(self) -> None:
+        """What lay on edges that are gone counts as processed; the activity of nodes that are gone is lost (A8)."""
+        core = self.core
+        for edge in self.found.lost:
+            discard(edge, "removed")
+            if not isinstance(edge, EventEdge):
+                release((edge,))
+        for worker in self.found.gone:
+            if worker.active and worker.scope is None:
+                core.lost_activity += 1
+                if core.trace is not None:
+                    core.trace(ActivityLost(core.now(), worker.path))
+        touch(core, [scope for scope in self.scopes if scope.watched])
 
     def changed_nodes(self) -> set[Any]:
         """The nodes and subgraphs at which something is not as it was."""
@@ -555,25 +543,18 @@ class _Applying:
         specialise(worker)
 
 
-def _lay(edge: Any) -> None:
-    """Initial tokens of an edge that begins now (P7)."""
-    now = edge.target.core.now()
-    edge.queue.extend(Token(value, 0, now, 0) for value in edge.initial)
-    if isinstance(edge, EventEdge):
-        note_full(edge)
-
-
 def _rename_inside(core: Core) -> None:
     """A subgraph that iterates has another path, and so has all inside it."""
     for worker in core.workers:
         if worker.node is not None:
-            worker.path = worker.node._place.path
+            worker.rename(worker.node._place.path)
         if worker.iteration is not None:
             _rename_inside(worker.iteration.core)
     for edge in core.edges:
         if edge.segments:
-            edge.label = edge.label.replace(_base(edge.label), _name(edge))
-    core.by_path = {worker.path: worker for worker in core.workers if worker.path}
+            edge.rename(edge.label.replace(_base(edge.label), _name(edge)))
+    core.by_path.clear()
+    core.by_path.update((worker.path, worker) for worker in core.workers if worker.path)
 
 
 def _index(edge: Any) -> float:
@@ -600,8 +581,3 @@ def _gates_of(graph: Graph) -> list[Any]:
     levels = [level for level in level_of(graph).walk() if level.gates.listed]
     levels.sort(key=lambda level: () if level.owner is None else node_place(level.owner))
     return [gate for level in levels for gate in level.gates]
-
-
-def _no_step(worker: Worker) -> None:
-    """It is gone."""
-    worker.queued = False

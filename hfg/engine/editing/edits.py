@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Collection, Coroutine, Iterable, Sequence
+from collections.abc import Callable, Collection, Coroutine, Iterable, Sequence, Set
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -22,6 +22,7 @@ from hfg.engine.editing.plan_diff import PlanDiff, diff
 from hfg.engine.editing.plan_index import PlanIndex, node_place
 from hfg.engine.editing.setting import refuse_without_effect
 from hfg.engine.editing.turns import Turns
+from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
 from hfg.engine.rules import lifecycle, subgraphs
 from hfg.engine.runtime import plan
@@ -44,6 +45,27 @@ __all__ = ["Edits"]
 
 _Switched = dict[Worker, bool]
 """Nodes and subgraphs, and whether they are enabled or disabled."""
+
+
+class _Following:
+    """One edit, and what is known of it on its way into the run.
+
+    Attributes:
+      changes: what was done to the drawn graph.
+      how: what that means to the plan.
+      switched: who is enabled or disabled by it.
+      values: parameters with which nobody works yet.
+      come: new nodes, of which the setup has begun.
+      took_effect: from here on nothing is taken back.
+    """
+
+    def __init__(self, changes: Sequence[Change]) -> None:
+        self.changes = changes
+        self.how = PlanDiff()
+        self.switched: _Switched = {}
+        self.values: list[ParameterChange] = []
+        self.come: list[Worker] = []
+        self.took_effect = False
 
 
 class Edits:
@@ -111,90 +133,99 @@ class Edits:
           the workers that are gone and have yet to be torn down, for which the next edit does not wait.
         """
         engine = self._engine
-        come: list[Worker] = []
-        waiting: list[ParameterChange] = []  # values with which nobody works yet
-        took_effect = False
+        edit = _Following(changes)
         engine.hold()
         try:
-            if self._index is None:
-                self._index = PlanIndex(engine.core)
-            how = diff(self._graph, self._index, changes)
-            if check and how.doubtful:
-                self._refuse_errors()
-            switched = self._switched(changes)
-            waiting = self._values_of_running_nodes(changes)
-            undo_all(waiting)  # they work with the old ones until their firings are over
-            self._refuse_without_effect(waiting, how, switched)
-            touched = self._touched(how, switched, waiting)
+            self._find_out(edit, check=check)
+            touched = self._touched(edit)
             self._turns.wait_for(touched)
-            await self._set_up(how, come)
+            await self._set_up(edit)
             self._turns.wait_for(touched)
             async with Held(engine, touched) as held:
                 self._turns.wait_for(())
-                await self._exchange_nodes(how)
-                fresh = self._to_start_afresh(switched)
-                self._refuse_without_effect(waiting, how, switched)
-                starting = {worker.node for worker in fresh}
-                for value in [value for value in waiting if value.node in starting]:
-                    value.do()
-                    waiting.remove(value)
-                for worker in fresh:
-                    self._turns.wait_for((worker,))
-                    await self._hook(worker, lifecycle.tear_down)
-                    await self._hook(worker, lifecycle.set_up)
+                await self._exchange_nodes(edit.how)
+                fresh = await self._begin_afresh(edit)
                 self._need_run()
-                for value in waiting:
+                for value in edit.values:
                     value.do()
-                took_effect = held.done = True
+                edit.took_effect = held.done = True
                 note()
                 if engine.core.trace is not None:
                     engine.core.trace(StructureChanged(engine.core.now(), what))
-                self._switch(switched, fresh)
-                self._take_effect(how, come, changes)
+                self._switch(edit.switched, fresh)
+                self._take_effect(edit)
         except BaseException:
-            if not took_effect:
-                undo_all([change for change in changes if change not in waiting])
-                self._turns.wait_for(come)
-                await self._to_its_end(self._tear_down(come))
+            if not edit.took_effect:
+                undo_all([change for change in changes if change not in edit.values])
+                self._turns.wait_for(edit.come)
+                await self._to_its_end(self._tear_down(edit.come))
             raise
         finally:
             engine.unhold()
-        return how.gone
+        return edit.how.gone
+
+    def _find_out(self, edit: _Following, *, check: bool) -> None:
+        """What the changes mean to the run; what no run can follow is refused."""
+        if self._index is None:
+            self._index = PlanIndex(self._engine.core)
+        edit.how = diff(self._graph, self._index, edit.changes)
+        if check and edit.how.doubtful:
+            self._refuse_errors()
+        edit.switched = self._switched(edit.changes)
+        edit.values = self._values_of_running_nodes(edit.changes)
+        undo_all(edit.values)  # they work with the old ones until their firings are over
+        self._refuse_without_effect(edit)
+
+    async def _begin_afresh(self, edit: _Following) -> list[Worker]:
+        """Tear down and set up who is to be enabled, with its new values; gives them back."""
+        fresh = self._to_start_afresh(edit.switched)
+        self._refuse_without_effect(edit)
+        starting = {worker.node for worker in fresh}
+        for value in [value for value in edit.values if value.node in starting]:
+            value.do()
+            edit.values.remove(value)
+        for worker in fresh:
+            self._turns.wait_for((worker,))
+            await self._hook(worker, lifecycle.tear_down)
+            await self._hook(worker, lifecycle.set_up)
+        return fresh
 
     def _values_of_running_nodes(self, changes: Sequence[Change]) -> list[ParameterChange]:
         values = [change for change in changes if isinstance(change, ParameterChange)]
         running = {worker.node for worker in self._engine.all_workers()} if values else set()
         return [value for value in values if value.node in running]
 
-    def _refuse_without_effect(self, values: Sequence[ParameterChange], how: PlanDiff, switched: _Switched) -> None:
+    def _refuse_without_effect(self, edit: _Following) -> None:
         """P8: what the code that runs cannot see is refused, unless the node begins afresh by this very edit."""
-        if not values:
+        if not edit.values:
             return
-        afresh = {*how.gone, *(worker for worker, _, _ in how.swapped), *self._to_start_afresh(switched)}
+        how = edit.how
+        afresh = {*how.gone, *(worker for worker, _, _ in how.swapped), *self._to_start_afresh(edit.switched)}
         refuse_without_effect(
-            [(value.node, value.name) for value in values],
+            [(value.node, value.name) for value in edit.values],
             [worker for worker in self._engine.all_workers() if worker not in afresh],
         )
 
-    def _touched(self, how: PlanDiff, switched: _Switched, values: Sequence[ParameterChange]) -> list[Worker]:
+    def _touched(self, edit: _Following) -> list[Worker]:
         """Those who must rest: also all inside a subgraph that is enabled, and nodes inside what iterates."""
-        scopes = [worker.scope for worker, enabled in switched.items() if worker.scope is not None and enabled]
-        set_ = {value.node for value in values}
+        scopes = [worker.scope for worker, enabled in edit.switched.items() if worker.scope is not None and enabled]
+        set_ = {value.node for value in edit.values}
         everybody = self._engine.all_workers() if set_ else ()
         inside = [one for one in everybody if one.node in set_ and one.core is not self._engine.core]
-        return list(dict.fromkeys([*how.touched, *(member for scope in scopes for member in scope.members), *inside]))
+        members = [member for scope in scopes for member in scope.members]
+        return list(dict.fromkeys([*edit.how.touched, *members, *inside]))
 
     def _refuse_errors(self) -> None:
         """A graph that runs has no errors, and gets none."""
         refuse_new_errors((), [one for one in check_flat(flatten(self._graph)) if one.severity == "error"])
 
-    async def _set_up(self, how: PlanDiff, come: list[Worker]) -> None:
+    async def _set_up(self, edit: _Following) -> None:
         """Make workers of the nodes that come and set them up, before anybody is held for them."""
         engine = self._engine
-        for node in sorted(how.come, key=node_place):
-            said = FlatNode(0, node._place.path, node, how.come[node], ())
+        for node in sorted(edit.how.come, key=node_place):
+            said = FlatNode(0, node._place.path, node, edit.how.come[node], ())
             worker = plan.make_worker(engine.core, said, engine.groups)
-            come.append(worker)
+            edit.come.append(worker)
             self._lifetime.carry(worker)
             worker.be_busy("setup")
             self._turns.wait_for((worker,))
@@ -265,21 +296,17 @@ class Edits:
         engine_ports.release_ports(worker)
         if worker.carrier is not None:
             worker.carrier.drop()
-            worker.carrier = None
-        worker.node = node
-        worker.type = type(node)._type
-        worker.silent_code = worker.type.is_function
-        worker.is_async = worker.type.process_kind.startswith("async")
+            worker.be_carried(None)
+        worker.take_node(node)
         node._active = worker.active
         self._lifetime.carry(worker)
         await self._hook(worker, lifecycle.set_up)
 
-    def _take_effect(self, how: PlanDiff, come: list[Worker], changes: Sequence[Change]) -> None:
+    def _take_effect(self, edit: _Following) -> None:
         """From one moment to the next the run is another."""
-        engine = self._engine
-        core = engine.core
+        engine, how = self._engine, edit.how
         assert self._index is not None
-        new, nodes = apply(core, self._index, self._graph, how, come, engine.groups)
+        new, nodes = apply(engine.core, self._index, self._graph, how, edit.come, engine.groups)
         for edge, flat in new:
             if flat.source.kind == "observable":
                 self._lifetime.feed(flat.source.port, edge, flat.through)
@@ -287,19 +314,23 @@ class Edits:
                 self._lifetime.pipe(edge, flat.through)
         for edge in how.lost:
             self._lifetime.forget(edge)
-        for change in changes:
-            if isinstance(change, ParameterChange) and core.trace is not None and change.node._place is not None:
-                here = core.by_path.get(change.node._place.path)
-                if here is not None and here.node is change.node:
-                    core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
-        swapped = {change.old: change.new for change in changes if isinstance(change, NodeSwap)}
+        self._tell_parameters(edit.changes)
+        swapped = {change.old: change.new for change in edit.changes if isinstance(change, NodeSwap)}
         edited = Edited([worker for worker, _, _ in how.swapped], swapped, nodes)
         for find_again in engine.callbacks.edited:
             find_again(edited)
-        for worker in come:
-            core.upstairs.idle_again(worker)
+        for worker in edit.come:
+            engine.core.upstairs.idle_again(worker)
         if engine.settings.check_all:
             engine.check_invariants()
+
+    def _tell_parameters(self, changes: Sequence[Change]) -> None:
+        core = self._engine.core
+        for change in changes if core.trace is not None else ():
+            if isinstance(change, ParameterChange) and change.node._place is not None:
+                here = core.by_path.get(change.node._place.path)
+                if here is not None and here.node is change.node and core.trace is not None:
+                    core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
 
     def _switched(self, changes: Sequence[Change]) -> _Switched:
         """The nodes, then the subgraphs, that are enabled or disabled, and which of both in the end."""
@@ -324,17 +355,10 @@ class Edits:
         """Whom to tear down and set up before they are enabled (F10), so that it all takes effect at one moment."""
         on = {worker for worker, enabled in switched.items() if enabled}
         scopes = {worker.scope for worker in on}
-        fresh = []
-        inside = [member for worker in on if worker.scope is not None for member in worker.scope.members]
+        inside = {member for scope in scopes if scope is not None for member in scope.members}
         assert self._index is not None
-        there = {worker for worker in (*on, *inside) if worker.scope is None}
-        for worker in sorted(there, key=self._index.leaves.label):
-            meant = worker in on or (worker.own_enabled and not scopes.isdisjoint(worker.around))
-            if not meant or worker.scope is not None or not worker.blocked & DISABLED or worker.blocked & BACKOFF:
-                continue
-            if all(scope.enabled or scope in scopes for scope in worker.around):
-                fresh.append(worker)
-        return fresh
+        there = sorted((worker for worker in on | inside if worker.scope is None), key=self._index.leaves.label)
+        return [worker for worker in there if _is_to_begin(worker, on, scopes)]
 
     def _switch(self, switched: _Switched, fresh: Collection[Worker]) -> None:
         """Enable and disable nodes and subgraphs (F10)."""
@@ -351,7 +375,7 @@ class Edits:
 
     def _note_options(self, worker: Worker, enabled: bool) -> None:
         if worker.options is not None:
-            worker.options = msgspec.structs.replace(worker.options, enabled=enabled)
+            worker.set_options(msgspec.structs.replace(worker.options, enabled=enabled))
 
     async def _leave(self, gone: list[Worker]) -> None:
         """Nodes that are gone are torn down, also if nobody waits for that any more."""
@@ -366,11 +390,7 @@ class Edits:
         """Let nodes that are gone close what they have opened; if that fails, it is told with other errors (X3)."""
         engine = self._engine
         for worker in workers:
-            for name in ("rate_timer", "limit_timer", "active_timer", "backoff_timer"):
-                timer = getattr(worker, name)
-                if timer is not None:
-                    timer.cancel()
-                    setattr(worker, name, None)
+            worker.cancel_timers()
         for worker in workers:
             try:
                 await self._hook(worker, lifecycle.tear_down)
@@ -380,6 +400,14 @@ class Edits:
             self._lifetime.forget(worker)
             if worker.carrier is not None:
                 worker.carrier.drop()
+
+
+def _is_to_begin(worker: Worker, on: Collection[Worker], scopes: Set[Scope | None]) -> bool:
+    """Whether it is off and will be on, with all around it (F10); in a back-off it is set up when that is over."""
+    if not worker.blocked & DISABLED or worker.blocked & BACKOFF:
+        return False
+    meant = worker in on or (worker.own_enabled and not scopes.isdisjoint(worker.around))
+    return meant and all(scope.enabled or scope in scopes for scope in worker.around)
 
 
 def _told(commands: Sequence[Command]) -> str:

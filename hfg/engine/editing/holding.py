@@ -68,7 +68,7 @@ class Held:
         self._held[worker] = over
         if len(self._held) == len(self._workers):
             if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)
-                self._engine.core.in_flight += 1
+                self._engine.core.set_out()
                 self._counts = True
             answer(self._waiter, None)
 
@@ -97,8 +97,9 @@ class Held:
             await asyncio.wait((waiter, ending), return_when=asyncio.FIRST_COMPLETED)
         finally:
             ending.cancel()
-            engine.core.in_flight -= self._counts
-            self._counts = False
+            if self._counts:
+                self._counts = False
+                engine.core.come_back()
         if engine.core.over:
             raise NotRunning("the run ended before the edit could take effect; the graph is as it was")
 

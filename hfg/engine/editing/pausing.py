@@ -14,7 +14,6 @@ from typing import Any, Protocol
 
 import msgspec
 
-from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
 from hfg.engine.rules import quiet
 from hfg.engine.runtime.callbacks import Edited
@@ -129,11 +128,9 @@ class Pausing:
 
     def _hold_groups(self, held: bool) -> None:
         for core in self._engine.all_cores():
-            core.held = held
-            for region in core.regions if held else ():
-                region.interrupt()
+            core.hold(held)
         for group in self._engine.groups.values():
-            group.held = held
+            group.hold(held)
 
     def _rest(self) -> None:
         """The pump would go on now: tell those who wait for the pause, or for the end of what is under way."""
@@ -301,8 +298,7 @@ class Pausing:
         found = self._at_nodes.get(worker)
         if found is None:
             found = self._at_nodes[worker] = Breakpoint(worker.node, worker.path, self.remove)
-            worker.halt = partial(self._behind, found)
-            specialise(worker)
+            worker.halt_at(partial(self._behind, found))
         return found
 
     def _at_edges_of(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
@@ -370,8 +366,7 @@ class Pausing:
         for worker in [worker for worker, found in self._at_nodes.items() if found is point]:
             del self._at_nodes[worker]
             self._waived.discard(worker)
-            worker.halt = None
-            specialise(worker)
+            worker.halt_at(None)
 
     def _behind(self, point: Breakpoint, step: Callable[[Worker], None]) -> Callable[[Worker], None]:
         """The step of a worker, behind its breakpoint."""

@@ -282,15 +282,9 @@ class _Comparing:
 
     def judge(self) -> None:
         """See whether the graph is sound beyond doubt; else a check of the whole is to say what is wrong (R4)."""
-        found, graph = self.found, self.graph
+        found = self.found
         changed = [way for way, running in found.ways if running is None or running.segments != way.segments]
-        joined = [
-            (self._old_node(way.source.port), self._old_node(way.target.port))
-            for way, running in found.ways
-            if running is None and not way.is_event_edge and not way.initial and way.target.kind in _JOINED
-            if way.source.node != ROOT and way.target.node != ROOT
-        ]
-        closes_a_ring = self.index.order.closes_a_ring(joined, found.lost)
+        closes_a_ring = self._closes_a_ring()  # asked in any case, for the index learns by that
         found.doubtful = (
             found.doubtful
             or closes_a_ring
@@ -298,15 +292,26 @@ class _Comparing:
             or not all(map(self._fits, changed))
             or self._are_doubled(changed)
             or found.gates
+            or self._waits_in_thread()
         )
-        threads = {name for name, group in graph.groups.items() if group.threads}
-        if threads:
-            nodes = [*found.come.items(), *((worker.node, options) for worker, options in found.options)]
-            nodes += [(node, _options_of(node)) for _, _, node in found.swapped]
-            for node, options in nodes:
-                kind = node._type
-                waits = kind.process_kind.startswith("async") or any(slot.is_async for slot in kind.slots.values())
-                found.doubtful |= waits and options.group in threads
+
+    def _closes_a_ring(self) -> bool:
+        """Whether new edges make a ring of synchronous ones without a delay (P7)."""
+        joined = [
+            (self._old_node(way.source.port), self._old_node(way.target.port))
+            for way, running in self.found.ways
+            if running is None and not way.is_event_edge and not way.initial and way.target.kind in _JOINED
+            if way.source.node != ROOT and way.target.node != ROOT
+        ]
+        return self.index.order.closes_a_ring(joined, self.found.lost)
+
+    def _waits_in_thread(self) -> bool:
+        """Whether async code would be in a group that is a thread."""
+        found = self.found
+        threads = {name for name, group in self.graph.groups.items() if group.threads}
+        nodes = [*found.come.items(), *((worker.node, options) for worker, options in found.options)]
+        nodes += [(node, _options_of(node)) for _, _, node in found.swapped]
+        return any(options.group in threads and _may_wait(node._type) for node, options in nodes)
 
     def _old_node(self, port: Any) -> Any:
         """The node by which the index knows a worker."""
@@ -364,6 +369,11 @@ class _Comparing:
         found.touched = [
             worker for worker in touched if worker is not None and worker.node is not None and worker.scope is None
         ]
+
+
+def _may_wait(kind: Any) -> bool:
+    """Whether there is async code in nodes of a type."""
+    return kind.process_kind.startswith("async") or any(slot.is_async for slot in kind.slots.values())
 
 
 def _ends_of_running(edge: Any) -> tuple[Any, ...]:

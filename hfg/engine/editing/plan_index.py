@@ -45,7 +45,7 @@ class PlanIndex:
         for edge in self.edges.items:
             self.note(edge)
             self.labels[edge.label] = edge
-            edge.index = self.edges.label(edge)
+            edge.renumber(self.edges.label(edge))
         self.order = TopologicalOrder(self)
 
     def note(self, edge: Any) -> None:

@@ -113,7 +113,7 @@ class Feed(Generic[T]):
         if worker.outputs.missing:
             worker.outputs.when_complete(partial(self._put_end_soon, _Waiting(self._engine, worker)))
             return
-        worker.blocked |= ENDED
+        worker.block(ENDED)
         self._put(END, None, None)
 
     def _put_end_soon(self, waiting: _Waiting) -> None:
@@ -212,15 +212,15 @@ async def read(engine: Engine, worker: Worker) -> AsyncIterator[Any]:
 def collect(engine: Engine, worker: Worker, values: list[Any]) -> None:
     """Read a graph output into a list, for runs that nobody reads."""
 
-    def step(_worker: Worker) -> None:
-        worker.queued = worker.placed = False
+    def step(worker: Worker) -> None:
+        worker.no_turn()
         while worker.live_inputs and not worker.inputs.missing:
             token = take_from_reader(worker)
             if type(token.value) is not Marker:
                 values.append(token.value)
         engine.kick()
 
-    worker.process = step
+    worker.run_by(step)
 
 
 async def signal(
@@ -238,10 +238,7 @@ async def signal(
             adopt(edge)
     while len(edge.queue) >= edge.capacity:
         waiter: asyncio.Future[None] = engine.loop.create_future()
-        outside = edge.source
-        if outside.room_waiters is None:
-            outside.room_waiters = []
-        outside.room_waiters.append(partial(answer, waiter, None))
+        edge.source.when_room(partial(answer, waiter, None))
         await until(engine, lambda done: waiter.add_done_callback(lambda _: done()))  # noqa: B023
         _check_running(engine)
     explicit = activity or 0

@@ -15,7 +15,6 @@ from hfg.engine.editing.pausing import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
 from hfg.engine.face import outside
 from hfg.engine.face.composition import Composition
-from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import UNREADY
 from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance, glance_at
@@ -345,8 +344,7 @@ class Run:
             raise UsageError(f'"{worker.path}" is a subgraph, in which each node waits for itself: name a node inside')
         neighbours = [edge.source for edge in worker.in_edges] + [edge.target for edge in worker.all_out_edges()]
         for one in (worker, *neighbours):
-            one.observed = True
-            specialise(one)
+            one.be_observed()
         await outside.until(self._engine, getattr(worker, which).when_complete)
 
     async def wait_finished(self) -> Report:

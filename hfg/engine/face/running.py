@@ -37,6 +37,14 @@ def _need_clock(clock: str) -> None:
         raise UsageError(f'clock must be "real" or "virtual", got {clock!r}')
 
 
+def _need_no_loop() -> None:
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return
+    raise UsageError("hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`")
+
+
 def _settings(options: RunOptions, *, allow_idle: bool = False) -> Settings:
     for name in options.keys() - RunOptions.__annotations__.keys():
         raise TypeError(f'a run has no option "{name}"; {suggest(name, RunOptions.__annotations__)}')
@@ -156,16 +164,14 @@ def run(
       RunError: a node failed (`NodeError`), the graph stalled (`Stalled`) or aborted itself (`Aborted`).
       UsageError: called inside a running event loop, or the graph runs already.
     """
-    try:
-        asyncio.get_running_loop()
-    except RuntimeError:
-        pass
-    else:
-        raise UsageError(
-            "hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`"
-        )
+    _need_no_loop()
     settings = _settings(options, allow_idle=allow_idle)
     _need_clock(clock)
+    return _run_blocking(graph, clock, settings, begin)
+
+
+def _run_blocking(graph: Graph, clock: Clock, settings: Settings, begin: Callable[[Run], object] | None) -> Report:
+    """Run it in an event loop of its own; Ctrl-C ends the run well, and is told when that is over."""
     factory = VirtualTimeLoop if clock == "virtual" else PunctualLoop
     ctrl_c = CtrlC()
     runner = asyncio.Runner(loop_factory=factory)
@@ -193,34 +199,21 @@ async def running(
     comes out here.
     """
     run, parts = _prepare(graph, clock or "real", _settings(options))
-    engine, lifetime = parts.engine, parts.lifetime
-    body = asyncio.current_task()
-    assert body is not None
-    cancelled_by_us = False
-
-    async def guard() -> None:
-        nonlocal cancelled_by_us
-        await engine.ending.wait()
-        if engine.error is not None and not parts.ending:
-            cancelled_by_us = True
-            body.cancel()
-
-    watcher: asyncio.Task[None] | None = None
+    engine = parts.engine
+    guard = _Guard(parts)
     try:
         parts.stay_open()
-        await lifetime.start()
+        await parts.lifetime.start()
         if engine.error is None:
-            watcher = asyncio.create_task(guard(), name=f"hfg guard of {graph.name}")
+            guard.begin(graph.name)
             yield run
     except asyncio.CancelledError:
-        if not cancelled_by_us:
+        if not guard.has_cancelled():
             engine.finish("cancelled", None)
-            lifetime.hurry()
+            parts.lifetime.hurry()
             raise
-        body.uncancel()
     finally:
-        if watcher is not None:
-            watcher.cancel()
+        guard.end()
         if engine.outcome == "running":
             engine.finish("stopped", None)
         try:
@@ -228,6 +221,39 @@ async def running(
         finally:
             level_of(graph).whole.end_run()
     parts.raise_failure()
+
+
+class _Guard:
+    """Cancels what the block of a run waits for when the run fails."""
+
+    def __init__(self, parts: Composition) -> None:
+        body = asyncio.current_task()
+        assert body is not None
+        self._body = body
+        self._parts = parts
+        self._cancelled = False
+        self._watcher: asyncio.Task[None] | None = None
+
+    def begin(self, name: str) -> None:
+        """From now on."""
+        self._watcher = asyncio.create_task(self._watch(), name=f"hfg guard of {name}")
+
+    async def _watch(self) -> None:
+        await self._parts.engine.ending.wait()
+        if self._parts.engine.error is not None and not self._parts.ending:
+            self._cancelled = True
+            self._body.cancel()
+
+    def has_cancelled(self) -> bool:
+        """Whether it was the guard that has cancelled the block; then its task is not cancelled any more."""
+        if self._cancelled:
+            self._body.uncancel()
+        return self._cancelled
+
+    def end(self) -> None:
+        """The block is left."""
+        if self._watcher is not None:
+            self._watcher.cancel()
 
 
 async def _quietly(closing: Coroutine[Any, Any, None]) -> None:

@@ -217,6 +217,20 @@ class Core:
         self.code: Code
         self.upstairs = upstairs
         self.now = host.now
+        self.trace: Callable[[TraceEvent], None] | None = None
+        self.debug = False
+        self.fast = True
+        self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
+        self.inside: Any = None  # the iteration whose inside this is (G4)
+        self.started = False
+        self.over = False
+        self.held = False  # the run is paused: nodes move one by one
+        self.errors: list[HfgError] = []
+        self.lost_activity = 0
+        self._has_no_plan()
+        self._has_nothing_under_way()
+
+    def _has_no_plan(self) -> None:
         self.workers: list[Worker] = []
         self._numbers = itertools.count()
         self.edges: list[SyncEdge | BufferEdge | EventEdge] = []
@@ -224,29 +238,28 @@ class Core:
         self.gates: list[Gate] = []
         self.by_path: dict[str, Worker] = {}
         self.boundary: Worker | None = None
-        self.trace: Callable[[TraceEvent], None] | None = None
-        self.debug = False
-        self.fast = True
+        self.sources: list[Worker] = []
+        self.feeds: list[Worker] = []  # the graph's own inputs (P10)
+        self.readers: list[Worker] = []  # the graph's own outputs
+        self.piped: list[tuple[Any, tuple[Any, ...]]] = []  # edges with operators (P9)
+        self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
+        self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
+        self.listeners: dict[Any, None] = {}  # outputs to slots, perhaps ahead of the edges' counts
+        self.regions: set[Region] = set()  # fused, and perhaps ahead of the counts of their members
+
+    def _has_nothing_under_way(self) -> None:
         self.in_flight = 0
         self.full_edges = 0  # queues that hold their sources back (F8)
         self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
         self.timers = 0
         self.pumping = False
+        self.slices = 0  # of the pump, for the watchdog
+        self.until = 0.0  # on the run's clock: the pump's slice is over
+        self.flags: list[str] = []  # why the pump is to look round; not empty: a wave ends behind the call under way
         self.futile = False  # the sources left feed only ended nodes (R5)
         self.current: Worker | None = None
         self.speaker: Worker | None = None  # whose code a fast path runs: what it triggers may take one too
-        self.started = False
-        self.over = False
         self.holding: Any = None  # what holds nodes for an edit (R4)
-        self.errors: list[HfgError] = []
-        self.lost_activity = 0
-        self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
-        self.held = False  # the run is paused: nodes move one by one
-        self.listeners: dict[Any, None] = {}  # outputs to slots, perhaps ahead of the edges' counts
-        self.regions: set[Region] = set()  # fused, and perhaps ahead of the counts of their members
-        self.flags: list[str] = []  # why the pump is to look round; not empty: a wave ends behind the call under way
-        self.slices = 0  # of the pump, for the watchdog
-        self.until = 0.0  # on the run's clock: the pump's slice is over
         self.followers: list[Worker] = []  # enabled by the sending under way, and to go next (R2)
         self.followed = 0  # how many have gone so; the pump counts waves, not hops, where time is virtual
         self.dirty_scopes: list[Scope] = []
@@ -255,13 +268,6 @@ class Core:
         self.heard: deque[tuple[Any, Token[Any]]] = deque()  # signals of which subscribers are to hear (F3)
         self.telling = False  # they are hearing
         self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
-        self.sources: list[Worker] = []
-        self.feeds: list[Worker] = []  # the graph's own inputs (P10)
-        self.readers: list[Worker] = []  # the graph's own outputs
-        self.piped: list[tuple[Any, tuple[Any, ...]]] = []  # edges with operators (P9)
-        self.inside: Any = None  # the iteration whose inside this is (G4)
-        self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
-        self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges
 
     def settle_counts(self) -> None:
         """Somebody is about to read how often nodes have fired: fused regions count by waves."""
@@ -284,6 +290,18 @@ class Core:
         """
         if self.over:
             return
+        self._check_workers()
+        for region in self.regions:
+            region.check_invariants()
+        self._check_queues()
+        if self.followers or self.returned or self.drained or self.late is not None:
+            raise EngineInternalError("a sending is not over: who follows, or what was returned or drained, is left")
+        for scope in self.scopes:
+            if scope.watched and scope not in self.dirty_scopes and scope.active != scope.derive():
+                raise EngineInternalError(f'subgraph "{scope.path}": its activity is not that of its inside (G2)')
+
+    def _check_workers(self) -> None:
+        """What lies on the edges is what the nodes at their ends have counted."""
         held: Counter[Worker] = Counter()
         full: Counter[Worker] = Counter()
         for edge in self.edges:
@@ -299,14 +317,6 @@ class Core:
                 raise EngineInternalError(f'node "{worker.path}": {full[worker]} of its queues are full (F8)')
             if worker.region is not None and worker.region not in self.regions:
                 raise EngineInternalError(f'node "{worker.path}": its region is gone')
-        for region in self.regions:
-            region.check_invariants()
-        self._check_queues()
-        if self.followers or self.returned or self.drained or self.late is not None:
-            raise EngineInternalError("a sending is not over: who follows, or what was returned or drained, is left")
-        for scope in self.scopes:
-            if scope.watched and scope not in self.dirty_scopes and scope.active != scope.derive():
-                raise EngineInternalError(f'subgraph "{scope.path}": its activity is not that of its inside (G2)')
 
     def _check_queues(self) -> None:
         """Who is queued stands in the run queue of its group, once, and nobody else does."""
@@ -314,6 +324,12 @@ class Core:
         for worker in self.workers:
             if standing[worker] != worker.queued:
                 raise EngineInternalError(f'node "{worker.path}": it stands {standing[worker]} times in its run queue')
+
+    def hold(self, held: bool) -> None:
+        """R3: whether the run is paused, and nodes move one by one; a wave under way ends behind its present call."""
+        self.held = held
+        for region in self.regions if held else ():
+            region.interrupt()
 
     def set_out(self) -> None:
         """Code waits, or runs in a thread: the run is not quiet before it has come back."""

@@ -25,7 +25,6 @@ class Group:
     """
 
     threaded = False
-    held = False  # the run is paused: nobody of it moves
 
     def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
         self.name = name
@@ -36,6 +35,11 @@ class Group:
         self.take: Callable[[], Any] = policy.popleft if isinstance(policy, Fifo) else policy.pop
         self.fair = policy if isinstance(policy, FairShare) else None
         self.clock = clock  # read only where time is shared
+        self.held = False
+
+    def hold(self, held: bool) -> None:
+        """R3: whether nobody of it moves, for the run is paused."""
+        self.held = held
 
     def charge(self, worker: Worker, busy_s: float) -> None:
         """A worker has kept the group busy for so long."""

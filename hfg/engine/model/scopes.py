@@ -6,6 +6,7 @@ gates a node. Its activity is derived, never stored by a token. Stands on `worke
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Scope:
         "worker",
     )
 
-    def __init__(self, index: float, path: str, parent: Scope | None) -> None:
+    def __init__(self, index: float, path: str, parent: Scope | None, *, enabled: bool = True) -> None:
         self.index = index
         self.path = path
         self.parent = parent
@@ -53,9 +54,38 @@ class Scope:
         self.worker: Worker | None = None
         self.active = False
         self.told = False
-        self.enabled = True
+        self.enabled = enabled
         self.watched = False
         self.gates: list[Gate] = []
+
+    def be_told_by(self, worker: Worker) -> None:
+        """Its automatic ports live there."""
+        self.worker = worker
+
+    def take_in(self, members: Iterable[Worker]) -> None:
+        """These running nodes are inside, and know it."""
+        self.members = list(members)
+        for member in self.members:
+            member.lie_in((*member.around, self))
+
+    def move(self, path: str, parent: Scope | None) -> None:
+        """It is called otherwise, and lies elsewhere, as the last one inside of that."""
+        self.path = path
+        self.parent = parent
+        if parent is not None:
+            parent.children.append(self)
+
+    def rename(self, path: str) -> None:
+        """It is called otherwise from now on."""
+        self.path = path
+
+    def renumber(self, index: float) -> None:
+        """It comes here in the order of all."""
+        self.index = index
+
+    def forget_gates(self) -> None:
+        """No gate looks at its activity."""
+        self.gates = []
 
     def and_around(self) -> tuple[Scope, ...]:
         """Give it and those around it, outermost first."""
@@ -118,7 +148,10 @@ class Gate:
 
     __slots__ = ("idle_rate_hz", "state", "workers")
 
-    def __init__(self, state: Worker | Scope, idle_rate_hz: float | None) -> None:
+    def __init__(self, state: Worker | Scope, idle_rate_hz: float | None, workers: Iterable[Worker]) -> None:
         self.state = state
         self.idle_rate_hz = idle_rate_hz
-        self.workers: list[Worker] = []
+        self.workers = list(workers)
+        for worker in self.workers:
+            worker.be_gated(self)
+        state.gates.append(self)

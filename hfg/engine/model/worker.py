@@ -10,14 +10,15 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
+from hfg.engine.model.vertex import RunningEvent, Vertex
 from hfg.errors import EngineInternalError
 from hfg.ports.barrier import Barrier
-from hfg.ports.edges import Edge, EventEdge, SyncEdge
+from hfg.ports.edges import Edge, EventEdge
 
 if TYPE_CHECKING:
     from hfg.engine.model.core import Core, Region
     from hfg.engine.model.groups import Group
-    from hfg.engine.model.scopes import Gate, Scope
+    from hfg.engine.model.scopes import Scope
 
 __all__ = [
     "AMID_NOTHING",
@@ -36,7 +37,6 @@ __all__ = [
     "UNREADY",
     "UNWIRED",
     "RunningEvent",
-    "Shape",
     "Worker",
 ]
 
@@ -60,70 +60,8 @@ AMID_NOTHING: Final = ("", "edit", "over")  # values of Worker.busy: automatic e
 
 SAME_MOMENT_S: Final = 1e-9  # times that differ by less are one: sums of floats do
 
-NOTHING: Final[dict[str, Any]] = {}  # shared by the many that have none; never written
 
-
-class RunningEvent:
-    """An event of a running node and the edges it feeds, slots first (D10 of docs/semantics.md, F9)."""
-
-    __slots__ = ("edges", "name", "pipelines", "port", "tap", "worker")
-
-    def __init__(self, worker: Worker, name: str, port: Any) -> None:
-        self.worker = worker
-        self.name = name
-        self.port = port
-        self.edges: tuple[Any, ...] = ()
-        self.tap: tuple[Any, ...] | None = None  # who looks at its signals; () if at one of its edges only
-
-    @property
-    def label(self) -> str:
-        """Its path, as traces name it."""
-        return f"{self.worker.path}.{self.name}" if self.worker.path else self.name
-
-
-class Shape:
-    """What the wiring of a worker says about each of its firings, found once.
-
-    Attributes:
-      sequential: inputs whose tokens are processed when its outputs are (F5).
-      pipelined: those whose tokens are when it has taken them.
-      plain: a firing without markers is a call of its function with what lies on its inputs, and nothing else.
-      direct: the arguments of that call are the values, as they lie there.
-      single: what the call gives back is the value of its one output.
-      outgoing: where that is put, slots first (F9).
-      gives: activity may leave by one of those edges (A3).
-    """
-
-    __slots__ = ("direct", "gives", "outgoing", "pipelined", "plain", "sequential", "single")
-
-    def __init__(self, worker: Worker) -> None:
-        edges, kind = worker.live_inputs, worker.type
-        synchronous = [edge for edge in edges if type(edge) is not EventEdge]
-        self.sequential = tuple(edge for edge in synchronous if edge.sequential)
-        self.pipelined = tuple(edge for edge in synchronous if not edge.sequential)
-        self.plain = (
-            kind is not None
-            and worker.process is not None
-            and all(type(edge) is SyncEdge and edge.target_kind == "input" for edge in edges)
-            and not any(edge.ended for edge in worker.in_edges)
-            and not (worker.gates_over or worker.paced)
-        )
-        self.direct = (
-            self.plain
-            and worker.iteration is None
-            and kind.process_kind in ("function", "async")
-            and [edge.position for edge in edges] == list(range(len(worker.unset)))
-            and not any(worker.wants_token)
-        )
-        self.single = (
-            kind is not None and kind.result == "single" and len(worker.out_edges) == 1 and not worker.core.debug
-        )
-        outgoing = worker.out_edges[0] if self.single else ()
-        self.outgoing = tuple(sorted(outgoing, key=lambda edge: edge.target_kind != "slot"))
-        self.gives = any(edge.active for edge in outgoing)
-
-
-class Worker:
+class Worker(Vertex):
     """What a node is while its graph runs.
 
     Attributes:
@@ -149,10 +87,8 @@ class Worker:
 
     __slots__ = (
         "active",
-        "active_for_s",
         "active_timer",
         "ahead",
-        "around",
         "backoff_timer",
         "blocked",
         "busy",
@@ -161,161 +97,88 @@ class Worker:
         "calls",
         "calls_failed",
         "carrier",
-        "core",
         "deferred",
         "end_firings",
         "end_stamp",
-        "events",
         "events_due",
         "failed",
         "firings",
         "follows",
         "full_edges",
         "gate_next",
-        "gates",
-        "gates_over",
         "generator",
         "given_up",
         "grid_start",
-        "group",
         "halt",
-        "handlers",
-        "has_hooks",
         "held",
-        "in_edges",
         "in_flight",
-        "index",
         "inputs",
-        "is_async",
-        "is_boundary_output",
-        "is_source",
         "is_up",
-        "iteration",
         "job",
         "limit_timer",
         "listened",
-        "listeners",
-        "live_inputs",
-        "mandatory_ports",
         "meter",
         "next_period",
         "next_start",
-        "node",
         "observed",
         "on_idle",
-        "options",
-        "out_edges",
-        "out_names",
         "outputs",
-        "own_enabled",
-        "paced",
-        "path",
         "pending_end",
         "placed",
-        "plain_handlers",
-        "port_name",
-        "priority",
-        "process",
-        "push",
-        "push_next",
         "queued",
         "rate_timer",
-        "ready_hook",
         "region",
         "restarts",
         "right",
         "room_waiters",
-        "scope",
-        "scopes",
-        "shape",
         "silent",
-        "silent_code",
-        "slot_edges",
         "speaks",
         "special",
         "stamp",
         "step",
         "taken",
         "ticket",
-        "type",
         "unfit",
-        "unset",
         "waiting_room",
-        "wants_token",
-        "watched",
-        "wired_out",
         "written",
     )
 
     # --- made -------------------------------------------------------------------------------------------------------
 
-    def __init__(self, core: Core, index: int, path: str, node: Any, options: Any, group: Group) -> None:
-        self.core = core
-        self.index = index
-        self.path = path
-        self.node = node
-        self.type: Any = (
-            type(node)._type if node is not None else None
-        )  # a NodeType; None for what stands for the outside
-        self.options = options
-        self.group = group
-        self.push: Callable[[Worker], None] = group.push
-        self.push_next: Callable[[Worker], None] = group.push_next
-        self.priority: int = options.priority if options is not None else 0
-
+    def __init__(self, core: Core, path: str, node: Any, options: Any, group: Group) -> None:
+        super().__init__(core, path, node, options, group)
         self.inputs = Barrier()
         self.outputs = Barrier()
         self.blocked = 0
+        self.busy = ""
+        self.step: Callable[[Worker], None] = _not_planned
+        self._has_no_place()
+        self._is_looked_at_by_nobody()
+        self._has_not_fired()
+        self._has_no_timers()
+
+    def _has_no_place(self) -> None:
         self.placed = False
         self.ahead = 0
         self.calls: deque[Any] | None = None
         self.queued = False
         self.follows = False
-        self.busy = ""
-        self.special = False
-        self.step: Callable[[Worker], None] = _not_planned
+        self.full_edges = 0
+        self.waiting_room = 0  # its code awaits trigger_wait
+        self.room_waiters: list[Callable[[], None]] | None = None
+        self.on_idle: list[Callable[[], None]] | None = None  # what waits until it is not busy
 
-        # structure, set by the plan and by `wiring.rewire`
-        self.in_edges: tuple[Any, ...] = ()  # into inputs and parameters, in order of the ports
-        self.live_inputs: tuple[Any, ...] = ()  # those that are waited for
-        self.slot_edges: tuple[Any, ...] = ()
-        self.out_edges: tuple[tuple[Any, ...], ...] = ()  # per output, then per parameter
-        self.out_names: tuple[str, ...] = ()
-        self.events: dict[str, RunningEvent] = {}
-        self.mandatory_ports: tuple[str, ...] = ()
-        self.wired_out: tuple[tuple[Any, ...], ...] = ()  # the same, live or not
-        self.listeners: tuple[Any, ...] = ()  # per output: its slots that listen only while they are active; or ()
-        self.listened: list[Any] | None = None  # what tells those who send to such slots of its own that it may listen
-        self.unset: tuple[Any, ...] = ()  # per declared input what an absent one gives (P6)
-        self.wants_token: tuple[bool, ...] = ()
-        self.handlers: dict[str, Any] = NOTHING  # slot -> callable(token)
-        self.plain_handlers: dict[str, Any] = NOTHING  # slot -> callable(value), where that is the same
-        self.silent_code = False  # a function: it can neither send nor trigger by itself
-        self.port_name = ""  # of a graph input or output
-        self.is_boundary_output = False
-        self.scope: Scope | None = None  # it stands for this subgraph's automatic ports
-        self.around: tuple[Scope, ...] = ()  # subgraphs around it
-        self.scopes: tuple[Scope, ...] = ()  # those of them that are watched
-        self.own_enabled = True
-        self.paced = False  # a rate or a throttling gate may hold its firings
-        self.gates_over: tuple[Gate, ...] = ()  # it works only while their states are active
-        self.gates: list[Any] = []  # that look at its activity
-        self.active_for_s: float | None = None
+    def _is_looked_at_by_nobody(self) -> None:
         self.halt: Callable[[Callable[[Worker], None]], Callable[[Worker], None]] | None = None  # R3: its breakpoint
+        self.observed = False  # somebody waits at its barriers: no fast paths
+        self.meter: Any = None  # a Meter, while somebody wants statistics
+        self.listened: list[Any] | None = None  # what tells those who send to slots of its own that it may listen
         self.region: Region | None = None  # in which its firings are fused
         self.speaks = False  # its code sends by itself: the region says so before each call
         self.unfit = False  # its firings turned out not to be plain calls
-        self.observed = False  # somebody waits at its barriers: no fast paths
-        self.watched = False  # activity changes have consequences beyond the flag
-        self.is_source = False
-        self.is_async = False
-        self.process: Callable[..., Any] | None = None
-        self.ready_hook: Callable[[], Any] | None = None
-        self.has_hooks = False
-        self.iteration: Any = None
-        self.meter: Any = None  # a Meter, while somebody wants statistics
 
-        # state of the run
+    def _has_not_fired(self) -> None:
+        self.special = False
         self.active = False
         self.right = False
         self.stamp: float | None = None
@@ -333,30 +196,72 @@ class Worker:
         self.call_edge: Any = None
         self.in_flight = False  # its code waits or runs in a thread
         self.job: Any = None  # what its thread is doing for it
-        self.waiting_room = 0  # its code awaits trigger_wait
-        self.room_waiters: list[Callable[[], None]] | None = None
-        self.on_idle: list[Callable[[], None]] | None = None  # what waits until it is not busy
         self.ticket = 0  # which firing or call a late result belongs to (X2)
-        self.full_edges = 0
+        self.firings = self.silent = self.end_firings = self.call_number = 0
+        self.failed = self.calls_failed = self.restarts = 0
+
+    def _has_no_timers(self) -> None:
         self.grid_start: float | None = None  # when its first firing with a rate began, and so its grid (F11)
         self.next_period = 0  # of that grid: the first in which it may start again
         self.next_start = 0.0  # when that begins
+        self.gate_next = float("-inf")  # when its last firing began, for a throttling gate
         self.rate_timer: Any = None
         self.limit_timer: Any = None
         self.backoff_timer: Any = None
         self.active_timer: Any = None
-        self.gate_next = float("-inf")  # when its last firing began, for a throttling gate
 
-        self.shape = Shape(self)  # what follows from the wiring for each firing; set by `rewire`
+    # --- its place in the plan (R4) ---------------------------------------------------------------------------------
 
-        # counts
-        self.firings = 0
-        self.silent = 0
-        self.end_firings = 0
-        self.call_number = 0
-        self.failed = 0
-        self.calls_failed = 0
-        self.restarts = 0
+    def stand_for(self, scope: Scope, active_for_s: float | None) -> None:
+        """Have the automatic ports of a subgraph that is dissolved; never fire."""
+        self.scope = scope
+        self.silent_code = True
+        self.active_for_s = active_for_s
+        scope.be_told_by(self)
+
+    def lead_in(self, edge: Edge, kind: str, name: str) -> None:
+        """An edge leads into one of its ports from now on, in the order of those."""
+        super().lead_in(edge, kind, name)
+        if self.slot_edges and self.calls is None:
+            self.calls = deque()
+
+    def lead_out_of_event(self, edge: Edge, name: str, port: Any) -> None:
+        """An edge leads out of one of its events from now on."""
+        event = self.make_event(name, port if self.node is not None or name == "start" else None)
+        event.feed((*event.edges, edge))
+
+    def make_event(self, name: str, port: Any) -> RunningEvent:
+        """Give the running event of this name; one that has neither edge nor subscriber yet is made now."""
+        event = self.events.get(name)
+        if event is None:
+            event = self.events[name] = RunningEvent(self, name, port)
+        return event
+
+    def regroup(self, group: Group) -> None:
+        """It runs elsewhere from now on; where it stood in a queue it does no more."""
+        self.leave_queue()
+        self.join(group)
+
+    def leave_plan(self) -> None:
+        """An edit took it out of the graph: it moves no more, whatever still comes to it."""
+        self.pending_end = False
+        self.block(TORN_DOWN | REMOVED)
+        self.leave_queue()
+        self.step = Worker.dequeued
+
+    def run_over(self) -> None:
+        """The run is over: what is queued already does nothing, and nobody waits for room any more."""
+        self.blocked |= TORN_DOWN
+        self.placed = False
+        for waiter in self.room_waiters or ():
+            waiter()
+
+    def cancel_timers(self) -> None:
+        """Nothing is to come of it any more."""
+        for timer in (self.rate_timer, self.limit_timer, self.backoff_timer, self.active_timer):
+            if timer is not None:
+                timer.cancel()
+        self.rate_timer = self.limit_timer = self.backoff_timer = self.active_timer = None
 
     # --- its place in the agenda and in the run queue (F1, F9, R2) ---------------------------------------------------
 
@@ -412,6 +317,10 @@ class Worker:
         self.placed = False
         if self.rate_timer is not None:
             self.forget_rate()
+
+    def no_turn(self) -> None:
+        """It has had its turn, and all that it was enabled for is done by that."""
+        self.queued = self.placed = False
 
     # --- what keeps it from moving (F1) ------------------------------------------------------------------------------
 
@@ -565,11 +474,6 @@ class Worker:
     def be_up(self, up: bool) -> None:
         """Whether its setup has begun and its teardown has not."""
         self.is_up = up
-
-    def enable_itself(self, enabled: bool) -> bool:
-        """Whether it is enabled itself, whatever is around it; gives back whether that is new."""
-        before, self.own_enabled = self.own_enabled, enabled
-        return before != enabled
 
     def take_written(self) -> list[Any] | None:
         """What the firing has written leaves now, or never."""
@@ -784,12 +688,20 @@ class Worker:
 
     def rewire(self, live_inputs: tuple[Any, ...]) -> None:
         """What it waits for, and what it sends on, is derived anew from the liveness of its edges."""
-        self.live_inputs = live_inputs
-        self.out_edges = tuple(tuple(edge for edge in edges if edge.live) for edges in self.wired_out)
+        self.wait_for(live_inputs)
         self.inputs.count(sum(1 for edge in live_inputs if not edge.untaken))
         if self.inputs.missing:
             self.unplace()
-        self.shape = Shape(self)
+
+    def halt_at(self, halt: Callable[[Callable[[Worker], None]], Callable[[Worker], None]] | None) -> None:
+        """R3: a breakpoint stands before its step from now on, or none."""
+        self.halt = halt
+        self.changed()
+
+    def be_observed(self) -> None:
+        """Somebody waits at its barriers: each firing is to be seen there."""
+        self.observed = True
+        self.changed()
 
     def changed(self) -> None:
         """Its wiring, or somebody's interest in it, is another: how it does its next piece of work is chosen anew."""
@@ -798,27 +710,6 @@ class Worker:
     def is_on_fast_path(self) -> bool:
         """Whether a call of its code is under way that `busy` does not tell, by a fast path."""
         return self.stamp is not None or (self.region is not None and self.region.is_calling(self))
-
-    def edges_in(self) -> tuple[Edge, ...]:
-        """All edges into it, slots too."""
-        return self.in_edges + self.slot_edges
-
-    def all_out_edges(self) -> Iterator[Any]:
-        """The same, live or not."""
-        for edges in self.wired_out:
-            yield from edges
-        for event in self.events.values():
-            yield from event.edges
-
-    def event_edges(self) -> Iterator[Any]:
-        """The edges of its events."""
-        for event in self.events.values():
-            yield from event.edges
-
-    def timeout_leads_somewhere(self) -> bool:
-        """Whether its event `timeout` has an edge or a subscriber (docs/semantics.md, "quiet")."""
-        event = self.events.get("timeout")
-        return event is not None and bool(event.edges or (event.port is not None and event.port._observers))
 
     def check_invariants(self) -> None:
         """Between two steps of the run certain things hold of every worker, whatever its region has fused.
@@ -835,15 +726,8 @@ class Worker:
 
     def _relations(self) -> Iterator[tuple[bool, str]]:
         """What holds of it between two steps."""
-        may_fire = not (self.blocked or self.inputs.missing or self.outputs.missing)
-        may_call = bool(self.calls) and not self.blocked & CALLS_BLOCKED
-        rests = self.busy == ""
-        yield may_fire or not self.placed, "its firing has a place, but F1 does not hold"
-        if rests and self.core.started and not self.is_boundary_output:
-            yield self.placed or not may_fire, "F1 holds, but its firing has no place"
-            yield self.queued or not (self.placed or may_call), "it may move, but does not stand in its run queue"
-        yield not self.calls or self.ahead <= len(self.calls) or not self.placed, "more calls stand before its firing"
-        if rests:
+        yield from self._relations_of_its_place()
+        if not self.busy:
             yield self.stamp is None and not self.right, "it rests, but has the stamp or the right of a firing (T5, A3)"
             yield self.written is None, "it rests, but what a firing wrote has not left (F3)"
             yield self.call_edge is None, "it rests, but is amid a slot call"
@@ -853,11 +737,18 @@ class Worker:
         yield bool(self.blocked & ENDED) or self.deferred is None, "modifiers wait for its END, but it has not ended"
         yield bool(self.full_edges) == bool(self.blocked & FULL), "held back by a full queue that is none (F8)"
         yield self.rate_timer is None or bool(self.blocked & RATE), "a rate's timer runs, but no rate holds it (F11)"
-        waiting = sum(edge.untaken for edge in self.called_by())
-        yield (
-            waiting == len(self.calls or ()),
-            f"{waiting} tokens lie before its slots, for {len(self.calls or ())} calls",
-        )
+
+    def _relations_of_its_place(self) -> Iterator[tuple[bool, str]]:
+        """What holds of its place in the agenda and in the run queue (F1, F9)."""
+        may_fire = not (self.blocked or self.inputs.missing or self.outputs.missing)
+        may_call = bool(self.calls) and not self.blocked & CALLS_BLOCKED
+        yield may_fire or not self.placed, "its firing has a place, but F1 does not hold"
+        if not self.busy and self.core.started and not self.is_boundary_output:
+            yield self.placed or not may_fire, "F1 holds, but its firing has no place"
+            yield self.queued or not (self.placed or may_call), "it may move, but does not stand in its run queue"
+        calls, waiting = len(self.calls or ()), sum(edge.untaken for edge in self.called_by())
+        yield not calls or self.ahead <= calls or not self.placed, "more calls stand before its firing"
+        yield waiting == calls, f"{waiting} tokens lie before its slots, for {calls} calls"
 
     def called_by(self) -> Iterator[Any]:
         """Each edge whose tokens wait for a call: into a slot, or a signal into a parameter (P8)."""

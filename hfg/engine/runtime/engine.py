@@ -19,7 +19,7 @@ from hfg.clock import current_clock
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
 from hfg.engine.model.policies import make_policy
-from hfg.engine.model.worker import TORN_DOWN, Worker
+from hfg.engine.model.worker import Worker
 from hfg.engine.rules import quiet
 from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime.callbacks import Callbacks
@@ -251,13 +251,26 @@ class Engine:
         """Drain the loop group within a slice; a hop is a few function calls."""
         self._scheduled = False
         core = self.core
-        if core.over or not core.started:
-            return
-        if self._rests():
+        if core.over or not core.started or self._rests():
             return
         policy: Any = self._loop_group.policy
         if self.virtual and (policy or self._ready_groups) and self._waits_for_work():
             return
+        self._work(policy)
+        while self._resumed:
+            self.loop.call_soon(self._resumed.popleft(), context=self.context)
+        for call in self.callbacks.pumped:
+            call()
+        if self.ended_how is not None or self._rests():
+            return
+        if policy or self._ready_groups:
+            self.kick()
+        else:
+            self._settle()
+
+    def _work(self, policy: Any) -> None:
+        """One slice of the pump; whatever is raised in it ends the run."""
+        core = self.core
         core.pumping = True
         core.slices += 1
         core.flags.clear()
@@ -273,18 +286,6 @@ class Engine:
         finally:
             core.pumping = False
             core.current = core.speaker = None
-        while self._resumed:
-            self.loop.call_soon(self._resumed.popleft(), context=self.context)
-        for call in self.callbacks.pumped:
-            call()
-        if self.ended_how is not None:
-            return
-        if self._rests():
-            return
-        if policy or self._ready_groups:
-            self.kick()
-        else:
-            self._settle()
 
     def _waits_for_work(self) -> bool:
         """R5, R1: a loop that is always busy must not keep out what comes back from threads.
@@ -506,11 +507,7 @@ class Engine:
         self.ended_at = self.now()
         for worker in self.all_workers():
             worker.core.over = True
-            worker.blocked |= TORN_DOWN
-            worker.placed = False  # what is queued already does nothing
-            if worker.room_waiters is not None:
-                for waiter in worker.room_waiters:
-                    waiter()
+            worker.run_over()
         for call in self.callbacks.finished:
             call()
         self._answer_quiet()

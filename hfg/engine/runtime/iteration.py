@@ -114,8 +114,7 @@ class Iteration:
         plan.build(self.core, flat, groups, loop=loop)
         for inner in self.core.workers:
             if not inner.is_boundary_output:
-                inner.push = self._counted(inner.push)
-                inner.push_next = self._counted(inner.push_next)
+                inner.queue_by(self._counted(inner.push), self._counted(inner.push_next))
 
     def _counted(self, push: Callable[[Worker], None]) -> Callable[[Worker], None]:
         def counted(inner: Worker) -> None:
@@ -169,9 +168,9 @@ class Iteration:
 
     def _finished(self) -> None:
         worker = self.worker
-        worker.in_flight = False
-        worker.core.in_flight -= 1
-        worker.written = [(values, None, None) for values in self._results]
+        worker.come_back()
+        for position, values in enumerate(self._results):
+            worker.write(position, (values, None, None))
         firing.complete_firing(worker, None)
         worker.core.host.kick()
 

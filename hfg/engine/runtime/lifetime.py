@@ -21,15 +21,14 @@ from hfg.engine.rules.activity import gate_changed
 from hfg.engine.rules.agenda import consider, note_full
 from hfg.engine.rules.modifiers import discard
 from hfg.engine.rules.sending import trigger
-from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime import ports as engine_ports
+from hfg.engine.runtime import rx
 from hfg.engine.runtime.code import answer
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.groups import ThreadGroup
 from hfg.engine.runtime.watchdog import Watch, watchdog
 from hfg.errors import HfgError, NodeError, TeardownError
 from hfg.ports.edges import BufferEdge, EventEdge
-from hfg.token import Token
 from hfg.trace import RunEnded, RunStarted
 
 __all__ = ["Lifetime"]
@@ -86,7 +85,7 @@ class Lifetime:
             self.carry(worker)
         for edge in core.edges:
             if isinstance(edge, BufferEdge | EventEdge):
-                edge.queue.extend(Token(value, 0, engine.now(), 0) for value in edge.initial)
+                edge.begin(engine.now())
                 if isinstance(edge, EventEdge):
                     note_full(edge)
         for worker in core.workers:
@@ -100,7 +99,7 @@ class Lifetime:
                 worker.iteration.core.started = True
         for worker in core.workers:
             engine_ports.bind_automatic(worker)
-            plan.watch(worker)
+            worker.watch()
             if worker.watched:
                 engine_ports.bind(worker)
             wiring.rewire(worker)
@@ -127,15 +126,15 @@ class Lifetime:
         for worker in core.workers:
             if worker.gates_over and worker.is_source:
                 gate_changed(worker.gates_over)
-            worker.blocked &= ~STARTING
+            worker.allow(STARTING)
             consider(worker)
             if worker.iteration is not None:
                 self._open_sources(worker.iteration.core)
 
     def carry(self, worker: Worker) -> None:
         """Give an async node its dormant task."""
-        if worker.type is not None and (worker.is_async or any(spec.is_async for spec in worker.type.slots.values())):
-            worker.carrier = self._engine.code.carrier(worker)
+        if worker.may_wait():
+            worker.be_carried(self._engine.code.carrier(worker))
 
     async def _set_up_one(self, worker: Worker) -> None:
         engine = self._engine
@@ -258,9 +257,7 @@ class Lifetime:
         engine = self._engine
         for worker in engine.all_workers():
             engine_ports.release_ports(worker)
-            for timer in (worker.rate_timer, worker.limit_timer, worker.active_timer):
-                if timer is not None:
-                    timer.cancel()
+            worker.cancel_timers()
         for carrier in self._carriers():
             carrier.drop()
         for group in engine.groups.values():
@@ -332,7 +329,7 @@ class Lifetime:
         code = self._engine.code
         busy = [worker for worker in self._engine.all_workers() if worker.in_flight and worker.iteration is None]
         for worker in busy:
-            worker.ticket += 1
+            worker.give_up_firing()
             if worker.carrier is not None:
                 worker.carrier.cancel()
         for task in code.aside:

@@ -10,8 +10,8 @@ from functools import partial
 from typing import Any
 
 from hfg.engine.fusion import slots
-from hfg.engine.fusion.specialise import specialise
-from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.model.vertex import RunningEvent
+from hfg.engine.model.worker import Worker
 from hfg.engine.rules import firing
 from hfg.engine.rules.sending import trigger
 from hfg.engine.runtime import plan, relays
@@ -41,13 +41,14 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     event = worker.events.get(name)
     relayed = worker.scope is not None and name not in AUTOMATIC_EVENTS
     if event is None:
-        event = worker.events[name] = RunningEvent(worker, name, None)
+        event = worker.make_event(name, None)
         if relayed:
             for inner in relays.events_behind(worker.node.ports.events[name]):
                 inner.subscribe(worker.node.ports.events[name]._notify)
     if worker.node is None:  # the graph's own `start`
         return event
-    port = event.port = worker.node.ports.events[name]
+    port = worker.node.ports.events[name]
+    event.bind(port)
     host = worker.core.host
     if relayed:
         host.adopt_event(port)
@@ -69,8 +70,8 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     if name in AUTOMATIC_EVENTS and worker.scope is not None:
         plan.watch_scope(worker.scope)
     if name in AUTOMATIC_EVENTS and worker.core.started:
-        plan.watch(worker)
-        specialise(worker)
+        worker.watch()
+        worker.changed()
         bind(worker)  # what it triggers may have consequences now
     return event
 
@@ -119,7 +120,7 @@ def bind_start(boundary: Worker, port: EventPort[None]) -> RunningEvent | None:
     """Let the graph's `start` reach its edges and subscribers; None if it has neither (A10)."""
     event = boundary.events.get("start")
     if event is None and port._observers:
-        event = boundary.events["start"] = RunningEvent(boundary, "start", port)
+        event = boundary.make_event("start", port)
     if event is not None:
         boundary.core.host.adopt_event(port)
     return event

@@ -131,8 +131,7 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callab
             newest[0] = max(newest[0], token.stamp)
             subject.on_next(token)
 
-        edge.pipeline = into
-        edge.complete = subject.on_completed
+        edge.pipe(into, subject.on_completed)
         subscription.disposable = subject.pipe(*operators).subscribe(
             Observer(out, failed, lambda: None), scheduler=scheduler
         )
@@ -145,10 +144,10 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callab
         kick(edge)
 
     def failed(error: Exception) -> None:
-        edge.complete = None  # nothing goes through them any more
+        edge.take_complete()  # nothing goes through them any more
         operator_failed(edge, error)
 
-    edge.renew = connect
+    edge.pipe_afresh_by(connect)
     connect()
     return subscription.dispose
 

@@ -1,0 +1,61 @@
+"""What the wiring of a node says about each of its firings, found once and not per token. Stands on `ports`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from hfg.ports.edges import EventEdge, SyncEdge
+
+if TYPE_CHECKING:
+    from hfg.engine.model.vertex import Vertex
+
+__all__ = ["Shape"]
+
+
+class Shape:
+    """What follows from the live edges of one vertex.
+
+    Attributes:
+      sequential: inputs whose tokens are processed when its outputs are (F5).
+      pipelined: those whose tokens are when it has taken them.
+      plain: a firing without markers is a call of its function with what lies on its inputs, and nothing else.
+      direct: the arguments of that call are the values, as they lie there.
+      single: what the call gives back is the value of its one output.
+      outgoing: where that is put, slots first (F9).
+      gives: activity may leave by one of those edges (A3).
+    """
+
+    __slots__ = ("direct", "gives", "outgoing", "pipelined", "plain", "sequential", "single")
+
+    def __init__(self, vertex: Vertex) -> None:
+        synchronous = [edge for edge in vertex.live_inputs if type(edge) is not EventEdge]
+        self.sequential = tuple(edge for edge in synchronous if edge.sequential)
+        self.pipelined = tuple(edge for edge in synchronous if not edge.sequential)
+        self.plain = _is_plain(vertex)
+        self.direct = self.plain and _is_direct(vertex)
+        self.single = _is_single(vertex)
+        outgoing: tuple[Any, ...] = vertex.out_edges[0] if self.single else ()
+        self.outgoing = tuple(sorted(outgoing, key=lambda edge: edge.target_kind != "slot"))
+        self.gives = any(edge.active for edge in outgoing)
+
+
+def _is_plain(vertex: Vertex) -> bool:
+    if vertex.type is None or vertex.process is None or vertex.gates_over or vertex.paced:
+        return False
+    return all(type(edge) is SyncEdge and edge.target_kind == "input" for edge in vertex.live_inputs) and not any(
+        edge.ended for edge in vertex.in_edges
+    )
+
+
+def _is_direct(vertex: Vertex) -> bool:
+    return (
+        vertex.iteration is None
+        and vertex.type.process_kind in ("function", "async")
+        and [edge.position for edge in vertex.live_inputs] == list(range(len(vertex.unset)))
+        and not any(vertex.wants_token)
+    )
+
+
+def _is_single(vertex: Vertex) -> bool:
+    kind = vertex.type
+    return kind is not None and kind.result == "single" and len(vertex.out_edges) == 1 and not vertex.core.debug
