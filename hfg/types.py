@@ -1,25 +1,30 @@
 """Which port types fit together, and which values fit a type (rule P3).
 
-Our own comparison instead of beartype's `is_subhint`, which raises on every `NDArray` and knows neither int -> float
-nor arrays with a layout. Metadata of `Annotated` is taken off, apart from our own: `Shape` and `Pixels` say how an
-array is laid out. What cannot be judged is said, never guessed. Stands on numpy and beartype; knows neither ports nor
-nodes.
+Our own comparison instead of beartype's `is_subhint`, which raises on every `NDArray`, knows neither int -> float nor
+arrays with a layout, and takes bare generics for something else than open ones. Metadata of `Annotated` is taken off,
+apart from our own: `Shape` and `Pixels` say how an array is laid out. What cannot be judged is said, never guessed.
+Stands on `generics`, numpy and beartype; knows neither ports nor nodes.
 """
 
 from __future__ import annotations
 
+import enum
 import functools
 import operator
 import types
 import typing
-from collections.abc import Callable, Collection, Mapping
+from collections import abc
+from collections.abc import Callable, Collection, Iterable, Mapping
 from itertools import islice
-from typing import Annotated, Any, Final, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from beartype.door import TypeHint, is_bearable
 from beartype.roar import BeartypeException
+from typing_extensions import is_protocol
+
+from hfg import generics
 
 __all__ = [
     "Array",
@@ -124,8 +129,7 @@ _OPEN_DTYPES: Final = frozenset(
 _TOWER: Final[dict[type, tuple[type, ...]]] = {float: (int, bool), complex: (int, bool, float)}
 """What a number type takes besides itself (PEP 484)."""
 
-_ITEMS: Final[dict[type, type]] = {str: str, bytes: int, bytearray: int, range: int}
-"""What is in a plain sequence; beartype knows it of generic ones only."""
+_CALLABLE: Final[Any] = abc.Callable
 
 _LOOKED_AT: Final = 1000
 """How many items of a container are checked; the first ones, for the same value must always get the same answer."""
@@ -147,6 +151,8 @@ def why_not(source: Any, target: Any) -> str | None:
         return _why_not(source, target)
     except TypeError:  # a hint with an unhashable part, such as Annotated[int, []]: judged each time
         return _judge(source, target)
+    except RecursionError:
+        return f"hfg cannot judge {describe(source)} as {describe(target)}, for one of them contains itself; use Any"
 
 
 @functools.lru_cache(maxsize=4096)
@@ -155,48 +161,155 @@ def _why_not(source: Any, target: Any) -> str | None:
 
 
 def _judge(source: Any, target: Any) -> str | None:
+    opened, _ = _open(source)
+    if _is_union(opened):  # None in an output is silence (rule T2), so it never arrives
+        members = [member for member in typing.get_args(opened) if member is not _NONE]
+        return next((reason for member in members if (reason := _judge(member, target))), None)
+    return _fits(source, target)
+
+
+def _fits(source: Any, target: Any) -> str | None:
+    """The same for types inside of others, where None is a value: a list may hold some."""
     source, source_layouts = _open(source)
     target, target_layouts = _open(target)
-    if source is Any or target is Any or target is object:
+    if source is Any or target is Any or target is object or source in (typing.Never, typing.NoReturn):
         return None
-    if _is_union(source):  # needs all its members; None in an output is silence
-        members = [member for member in typing.get_args(source) if member is not _NONE]
-        return next((reason for member in members if (reason := _judge(member, target))), None)
+    if _is_union(source):
+        return _first(_fits(member, target) for member in typing.get_args(source))
     if _is_union(target):
-        members = list(typing.get_args(target))
-        if any(_judge(source, member) is None for member in members):
+        if any(_fits(source, member) is None for member in typing.get_args(target)):
             return None
         return f"{describe(source)} is none of {describe(target)}"
     arrays = _judge_arrays(source, source_layouts, target, target_layouts)
-    if arrays is not _NOT_ARRAYS:
-        return arrays
-    return _judge_plain(source, target)
+    return _judge_plain(source, target) if arrays is _NOT_ARRAYS else arrays
+
+
+def _first(reasons: Iterable[str | None]) -> str | None:
+    return next((reason for reason in reasons if reason is not None), None)
 
 
 def _judge_plain(source: Any, target: Any) -> str | None:
-    origin, arguments = typing.get_origin(target), typing.get_args(target)
-    if source in _ITEMS and len(arguments) == 1 and isinstance(origin, type) and issubclass(source, origin):
-        return _judge(_ITEMS[source], arguments[0])
-    if (isinstance(target, type) and source in _TOWER.get(target, ())) or source == target:
+    if source == target or (isinstance(target, type) and source in _TOWER.get(target, ())):
         return None
+    if typing.get_origin(source) is Literal or typing.get_origin(target) is Literal:
+        return _judge_literals(source, target)
+    if isinstance(source, typing.NewType):
+        return _fits(source.__supertype__, target)
+    wanted, found = generics.class_of(target), generics.class_of(source)
+    if wanted is _CALLABLE:
+        return _judge_callables(source, target)
+    if wanted is None or found is None or _is_unpacked(source) or _is_unpacked(target):
+        return _ask_beartype(source, target)
+    if typing.is_typeddict(wanted):
+        return _judge_keys(source, target)
+    return _judge_classes(source, found, target, wanted)
+
+
+def _judge_literals(source: Any, target: Any) -> str | None:
+    values = typing.get_args(source) if typing.get_origin(source) is Literal else _all_values(source)
+    if values is None:
+        return f"{describe(source)} is no {describe(target)}"
+    if typing.get_origin(target) is not Literal:
+        return _first(_fits(type(value), target) for value in values)
+    allowed = {(type(value), value) for value in typing.get_args(target)}
+    wrong = [value for value in values if (type(value), value) not in allowed]
+    return f"{wrong[0]!r} is no {describe(target)}" if wrong else None
+
+
+def _all_values(hint: Any) -> tuple[Any, ...] | None:
+    """All values of a type that has few; None of others."""
+    if hint is bool:
+        return (False, True)
+    if hint is _NONE:
+        return (None,)
+    return tuple(hint) if isinstance(hint, type) and issubclass(hint, enum.Enum) else None
+
+
+def _judge_keys(source: Any, target: Any) -> str | None:
+    """A dict with known keys, where another one is wanted; of a plain dict nobody knows the keys."""
+    refused = f"{describe(source)} is no {describe(target)}"
+    if not typing.is_typeddict(source):
+        return refused
+    has, wanted = typing.get_type_hints(source), typing.get_type_hints(target)
+    missing = next((key for key in wanted if key not in has), None)
+    if missing is not None:
+        return f'{refused}: it has no key "{missing}"'
+    wrong = _first(_fits(has[key], hint) for key, hint in wanted.items())
+    return None if wrong is None else f"{refused}: {wrong}"
+
+
+def _judge_callables(source: Any, target: Any) -> str | None:
+    found = generics.class_of(source)
+    if found not in (_CALLABLE, type) and not (found and any("__call__" in vars(one) for one in found.__mro__)):
+        return f"{describe(source)} cannot be called"
+    (given, result), (wanted, expected) = generics.callable_parts(source), generics.callable_parts(target)
+    if given is not None and wanted is not None:
+        if len(given) != len(wanted):
+            return f"{describe(source)} takes {len(given)} arguments, not {len(wanted)}"
+        wrong = _first(_fits(theirs, mine) for mine, theirs in zip(given, wanted, strict=True))
+        if wrong is not None:
+            return f"{describe(source)} does not take what {describe(target)} is given: {wrong}"
+    return _fits(result, expected)
+
+
+def _judge_classes(source: Any, found: type, target: Any, wanted: type) -> str | None:
+    """Two classes, generic or not.
+
+    What is sent is never changed (rule T1), so what they hold may be of a narrower type.
+    """
+    refused = f"{describe(source)} is no {describe(target)}"
+    if not _is_or_has(found, wanted):
+        missing = generics.lacks(found, wanted)
+        return refused if missing is None else f'{refused}: it has no "{missing}"'
+    inner = _judge_tuples(source, target) if wanted is tuple else _judge_parts(source, target, wanted)
+    return None if inner is None else f"{refused}: {inner}"
+
+
+def _is_or_has(found: type, wanted: type) -> bool:
+    """A class is of another one, or has what a protocol asks for."""
+    return generics.lacks(found, wanted) is None if is_protocol(wanted) else issubclass(found, wanted)
+
+
+def _judge_parts(source: Any, target: Any, wanted: type) -> str | None:
+    expected = typing.get_args(target)
+    parts = generics.parts_as(source, wanted) if expected else generics.UNKNOWN
+    if parts is generics.UNKNOWN or len(parts) != len(expected):
+        return None
+    names = getattr(wanted, "__parameters__", ()) or (None,) * len(expected)
+    return _first(
+        _fits(theirs, mine) if getattr(name, "__contravariant__", False) else _fits(mine, theirs)
+        for name, mine, theirs in zip(names, parts, expected, strict=False)
+    )
+
+
+def _judge_tuples(source: Any, target: Any) -> str | None:
+    items, expected = generics.tuple_items(source), generics.tuple_items(target)
+    if items is generics.UNKNOWN or expected is generics.UNKNOWN:
+        return None
+    if expected[1:] == (...,):
+        return _first(_fits(item, expected[0]) for item in items if item is not ...)
+    if items[1:] == (...,):
+        return "its length is open"
+    if len(items) != len(expected):
+        return f"it has {len(items)} items, not {len(expected)}"
+    return _first(_fits(mine, theirs) for mine, theirs in zip(items, expected, strict=True))
+
+
+def _is_unpacked(hint: Any) -> bool:
+    return any(
+        typing.get_origin(part) is typing.Unpack or getattr(part, "__unpacked__", False)
+        for part in typing.get_args(hint)
+    )
+
+
+def _ask_beartype(source: Any, target: Any) -> str | None:
+    """What we know nothing of."""
     try:
         fits = TypeHint(source).is_subhint(TypeHint(target))
     except (BeartypeException, TypeError, ValueError) as error:
-        if _same_generic(source, target):  # beartype raises on every NDArray, also inside list[...]
-            pairs = zip(typing.get_args(source), typing.get_args(target), strict=True)
-            return next((reason for mine, theirs in pairs if (reason := _judge(mine, theirs))), None)
         culprit = next((hint for hint in (source, target) if not _is_hint(hint)), source)
         return f"hfg cannot judge the type {describe(culprit)} ({type(error).__name__}); use a plainer type, or Any"
     return None if fits else f"{describe(source)} is no {describe(target)}"
-
-
-def _same_generic(source: Any, target: Any) -> bool:
-    origin = typing.get_origin(source)
-    return (
-        isinstance(origin, type)
-        and origin is typing.get_origin(target)
-        and len(typing.get_args(source)) == len(typing.get_args(target))
-    )
 
 
 def _is_hint(hint: Any) -> bool:
@@ -216,7 +329,7 @@ def _judge_arrays(
     """Compare two arrays by dtype and layout; `_NOT_ARRAYS` if the target is none, or both are plain."""
     target_dtype = _dtype_of(target)
     if target_dtype is None:
-        return _NOT_ARRAYS if _dtype_of(source) is None or target is np.ndarray else _subclass(np.ndarray, target)
+        return _NOT_ARRAYS if _dtype_of(source) is None or target is np.ndarray else _judge_as_container(target)
     source_dtype = _dtype_of(source)
     if source_dtype is None:
         return f"{describe(source)} is no array"
@@ -229,8 +342,10 @@ def _judge_arrays(
     return None
 
 
-def _subclass(source: type, target: Any) -> str | None:
-    if isinstance(target, type) and issubclass(source, target):
+def _judge_as_container(target: Any) -> str | None:
+    """An array where none is asked for by name: an Iterable, a Protocol; its items are checked on the value."""
+    wanted = generics.class_of(target)
+    if wanted is not None and _is_or_has(np.ndarray, wanted):
         return None
     return f"an array is no {describe(target)}"
 

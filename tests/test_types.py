@@ -2,14 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+import re
+from collections import Counter, defaultdict
+from collections.abc import (
+    Callable,
+    Collection,
+    Generator,
+    Hashable,
+    ItemsView,
+    Iterable,
+    Mapping,
+    Sequence,
+)
 from dataclasses import dataclass
-from typing import Annotated, Any, Generic, Literal, NewType, Protocol, TypeVar, runtime_checkable
+from pathlib import Path
+from typing import (
+    Annotated,
+    Any,
+    Generic,
+    Literal,
+    NamedTuple,
+    NewType,
+    NoReturn,
+    Protocol,
+    SupportsFloat,
+    TypedDict,
+    TypeVar,
+    runtime_checkable,
+)
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
+from beartype import BeartypeConf
+from beartype.door import TypeHint, is_bearable
+from beartype.roar import BeartypeException
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from typing_extensions import TypeAliasType
 
@@ -53,6 +81,50 @@ class Named(Protocol):
 
 
 class Boxed(Generic[Value]): ...
+
+
+class BoxOfInt(Boxed[int]): ...
+
+
+class Poses(list[Pose]): ...
+
+
+class Prices(dict[str, float]): ...
+
+
+class Stack(list[Value]): ...
+
+
+class Corner(NamedTuple):
+    x: int
+    name: str
+
+
+class Options(TypedDict):
+    width: int
+
+
+class LongOptions(Options):
+    height: int
+
+
+class HasX(Protocol):
+    @property
+    def x(self) -> float: ...
+
+
+class SupportsArray(Protocol):
+    def __array__(self) -> Any: ...
+
+
+class Late:
+    def __init__(self, x: float) -> None:
+        self.x = x
+
+
+class Calling:
+    def __call__(self, value: int) -> int:
+        return value
 
 
 FITS = [
@@ -108,6 +180,65 @@ FITS = [
     (Bytes, npt.NDArray[np.uint8 | np.uint16]),
     (list[Bytes], list[Array]),
     (Image, Image | None),
+    # what is sent is never changed (rule T1), so what it holds may be of a narrower type
+    (list[int], Sequence[float]),
+    (list[bool], list[int]),
+    (dict[str, int], Mapping[str, float]),
+    # containers as what they are more generally
+    (tuple[int, ...], Sequence[int]),
+    (tuple[int, ...], Iterable[float]),
+    (tuple[int, str], Collection[int | str]),
+    (tuple[()], tuple[int, ...]),
+    (tuple[int, int], tuple[int, ...]),
+    (list[int], Iterable[int]),
+    (list[int], Collection[int]),
+    (set[int], Collection[int]),
+    (dict[str, int], Iterable[str]),
+    (dict[str, int], Collection[str]),
+    (Counter[str], Mapping[str, int]),
+    (defaultdict[str, int], dict[str, int]),
+    (ItemsView[str, int], Iterable[tuple[str, int]]),
+    (Generator[int, None, None], Iterable[int]),
+    (str, Sequence[str]),
+    (str, Collection[str]),
+    (bytes, Sequence[int]),
+    (range, Sequence[int]),
+    (Corner, tuple[int, str]),
+    (Corner, Sequence[int | str]),
+    (Options, Mapping[str, int]),
+    (Options, Options),
+    (LongOptions, Options),
+    # a bare generic holds anything; that is seen on the values
+    (list, list[int]),
+    (list[int], list),
+    (list, Sequence[int]),
+    (dict, Mapping[str, int]),
+    (tuple, tuple[int, int]),
+    (Boxed, Boxed[int]),
+    (Boxed[int], Boxed),
+    # classes that say it of their bases
+    (Poses, Sequence[Pose]),
+    (Prices, Mapping[str, float]),
+    (BoxOfInt, Boxed[int]),
+    (Stack[int], Sequence[int]),
+    # protocols, by what a class has, writes in `__init__` or inherits
+    (Pose, HasX),
+    (Late, HasX),
+    (int, SupportsFloat),
+    (Array, SupportsArray),
+    # what can be called: it may take more and give less
+    (Callable[[float], bool], Callable[[int], int]),
+    (Callable[..., int], Callable[[int], int]),
+    (type[Dog], Callable[..., Animal]),
+    (Calling, Callable[[int], int]),
+    # the rest
+    (bool, Literal[True, False]),
+    (Literal[1, 2], float),
+    (Array, Iterable[float]),
+    (list[int | None], list[int | None]),
+    (list[int] | None, Sequence[float]),
+    (list[Annotated[int, "metres"]], Sequence[Meters | int]),
+    (NoReturn, int),
 ]
 
 DOES_NOT_FIT = [
@@ -130,6 +261,32 @@ DOES_NOT_FIT = [
     (Annotated[npt.NDArray[np.float64], Shape(3)], Image, "the layout"),
     (list[Bytes], list[Floats], "array of uint8"),
     (npt.NDArray[np.uint8 | np.float32], Bytes, "is no array of uint8"),
+    (list[float], Sequence[int], "float is no int"),
+    (tuple[int, str], Iterable[int], "tuple[int, str] is no Iterable[int]: str is no int"),
+    (tuple[int, ...], tuple[int, int], "its length is open"),
+    (tuple[int], tuple[int, int], "it has 1 items, not 2"),
+    (list[int], tuple[int, ...], "is no tuple"),
+    (dict[str, int], Iterable[int], "str is no int"),
+    (str, Sequence[int], "str is no Sequence[int]: str is no int"),
+    (str, list[str], "str is no list[str]"),
+    (Sequence[int], list[int], "is no list[int]"),
+    (Mapping[str, int], dict[str, int], "is no dict"),
+    (set[int], Sequence[int], "is no Sequence"),
+    (list[int | None], list[int], "None is no int"),  # inside of another value it is one
+    (Poses, Sequence[int], "Pose is no int"),
+    (BoxOfInt, Boxed[str], "int is no str"),
+    (Animal, HasX, 'Animal is no HasX: it has no "x"'),
+    (str, SupportsFloat, '"__float__"'),
+    (Callable[[int], int], Callable[[float], int], "does not take what"),
+    (Callable[[int], int], Callable[[int, int], int], "takes 1 arguments, not 2"),
+    (Callable[[int], str], Callable[[int], int], "str is no int"),
+    (Animal, Callable[..., Any], "cannot be called"),
+    (bool, Literal[True], "False is no"),
+    (Options, Mapping[str, str], "int is no str"),
+    (Options, LongOptions, 'it has no key "height"'),
+    (dict[str, int], Options, "is no Options"),
+    (list, Hashable, "list is no Hashable"),
+    (Array, Sequence[float], "an array is no Sequence"),
 ]
 
 
@@ -160,6 +317,86 @@ def test_metadata_that_cannot_be_hashed_is_judged_all_the_same() -> None:
     assert compatible(Annotated[int, []], float)
     assert why_not(Annotated[str, []], int) == "str is no int"
     assert accepts(3, Annotated[int, []])
+
+
+_PAGE = Path(__file__).resolve().parent.parent / "docs" / "howto" / "types.md"
+_ROW = re.compile(r"^\| `(?P<source>.+)` \| `(?P<target>.+)` \| (?P<fits>yes|no) \|", re.MULTILINE)
+_ROWS = [tuple(part.replace("\\|", "|") for part in row.groups()) for row in _ROW.finditer(_PAGE.read_text("utf-8"))]
+
+
+@pytest.mark.rule("P3")
+@pytest.mark.parametrize(("source", "target", "fits"), _ROWS)
+def test_the_table_in_the_docs_is_true(source: str, target: str, fits: str) -> None:
+    names = {**globals(), "NDArray": npt.NDArray}
+    assert compatible(eval(source, names), eval(target, names)) is (fits == "yes")
+
+
+def test_the_table_in_the_docs_was_found() -> None:
+    assert len(_ROWS) > 20
+
+
+# --- beartype, where it has an opinion ---
+
+_LEAVES: list[Any] = [int, bool, float, complex, str, bytes, object, Animal, Dog, Pose, Corner, Poses, type(None)]
+_HINTS: st.SearchStrategy[Any] = st.recursive(
+    st.sampled_from(_LEAVES),
+    lambda inner: st.one_of(
+        st.builds(
+            lambda generic, item: generic[item],
+            st.sampled_from([list, set, frozenset, Sequence, Iterable, Collection]),
+            inner,
+        ),
+        st.builds(lambda generic, item: generic[str, item], st.sampled_from([dict, Mapping, defaultdict]), inner),
+        st.builds(lambda item: tuple.__class_getitem__((item, ...)), inner),
+        st.builds(lambda first, second: tuple.__class_getitem__((first, second)), inner, inner),
+        st.builds(lambda first, second: first | second, inner, inner),
+        st.builds(lambda item: item | None, inner),
+        st.builds(lambda item: Annotated[item, "metres"], inner),
+        st.builds(lambda given: Callable[..., given], inner),  # its arguments beartype takes the wrong way round
+        st.builds(lambda item: type[item], st.sampled_from([int, bool, Animal, Dog])),
+    ),
+    max_leaves=4,
+)
+
+
+@pytest.mark.rule("P3")
+@given(_HINTS, _HINTS)
+@example(list[int], Sequence[int])
+@example(tuple[int, ...], Iterable[int])
+def test_what_beartype_says_is_a_subtype_fits(source: Any, target: Any) -> None:
+    """We let more through than beartype, which knows nothing of int -> float or bare generics, and never less."""
+    try:
+        is_subtype = TypeHint(source).is_subhint(TypeHint(target))
+    except (BeartypeException, TypeError, ValueError):
+        return
+    assert compatible(source, target) or not is_subtype
+
+
+@pytest.mark.rule("P3")
+@given(st.data())
+@settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+def test_a_value_of_a_type_that_fits_is_a_value_of_the_other_also_for_beartype(data: st.DataObject) -> None:
+    source, target = data.draw(_VALUED), data.draw(_VALUED)
+    if not compatible(source, target):
+        return
+    value = data.draw(st.from_type(source))
+    if value is None:
+        return  # in an output it is silence (rule T2)
+    assert is_bearable(value, target, conf=BeartypeConf(is_pep484_tower=True))
+    assert accepts(value, target)
+
+
+_VALUED: st.SearchStrategy[Any] = st.recursive(
+    st.sampled_from([int, bool, float, str, bytes, Corner, type(None)]),
+    lambda inner: st.one_of(
+        st.builds(lambda generic, item: generic[item], st.sampled_from([list, Sequence, Collection]), inner),
+        st.builds(lambda generic, item: generic[str, item], st.sampled_from([dict, Mapping]), inner),
+        st.builds(lambda item: tuple.__class_getitem__((item, ...)), inner),
+        st.builds(lambda first, second: tuple.__class_getitem__((first, second)), inner, inner),
+        st.builds(lambda first, second: first | second, inner, inner),
+    ),
+    max_leaves=3,
+)
 
 
 @given(st.sampled_from([hint for pair in FITS for hint in pair]))
