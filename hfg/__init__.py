@@ -7,9 +7,9 @@ Which floor stands on which; imports go down only, and asyncio begins on floor 5
     5  engine                                      outside: hfg_transports (sees floors 0-1 only)
     4  activity
     3  graph
-    2  nodetype, functions  <-  declaration  <-  signature  <-  hints, description     registry
+    2  nodetype, functions  <-  declaration  <-  vectors, signature  <-  hints, description     registry
     1  ports                                       transport
-    0  errors   problem   token   types   clock   trace   starting
+    0  errors   problem   token   types   generics   clock   trace   starting
 
 A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
 """
@@ -25,7 +25,8 @@ from hfg.errors import EndOfStream
 from hfg.functions import node
 from hfg.graph import Graph, Subgraph, commands
 from hfg.nodetype import Node
-from hfg.ports import Event, Input, Output, Parameter, State, slot
+from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
+from hfg.registry import reference_of
 from hfg.token import END, NO_MESSAGE, Token
 
 __all__ = [
@@ -33,14 +34,18 @@ __all__ = [
     "NO_MESSAGE",
     "EndOfStream",
     "Event",
+    "Events",
     "Graph",
     "Input",
+    "Inputs",
     "Node",
     "Output",
+    "Outputs",
     "Parameter",
     "PunctualLoop",
     "Report",
     "Run",
+    "Slots",
     "State",
     "StateMachine",
     "Statistics",
@@ -51,6 +56,7 @@ __all__ = [
     "errors",
     "node",
     "now",
+    "reference_of",
     "run",
     "run_async",
     "running",

@@ -8,7 +8,7 @@ from __future__ import annotations
 import inspect
 import re
 import types
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final, TypeAlias, TypeVar
 
 from hfg.description import EventSpec, InputSpec, NodeType, OutputSpec, Result, SlotSpec
@@ -22,8 +22,10 @@ from hfg.ports.outputs import Output
 from hfg.ports.parameters import REQUIRED, Parameter, ParameterSpec
 from hfg.ports.slots import UNSET, Slot
 from hfg.ports.states import State
+from hfg.ports.vectors import Events, Inputs, Outputs, Slots, Vector, VectorSpec
 from hfg.signature import Signature, read_signature
-from hfg.types import is_hint
+from hfg.types import describe, is_hint
+from hfg.vectors import list_of, size_parameters, vector_specs
 
 __all__ = [
     "HOOKS",
@@ -47,9 +49,9 @@ RESERVED: Final = frozenset(
 
 _SUBGRAPH_RESERVED: Final = RESERVED | {"graph", "build", "iterate_over"}
 
-Declaration: TypeAlias = Input[Any] | Output[Any] | Event[Any] | Slot[Any] | Parameter[Any] | State[Any]
+Declaration: TypeAlias = Input[Any] | Output[Any] | Event[Any] | Slot[Any] | Vector[Any] | Parameter[Any] | State[Any]
 D = TypeVar("D")
-_DECLARATIONS: Final = (Input, Output, Event, Slot, Parameter, State)
+_DECLARATIONS: Final = (Input, Output, Event, Slot, Vector, Parameter, State)
 
 
 class Shared:
@@ -83,9 +85,11 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
     is_subgraph = issubclass(cls, Relaying)
     _wrap_overridden_slots(cls, base)
     declared = _declared(cls, base, where)
+    vectors = vector_specs(declared, where)
     parameters = {name: parameter.spec() for name, parameter in _of(declared, Parameter).items()}
-    inputs = {name: InputSpec(name, d.type, d.optional, d.default) for name, d in _of(declared, Input).items()}
-    outputs = {name: OutputSpec(name, d.type) for name, d in _of(declared, Output).items()}
+    parameters.update(size_parameters(vectors))
+    inputs = {name: _input_spec(name, d) for name, d in _declared_as(declared, Input, Inputs)}
+    outputs = {name: OutputSpec(name, d.type) for name, d in _declared_as(declared, Output, Outputs)}
     process = cls.process
     signature = None
     if process is not base.process:
@@ -97,12 +101,12 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
             raise DeclarationError(
                 f'{where}: "process" is reserved for the function of a firing, got {process!r}; choose another name'
             )
-        signature = _read_process(cls, process, inputs, where)
+        signature = _read_process(cls, process, inputs, vectors, where)
         inputs = {spec.name: spec for spec in signature.inputs}
         parameters.update((spec.name, spec) for spec in signature.parameters if spec.name not in parameters)
-        outputs = outputs or _outputs(signature, where, must_say=not _of(declared, Input))
-    events = {name: EventSpec(name, d.type) for name, d in _of(declared, Event).items()}
-    slots = {name: _slot_spec(cls, d, where, is_subgraph) for name, d in _of(declared, Slot).items()}
+        outputs = outputs or _outputs(signature, where, must_say=not _has_inputs(declared))
+    events = {name: EventSpec(name, d.type) for name, d in _declared_as(declared, Event, Events)}
+    slots = {name: _slot_spec(cls, d, where, is_subgraph) for name, d in _declared_as(declared, Slot, Slots)}
     for spec in parameters.values():
         if spec.trigger:
             events[spec.name], slots[spec.name] = (
@@ -129,6 +133,7 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
         declared=declared,
         hooks=frozenset(name for name in HOOKS if getattr(cls, name) is not getattr(base, name)),
         caller=None if signature is None else _caller(signature),
+        vectors=types.MappingProxyType(vectors),
     )
     check_names(kind, where, _SUBGRAPH_RESERVED if is_subgraph else RESERVED)
     install_ports(cls, kind, base)
@@ -137,6 +142,20 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
 
 def _of(declared: Mapping[str, Declaration], kind: type[D]) -> dict[str, D]:
     return {name: declaration for name, declaration in declared.items() if isinstance(declaration, kind)}
+
+
+def _declared_as(declared: Mapping[str, Declaration], *kinds: type[Any]) -> Iterator[tuple[str, Any]]:
+    """Give the declarations of some kinds, in order of declaration."""
+    return ((name, declaration) for name, declaration in declared.items() if isinstance(declaration, kinds))
+
+
+def _has_inputs(declared: Mapping[str, Declaration]) -> bool:
+    return any(isinstance(declaration, Input | Inputs) for declaration in declared.values())
+
+
+def _input_spec(name: str, declaration: Input[Any] | Inputs[Any]) -> InputSpec:
+    hint = list_of(declaration.type) if isinstance(declaration, Inputs) else declaration.type
+    return InputSpec(name, hint, declaration.optional, declaration.default)
 
 
 def _caller(signature: Signature) -> Callable[[Any], Callable[..., Any]]:
@@ -197,8 +216,10 @@ def _argument(handler: Any) -> str | None:
     return names[1] if len(names) > 1 else None
 
 
-def _slot_spec(cls: type, slot: Slot[Any], where: str, is_subgraph: bool) -> SlotSpec:
+def _slot_spec(cls: type, slot: Slot[Any] | Slots[Any], where: str, is_subgraph: bool) -> SlotSpec:
     name = slot.name
+    if isinstance(slot, Slots):
+        return _slots_spec(slot, where, is_subgraph)
     if slot.handler is None:
         if not is_subgraph:
             raise DeclarationError(
@@ -210,7 +231,7 @@ def _slot_spec(cls: type, slot: Slot[Any], where: str, is_subgraph: bool) -> Slo
                 "slots inside that it leads to"
             )
         return SlotSpec(name, object if slot.type is UNSET else slot.type)
-    arguments = list(inspect.signature(slot.handler).parameters.values())[1:]
+    arguments = _behind_self(slot.handler, f'the handler of slot "{name}"', where)
     needed = [a for a in arguments if a.default is a.empty and a.kind not in (a.VAR_KEYWORD, a.VAR_POSITIONAL)]
     if len(needed) > 1 or any(a.kind is a.KEYWORD_ONLY for a in needed):
         names = ", ".join(a.name for a in needed)
@@ -232,9 +253,59 @@ def _slot_spec(cls: type, slot: Slot[Any], where: str, is_subgraph: bool) -> Slo
     return SlotSpec(name, type_ if slot.type is UNSET else slot.type, name, True, token, runs, slot.while_active)
 
 
-def _read_process(cls: type, process: Any, inputs: dict[str, InputSpec], where: str) -> Signature:
+def _slots_spec(slots: Slots[Any], where: str, is_subgraph: bool) -> SlotSpec:
+    """Describe each slot of a vector; its handler is told the number first."""
+    name, hint = slots.name, slots.type
+    if slots.handler is None:
+        if not is_subgraph:
+            raise DeclarationError(
+                f'{where}: the slots "{name}" have no handler; write `@hfg.Slots({describe(hint)}, 3)` above '
+                f"`def {name}(self, number: int, value)`"
+            )
+        return SlotSpec(name, hint)
+    arguments = _behind_self(slots.handler, f'the handler of the slots "{name}"', where)
+    positional = [a for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
+    if not positional or len([a for a in arguments if a.default is a.empty]) > 2:
+        raise DeclarationError(
+            f'{where}: the handler of the slots "{name}" takes the number of the slot and at most one value; write '
+            f"`def {name}(self, number: int, value)`"
+        )
+    token = False
+    if len(positional) > 1:
+        hints = hints_of(slots.handler, f'{where}, slots "{name}"')
+        token = split_token(hints[positional[1].name])[1] if positional[1].name in hints else False
+    return SlotSpec(name, hint, name, len(positional) > 1, token, "async" in kind_of(slots.handler))
+
+
+def _behind_self(function: Callable[..., Any], what: str, where: str) -> list[inspect.Parameter]:
+    """Give the arguments of a method behind the node itself.
+
+    Raises:
+      DeclarationError: the first cannot be the node.
+    """
+    arguments = list(inspect.signature(function).parameters.values())
+    first = arguments[0] if arguments else None
+    if first is None or first.kind is first.KEYWORD_ONLY or _is_annotated(first):
+        given = ", ".join(str(argument) for argument in arguments)
+        name = getattr(function, "__name__", "process")
+        raise DeclarationError(
+            f"{where}: {what} is a method and takes the node first; write "
+            f"`def {name}(self{', ' if given else ''}{given})`, or @staticmethod above it"
+        )
+    return arguments[1:]
+
+
+def _is_annotated(argument: inspect.Parameter) -> bool:
+    return argument.name != "self" and argument.annotation is not argument.empty
+
+
+def _read_process(
+    cls: type, process: Any, inputs: dict[str, InputSpec], vectors: Mapping[str, VectorSpec], where: str
+) -> Signature:
     bound = inspect.isfunction(inspect.getattr_static(cls, "process"))
-    return read_signature(process, where, known=inputs, bound=bound)
+    if bound:
+        _behind_self(process, "process", where)
+    return read_signature(process, where, known=inputs, bound=bound, vectors=vectors.keys() & inputs.keys())
 
 
 def _outputs(signature: Signature, where: str, *, must_say: bool) -> dict[str, OutputSpec]:
@@ -262,8 +333,7 @@ def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED)
     Raises:
       DeclarationError: naming the port and the remedy.
     """
-    triggers = {name for name, spec in kind.parameters.items() if spec.trigger}
-    values = [name for name in kind.parameters if name not in triggers]
+    values = [name for name, spec in kind.parameters.items() if spec.is_port]
     for side in ([*kind.inputs, *kind.slots, *values], [*kind.outputs, *kind.events, *values]):
         doubled = next((name for name in side if side.count(name) > 1), None)
         if doubled is not None:
@@ -316,6 +386,8 @@ def install_ports(cls: type, kind: NodeType, base: type) -> None:
     made += [Output(spec.type) for spec in kind.outputs.values()]
     names = [*kind.inputs, *kind.outputs]
     for spec in kind.parameters.values():
+        if spec.size:
+            continue
         made.append(Parameter(spec.default, *spec.limits, unit=spec.unit, choices=spec.choices, type=spec.type))
         names.append(spec.name)
     for name, declaration in zip(names, made, strict=True):

@@ -16,6 +16,7 @@ import msgspec
 
 from hfg.ports.parameters import REQUIRED, ParameterSpec
 from hfg.ports.states import State
+from hfg.ports.vectors import VectorSpec, element
 
 __all__ = [
     "EventSpec",
@@ -94,6 +95,8 @@ class NodeType:
       declared: the declarations in the class by name; identity tells a method reached by `super()` from the node's own.
       hooks: the hooks it overrides.
       caller: makes `node._process_call()`.
+      vectors: vectors of ports, whose ports are among the others, "values[0]" ...
+      layout: of a type with vectors of outputs, for each declared output how many ports it has, None for no vector.
     """
 
     name: str
@@ -116,6 +119,8 @@ class NodeType:
     declared: Mapping[str, Any] = field(default_factory=dict)
     hooks: frozenset[str] = frozenset()
     caller: Callable[[Any], Callable[..., Any]] | None = None
+    vectors: Mapping[str, VectorSpec] = field(default_factory=dict)
+    layout: tuple[int | None, ...] = ()
 
     @property
     def is_source(self) -> bool:
@@ -126,6 +131,16 @@ class NodeType:
     def given_parameters_once(self) -> bool:
         """Whether its code is given the parameters as it begins and sees no later value: a generator function."""
         return self.is_function and self.process_kind in ("generator", "async generator")
+
+    def spread(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Give values by input, where those of a vector may be a list under its name."""
+        found: dict[str, Any] = {}
+        for name, value in values.items():
+            if name in self.vectors and isinstance(value, list | tuple):
+                found.update((element(name, number), one) for number, one in enumerate(value))
+            else:
+                found[name] = value
+        return found
 
     @property
     def reference(self) -> str | None:

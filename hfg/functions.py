@@ -25,7 +25,10 @@ from hfg.hints import MISSING, function_name, hints_of_class, output_type
 from hfg.nodetype import Node
 from hfg.ports.outputs import OutputPort
 from hfg.ports.parameters import Parameter, ParameterSpec
+from hfg.ports.vectors import Inputs, Outputs, Vector
 from hfg.signature import CallPlan, Signature, read_signature
+from hfg.types import describe
+from hfg.vectors import list_of, size_parameters, vector_specs
 
 __all__ = ["FunctionNode", "NodeFunction", "node"]
 
@@ -176,6 +179,8 @@ def node(
         return functools.partial(node, inputs=inputs, outputs=outputs, parameters=parameters)
     if isinstance(function, NodeFunction) or (inspect.isclass(function) and issubclass(function, Node)):
         raise DeclarationError(f"{function_name(function)} is a node type already; use it as it is")
+    if isinstance(function, Node):
+        raise DeclarationError(f"{function!r} is a node already; add it to a graph: graph.add(node)")
     if not callable(function):
         raise DeclarationError(
             f"hfg.node needs a function, got {function!r}; options are given by keyword, as in hfg.node(outputs=Found)"
@@ -201,11 +206,19 @@ def _make(
 ) -> NodeFunction[..., Any]:
     name = function_name(function)
     where = f"node type {name}"
+    declared = _declared_vectors(where, inputs, outputs)
+    vectors = vector_specs(declared, where)
     signature = _read(function, where, inputs, outputs, parameters)
     output_specs, fields = _read_outputs(function, where, outputs, signature)
     result: Result = "none" if not output_specs else "fields" if fields is not None else "single"
     plan = signature.plan
+    if inspect.isclass(function) and not signature.inputs:
+        raise DeclarationError(
+            f"{where}: a class without inputs would be a source of {name} objects without end; write "
+            f"`class {name}(hfg.Node)` for a node type with state, or decorate a function"
+        )
     inputs_by_name = {spec.name: spec for spec in signature.inputs}
+    parameters_by_name = {spec.name: spec for spec in signature.parameters} | size_parameters(vectors)
     if len(inputs_by_name) < len(signature.inputs):
         raise DeclarationError(f"{where}: two inputs have the same name; give each its own in inputs=")
 
@@ -223,16 +236,20 @@ def _make(
             doc=inspect.cleandoc(getattr(function, "__doc__", None) or ""),
             inputs=types.MappingProxyType(inputs_by_name),
             outputs=types.MappingProxyType({spec.name: spec for spec in output_specs}),
-            parameters=types.MappingProxyType({spec.name: spec for spec in signature.parameters}),
+            parameters=types.MappingProxyType(parameters_by_name),
             process_kind=signature.kind,
             result=result,
             fields=fields or (),
             is_function=True,
             shared=shared_names(inputs_by_name, [spec.name for spec in output_specs], (), ()),
             caller=call_of,
+            declared=declared,
+            vectors=types.MappingProxyType(vectors),
         )
         check_names(made, where, RESERVED)
         install_ports(cls, made, Node)
+        for vector_name, vector in declared.items():
+            setattr(cls, vector_name, vector)
         return made
 
     body = {
@@ -245,8 +262,32 @@ def _make(
         types.new_class(name, (FunctionNode,), {"_made": describe_type}, lambda namespace: namespace.update(body)),
     )
     made: NodeFunction[..., Any] = NodeFunction(function, node_class)
-    made._type = node_class._type = dataclasses.replace(node_class._type, origin=made)
+    node_class._type = dataclasses.replace(node_class._type, origin=made)
+    if vectors:
+        node_class._stand_for_sizes()
+    made._type = node_class._type
     return made
+
+
+def _declared_vectors(where: str, inputs: Mapping[str, Any] | None, outputs: Any) -> dict[str, Vector[Any]]:
+    """Give the vectors that the call declares, each under its name.
+
+    Raises:
+      DeclarationError: an input and an output share a name, or a vector is of the other kind.
+    """
+    found: dict[str, Vector[Any]] = {}
+    for word, kind, given in (("inputs", Inputs, inputs), ("outputs", Outputs, outputs)):
+        for name, vector in given.items() if isinstance(given, Mapping) else ():
+            if not isinstance(vector, Vector):
+                continue
+            if not isinstance(vector, kind) or name in found:
+                raise DeclarationError(
+                    f'{where}: {word}= has {vector!r} as "{name}"; give each a name of its own, as in '
+                    f'{word}={{"{name}": hfg.{kind.__name__}(int, 3)}}'
+                )
+            vector.name = name
+            found[name] = vector
+    return found
 
 
 def _read(
@@ -262,7 +303,9 @@ def _read(
         return Signature(tuple(InputSpec(name, Any) for name in names), (), MISSING, "function", plan)
     declared = {name: value for name, value in (parameters or {}).items() if isinstance(value, Parameter)}
     defaults = {name: value.default if name in declared else value for name, value in (parameters or {}).items()}
-    signature = read_signature(function, where, inputs=inputs, parameters=defaults)
+    vectors = [name for name, value in (inputs or {}).items() if isinstance(value, Inputs)]
+    types_ = {name: list_of(value.type) if name in vectors else value for name, value in (inputs or {}).items()}
+    signature = read_signature(function, where, inputs=types_, parameters=defaults, vectors=vectors)
     if not declared:
         return signature
 
@@ -278,8 +321,14 @@ def _read_outputs(
     function: Any, where: str, outputs: Any, signature: Signature
 ) -> tuple[list[OutputSpec], tuple[str, ...] | None]:
     """Give the outputs, and the field names if the result is split; None if it is one value."""
+    if isinstance(outputs, Outputs):
+        raise DeclarationError(
+            f"{where}: a vector of outputs needs a name; write "
+            f'outputs={{"parts": hfg.Outputs({describe(outputs.type)}, 3)}}'
+        )
     if isinstance(outputs, Mapping):
-        return [OutputSpec(name, hint) for name, hint in outputs.items()], tuple(outputs)
+        hints = {name: one.type if isinstance(one, Outputs) else one for name, one in outputs.items()}
+        return [OutputSpec(name, hint) for name, hint in hints.items()], tuple(outputs)
     if outputs is not None:
         fields = _fields_of(outputs, where)
         if fields is not None:

@@ -34,6 +34,7 @@ from hfg.ports.parameters import ParameterPort
 from hfg.ports.slots import SlotPort
 from hfg.ports.views import Ports
 from hfg.token import Token
+from hfg.vectors import Vectors
 
 __all__ = ["Node", "NodeType", "Place"]
 
@@ -139,6 +140,15 @@ class Node:
                 f'node type {cls.__name__}: "{hidden}" is used by hfg itself; choose a name without the underscore'
             )
         cls._type = declare(cls, Node) if _made is None else _made(cls)
+        if _made is None and cls._type.vectors:
+            cls._stand_for_sizes()
+
+    @classmethod
+    def _stand_for_sizes(cls) -> None:
+        """Let the class make nodes of the size they are asked for (`vectors`); its type was read as their pattern."""
+        vectors = Vectors(cls, cls._type)
+        setattr(cls, "__new__", vectors.make)  # noqa: B010 - type checkers would take it for that of every node
+        cls._type = vectors.shown
 
     # --- for users ---
 
@@ -239,7 +249,7 @@ class Node:
                 return EventPort(self, name, type_.events[name].type)
             case "slot" if name in type_.slots:
                 return SlotPort(self, name, type_.slots[name].type)
-            case "parameter" if name in type_.parameters:
+            case "parameter" if name in type_.parameters and type_.parameters[name].is_port:
                 return ParameterPort(self, name, type_.parameters[name])
             case "event" if name in AUTOMATIC_EVENTS and (not type_.is_subgraph or name in SUBGRAPH_EVENTS):
                 return EventPort(self, name, AUTOMATIC_EVENTS[name])
@@ -298,6 +308,8 @@ class Node:
             return [result]
         if result is None:
             return [None] * len(type_.outputs)
+        if type_.layout:
+            result = self._spread(result)
         names = ", ".join(f'"{name}"' for name in type_.outputs)
         if type_.result == "none":
             raise TypeError(
@@ -317,6 +329,30 @@ class Node:
             f"{type_.name} gave back {result!r}, but has the outputs {names}; return a tuple with one value for each"
         )
 
+    def _spread(self, result: Any) -> list[Any]:
+        """Put what was given back for a vector of outputs in the place of the vector."""
+        type_ = self._type
+        parts = [result] if len(type_.layout) == 1 else result
+        if not isinstance(parts, tuple | list) or len(parts) != len(type_.layout):
+            raise TypeError(
+                f"{type_.name} gave back {result!r:.80}, but has {len(type_.layout)} outputs and vectors of outputs; "
+                "return a tuple with one value for each, and a list for each vector"
+            )
+        values: list[Any] = []
+        for part, count in zip(parts, type_.layout, strict=True):
+            if count is None:
+                values.append(part)
+            elif part is None:
+                values += [None] * count
+            elif not isinstance(part, tuple | list) or len(part) != count:
+                raise TypeError(
+                    f"{type_.name} gave back {part!r:.80} for a vector of {count} outputs; return a list with one "
+                    "value for each, None for silence"
+                )
+            else:
+                values += part
+        return values
+
     def _set_parameter(self, name: str, value: Any) -> None:
         """Change a parameter; the value stays if it is refused.
 
@@ -326,6 +362,11 @@ class Node:
         spec = self._type.parameters.get(name)
         if spec is None or spec.trigger:
             raise ValueError(unknown_parameter(self._type, name))
+        if spec.size:
+            raise ValueError(
+                f'"{_name(self)}.{name}" is a vector of {self._parameters[name]} ports, and a node keeps its ports: '
+                f"make another, {self._type.qualname}({name}={value!r}), or replace it by an edit"
+            )
         wrong = spec.check(value)
         if wrong is not None:
             raise ValueError(f'parameter "{_name(self)}.{name}" {wrong}')

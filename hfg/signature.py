@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import typing
 from collections import abc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
@@ -34,11 +34,13 @@ class CallPlan:
       positional: for each positional argument, the index of its input, or the name of its parameter.
       keyword_inputs: argument name and index of inputs passed by keyword.
       keyword_parameters: names of parameters passed by keyword.
+      rest: the index of the input whose list becomes all further positional arguments, `*values`.
     """
 
     positional: tuple[int | str, ...]
     keyword_inputs: tuple[tuple[str, int], ...] = ()
     keyword_parameters: tuple[str, ...] = ()
+    rest: int | None = None
 
     def bind(self, function: Callable[..., Any], parameters: Mapping[str, Any]) -> Callable[..., Any]:
         """Make what takes one positional argument for each input.
@@ -46,8 +48,8 @@ class CallPlan:
         Parameters are read from the live mapping at each call. Without parameters and with inputs in order it is the
         function itself: no call between runner and user.
         """
-        inputs_lead = self.positional == tuple(range(len(self.positional))) and not self.keyword_inputs
-        names = self.keyword_parameters
+        names, rest = self.keyword_parameters, self.rest
+        inputs_lead = self.positional == tuple(range(len(self.positional))) and not self.keyword_inputs and rest is None
         if inputs_lead and not names:
             return function
         if inputs_lead and len(names) == len(parameters):
@@ -59,7 +61,7 @@ class CallPlan:
             positional = [values[item] if type(item) is int else parameters[item] for item in self.positional]  # type: ignore[index]
             keywords = {name: values[index] for name, index in self.keyword_inputs}
             keywords.update((name, parameters[name]) for name in names)
-            return function(*positional, **keywords)
+            return function(*positional, *(values[rest] if rest is not None else ()), **keywords)
 
         return call
 
@@ -83,6 +85,7 @@ def read_signature(
     parameters: Mapping[str, Any] | None = None,
     known: Mapping[str, InputSpec] | None = None,
     bound: bool = False,
+    vectors: Collection[str] = (),
 ) -> Signature:
     """Read a callable.
 
@@ -93,11 +96,12 @@ def read_signature(
       parameters: defaults of arguments that are parameters.
       known: for classes, inputs declared as ports; then arguments take their types from there.
       bound: the first argument is the node itself.
+      vectors: which inputs are vectors; the argument takes a list, or is `*values`.
 
     Raises:
       DeclarationError: something needed is missing, or cannot be a port.
     """
-    return _Reader(function, where, inputs or {}, parameters or {}, known).read(bound)
+    return _Reader(function, where, inputs or {}, parameters or {}, known, vectors).read(bound)
 
 
 class _Reader:
@@ -110,12 +114,14 @@ class _Reader:
         inputs: Mapping[str, Any],
         parameters: Mapping[str, Any],
         known: Mapping[str, InputSpec] | None,
+        vectors: Collection[str],
     ) -> None:
         self.function = function
         self.where = where
         self.given_inputs = inputs
         self.given_parameters = parameters
         self.known = known
+        self.vectors = vectors
         # With types in inputs= that list is complete; with new names only, the others are read from the annotations.
         self.inputs_complete = any(not isinstance(value, str) for value in inputs.values())
         self.inputs: list[InputSpec] = []
@@ -123,6 +129,7 @@ class _Reader:
         self.positional: list[int | str] = []
         self.keyword_inputs: list[tuple[str, int]] = []
         self.keyword_parameters: list[str] = []
+        self.rest: int | None = None
         self.hints: dict[str, Any] = {}
 
     def read(self, bound: bool) -> Signature:
@@ -154,7 +161,7 @@ class _Reader:
                 f'{self.where}: a generator is a source and takes no inputs, but it has "{self.inputs[0].name}"; '
                 "return one value for each firing, or make the argument a keyword-only parameter"
             )
-        plan = CallPlan(tuple(self.positional), tuple(self.keyword_inputs), tuple(self.keyword_parameters))
+        plan = CallPlan(tuple(self.positional), tuple(self.keyword_inputs), tuple(self.keyword_parameters), self.rest)
         return Signature(tuple(self.inputs), tuple(self.parameters), output, kind, plan)
 
     def _check_given(self, names: set[str], any_keyword: bool) -> None:
@@ -172,12 +179,26 @@ class _Reader:
     def _argument(self, argument: inspect.Parameter, by_position: bool) -> bool:
         name = argument.name
         if argument.kind is argument.VAR_KEYWORD:
-            return by_position
-        if argument.kind is argument.VAR_POSITIONAL:
             if self.known is not None or not (self.given_inputs or self.given_parameters):
                 raise DeclarationError(
-                    f'{self.where}: "*{name}" cannot be a port; name each argument, or connect through a node that '
-                    "collects them"
+                    f'{self.where}: "**{name}" takes what nobody can give, for ports and parameters have names; name '
+                    f"each, as in `*, gain: float = 1.0`, or leave **{name} out"
+                )
+            return by_position
+        if argument.kind is argument.VAR_POSITIONAL:
+            if name in self.vectors and by_position:
+                self.rest = len(self.inputs)
+                self.inputs.append(self._input(argument))
+            elif self.known is not None or not (self.given_inputs or self.given_parameters):
+                hint = describe(self.hints.get(name, Any))
+                remedy = (
+                    f'inputs={{"{name}": hfg.Inputs({hint}, 3)}}'
+                    if self.known is None
+                    else f"{name} = hfg.Inputs({hint}, 3)"
+                )
+                raise DeclarationError(
+                    f'{self.where}: "*{name}" does not say how many inputs there are; declare a vector of them, '
+                    f"{remedy}, or name each argument"
                 )
             return False
         positional = argument.kind in _POSITIONAL
@@ -221,7 +242,7 @@ class _Reader:
         hint = self.hints.get(name, MISSING) if given is MISSING or isinstance(given, str) else given
         if self.known is not None and name in self.known:
             spec = self.known[name]
-            token = hint is not MISSING and split_token(hint)[1]
+            token = hint is not MISSING and split_token(self._of_each(hint, argument))[1]
             if has_default and not spec.optional:
                 raise DeclarationError(
                     f'{self.where}: process gives "{name}" a default, but the input is mandatory; '
@@ -245,7 +266,16 @@ class _Reader:
                 f"{self._call_to_write(name)}"
             )
         type_, token = split_token(hint)
+        if name in self.vectors:
+            token = split_token(self._of_each(self.hints.get(name, MISSING), argument))[1]
         return InputSpec(given if isinstance(given, str) else name, type_, has_default, default, token)
+
+    def _of_each(self, hint: Any, argument: inspect.Parameter) -> Any:
+        """What one port of a vector brings; the list of them is annotated, or each of `*values`."""
+        parts = typing.get_args(hint)
+        if argument.name not in self.vectors or argument.kind is argument.VAR_POSITIONAL or len(parts) != 1:
+            return hint
+        return parts[0] if split_token(parts[0])[1] else hint
 
     def _match_known(self) -> None:
         """The call gives values in the order of the declared ports, whatever the order of the arguments."""
@@ -262,6 +292,7 @@ class _Reader:
         new_index = [order[spec.name] for spec in self.inputs]
         self.positional = [new_index[item] if isinstance(item, int) else item for item in self.positional]
         self.keyword_inputs = [(name, new_index[index]) for name, index in self.keyword_inputs]
+        self.rest = None if self.rest is None else new_index[self.rest]
         self.inputs.sort(key=lambda spec: order[spec.name])
 
     def _parameter(self, argument: inspect.Parameter) -> ParameterSpec:

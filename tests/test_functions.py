@@ -346,7 +346,7 @@ def doubled(value: int, *, out: int = 1) -> int: ...
         (cv2.medianBlur, {"inputs": {"src": Image}}, r"nothing says what it gives back.*outputs=Any"),
         (math.sqrt, {}, r'write hfg\.node\(sqrt, inputs=\{"x": Any\}, outputs=Any\)'),
         (typing_only, {}, r'"Decimal" in the annotation of "value" cannot be found at run time'),
-        (stars, {}, r'"\*values" cannot be a port'),
+        (stars, {}, r'"\*values" .* inputs=\{"values": hfg.Inputs'),
         (generating, {}, "a generator is a source and takes no inputs"),
         (reserved, {}, r'"reset" is reserved for every node; .* as in inputs=\{"reset": "reset_in"\}'),
         (hidden, {}, '"_value" cannot be the name of a port'),

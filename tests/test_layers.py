@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 FLOORS = {
     "hfg.errors": 0,
+    "hfg.generics": 0,
     "hfg.problem": 0,
     "hfg.token": 0,
     "hfg.types": 0,
@@ -34,6 +35,7 @@ FLOORS = {
     "hfg.nodetype": 2,
     "hfg.registry": 2,
     "hfg.signature": 2,
+    "hfg.vectors": 2,
     "hfg.graph": 3,
     "hfg.activity": 4,
     "hfg.timeline": 4,

@@ -10,11 +10,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from types import ModuleType
-from typing import Any, TypeVar, overload
+from typing import Any, Final, Never, TypeVar, overload
 
 from reactivex import Observable
 from typing_extensions import TypeForm
 
+from hfg.errors import UsageError
 from hfg.graph.checks.checking import check
 from hfg.graph.drawing.formats import draw
 from hfg.graph.editing import transactions
@@ -42,6 +43,8 @@ __all__ = ["Graph"]
 
 N = TypeVar("N", bound=Node)
 T = TypeVar("T")
+
+_NOBODY: Final[Any] = None  # so that a forgotten `by=` is answered by a sentence
 
 
 class Graph:
@@ -218,6 +221,34 @@ class Graph:
         initial: Iterable[T] = (),
         buffer: int = 0,
     ) -> Edge: ...
+    @overload
+    def connect(
+        self,
+        source: str,
+        target: Target[Any] | str,
+        *,
+        active: bool = False,
+        capacity: int = DEFAULT_CAPACITY,
+        overflow: Overflow = "wait",
+        capacity_limit: int | None = None,
+        through: Iterable[Callable[[Observable[Any]], Observable[Any]]] = (),
+        initial: Iterable[Any] = (),
+        buffer: int = 0,
+    ) -> Edge: ...
+    @overload
+    def connect(
+        self,
+        source: Source[Any] | Observable[Any],
+        target: str,
+        *,
+        active: bool = False,
+        capacity: int = DEFAULT_CAPACITY,
+        overflow: Overflow = "wait",
+        capacity_limit: int | None = None,
+        through: Iterable[Callable[[Observable[Any]], Observable[Any]]] = (),
+        initial: Iterable[Any] = (),
+        buffer: int = 0,
+    ) -> Edge: ...
     def connect(
         self,
         source: Any,
@@ -234,8 +265,8 @@ class Graph:
         """Declare an edge from an output or event to an input or slot; a reactivex observable feeds from outside.
 
         Args:
-          source: where it begins.
-          target: where it ends.
+          source: where it begins: the port, or its path, "fetch/camera.out".
+          target: where it ends, in the same way.
           active: it also transports activity, the double line of the paper.
           capacity: of an event edge: how many untaken signals it holds (rule P5).
           overflow: of an event edge: what happens to more of them.
@@ -246,6 +277,7 @@ class Graph:
 
         Raises:
           ConnectionError: the edge cannot be; nothing was changed.
+          GraphError: a path leads nowhere.
         """
         said = {
             "active": active,
@@ -276,11 +308,11 @@ class Graph:
         """
         return declare_group(self._level, name, threads, policy, seed)
 
-    def move(self, node: Node, *, group: str | None) -> None:
+    def move(self, node: Node | str, *, group: str | None) -> None:
         """Let a node run in another group; with a subgraph go all inside that have no group of their own.
 
         Args:
-          node: of this graph or of a subgraph in it.
+          node: of this graph or of a subgraph in it, or its path.
           group: one that is declared; None is that of the subgraph around the node, at last the loop.
 
         Raises:
@@ -288,20 +320,26 @@ class Graph:
         """
         move(self._level, node, group)
 
-    def gate(self, target: Node, *, by: Node, idle_rate_hz: float | None = None) -> Gate:
+    def gate(
+        self, target: Node | str, *others: Never, by: Node | str = _NOBODY, idle_rate_hz: float | None = None
+    ) -> Gate:
         """Couple the work of a node or subgraph to the activity of another: it works while `by` is active (rule A11).
 
         Args:
-          target: who is gated.
-          by: the state node or subgraph.
+          target: who is gated: a node or subgraph, or its path.
+          others: nobody; they are told how to be said.
+          by: the state node or subgraph, or its path.
           idle_rate_hz: so many firings a second go on while `by` is inactive; None is none.
 
         Raises:
           GraphError: one of the two is not in this graph, or `target` has a gate already; nothing was changed.
         """
-        gate = Gate(target, by, idle_rate_hz)
-        set_gate(self._level, gate)
-        return gate
+        if others or by is _NOBODY:
+            raise UsageError(
+                f"a gate has to say who works while whom is active, got {len(others) + 1} nodes and "
+                f"{'no by=' if by is _NOBODY else 'by='}: write graph.gate(detector, by=fetch)"
+            )
+        return set_gate(self._level, target, by, idle_rate_hz)
 
     # --- ports of the whole ---
 
@@ -343,6 +381,8 @@ class Graph:
 
     def __getitem__(self, path: str) -> Any:  # noqa: ANN401 - of a path type checkers know nothing
         """Find a node, "fetch/go_to", or a port, "fetch/go_to.goal"; ports of the whole graph by their name.
+
+        Behind a port of a subgraph ".inner" names the side that looks into it.
 
         Raises:
           GraphError: there is none, or an input and an output share the name.

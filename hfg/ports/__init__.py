@@ -2,6 +2,7 @@
 
 inputs  outputs  events  slots  parameters  states     one file for each kind: declaration and bound port
 automatic                                               the ports of rule A9
+vectors                                                 several of one kind, as many as a node is made with
 relays                                                  the inner sides of a subgraph's ports
 observable                                              events as reactivex observables
 base                                                    Port, and the directions Source and Target
@@ -17,23 +18,29 @@ from hfg.ports.parameters import Parameter, ParameterPort, ParameterSpec
 from hfg.ports.relays import InnerSource, InnerTarget
 from hfg.ports.slots import Slot, SlotPort, slot
 from hfg.ports.states import State
+from hfg.ports.vectors import Events, Inputs, Outputs, PortVector, Slots
 
 __all__ = [
     "Event",
     "EventPort",
+    "Events",
     "InnerSource",
     "InnerTarget",
     "Input",
     "InputPort",
+    "Inputs",
     "Output",
     "OutputPort",
+    "Outputs",
     "Parameter",
     "ParameterPort",
     "ParameterSpec",
     "Port",
+    "PortVector",
     "Relaying",
     "Slot",
     "SlotPort",
+    "Slots",
     "Source",
     "State",
     "Target",

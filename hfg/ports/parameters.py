@@ -39,6 +39,7 @@ class ParameterSpec(msgspec.Struct, frozen=True):
       unit: for people, "m/s".
       choices: the only allowed values, or None.
       trigger: no value, but a slot and an event of this name (§3.1 of the paper).
+      size: how many ports a vector of this name has: said when a node is made, and no port itself.
     """
 
     name: str
@@ -48,6 +49,12 @@ class ParameterSpec(msgspec.Struct, frozen=True):
     unit: str | None = None
     choices: tuple[Any, ...] | None = None
     trigger: bool = False
+    size: bool = False
+
+    @property
+    def is_port(self) -> bool:
+        """Whether it has a value that can be set and seen while a node lives (rule P8)."""
+        return not (self.trigger or self.size)
 
     def check(self, value: Any) -> str | None:
         """Say what is wrong with a value ("must be <= 1, got 3"), or None."""

@@ -103,8 +103,8 @@ class Ports:
 
     @property
     def parameters(self) -> PortView[ParameterPort[Any]]:
-        """Parameters by name; a trigger parameter is a slot and an event instead."""
-        specs = {name: spec for name, spec in self._node._type.parameters.items() if not spec.trigger}
+        """Parameters by name, but a trigger, which is a slot and an event instead, and the size of a vector."""
+        specs = {name: spec for name, spec in self._node._type.parameters.items() if spec.is_port}
         return PortView(self._node, "parameter", specs)
 
     def __repr__(self) -> str:

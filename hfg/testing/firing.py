@@ -218,6 +218,7 @@ class _Firing:
         return self.run(step)
 
     def _arguments(self, values: dict[str, Any]) -> list[Any]:
+        values = self.type.spread(values)
         if unknown := set(values) - set(self.type.inputs):
             raise UsageError(
                 f"{self.type.name} has no input {_names(unknown)}; its inputs are {_names(self.type.inputs)}"

@@ -253,7 +253,7 @@ def test_a_modifier_or_stamp_that_is_none_is_refused(fast: bool) -> None:
             with pytest.raises(hfg.errors.UsageError, match=r"activity must be -1, 0 or \+1, or None .* got 5"):
                 await run.trigger(ear.hear, 1, activity=5)
             with pytest.raises(hfg.errors.UsageError, match="stamp must be seconds on the run's clock, .* got 'now'"):
-                await run.trigger(ear.hear, 1, stamp="now")  # type: ignore[arg-type]
+                await run.trigger(ear.hear, 1, stamp="now")  # type: ignore[call-overload]
         assert ear.heard == []
 
     drive(main)

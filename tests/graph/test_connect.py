@@ -184,7 +184,6 @@ def test_what_is_no_port_is_refused_with_what_to_write(graph: Graph, camera: Cam
     refused(graph, "the declaration in the class", "graph.add", source=Camera.count, target=robot.goal)
     refused(graph, "2.5", "node.ports.parameters", source=camera.count, target=robot.limit)
     refused(graph, "None", source=None, target=robot.goal)
-    refused(graph, "'camera.count'", source="camera.count", target=robot.goal)
 
 
 @pytest.mark.rule("P3")

@@ -219,8 +219,8 @@ def test_gates_that_make_no_sense_are_refused(graph: Graph) -> None:
         graph.gate(detector, by=MapLookup())
     with pytest.raises(GraphError, match="idle_rate_hz"):
         graph.gate(detector, by=fetch, idle_rate_hz=0)
-    with pytest.raises(GraphError, match="give the node itself"):
-        graph.gate(detector, by="fetch")  # type: ignore[arg-type]
+    with pytest.raises(GraphError, match="give nodes or their paths"):
+        graph.gate(detector, by=3)  # type: ignore[arg-type]
     assert not graph.gates
     graph.gate(detector, by=fetch)
     with pytest.raises(GraphError, match="has a gate already"):

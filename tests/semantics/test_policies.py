@@ -414,7 +414,7 @@ def test_moving_what_is_not_in_the_graph_is_refused() -> None:
     with pytest.raises(GraphError, match='"forward" is not in graph "graph"'):
         graph.move(other.add(forward()), group="loop")
     with pytest.raises(GraphError, match=r"graph\.move takes a node"):
-        graph.move("forward", group="loop")  # type: ignore[arg-type]
+        graph.move(3, group="loop")  # type: ignore[arg-type]
 
 
 def test_a_policy_that_does_not_exist_is_refused_with_those_that_do() -> None:

@@ -67,7 +67,8 @@ graph.connect(lookup.unknown, lookup.forget, overflow="forget")  # error
 graph.add(MapLookup)  # error
 graph.add(lookup, on_error="ignore")  # error
 graph.promote(follow.speed, 3)  # error
-graph.gate("lookup", by=lookup)  # error
+graph.gate(3, by=lookup)  # error
+graph.gate(lookup, lookup)  # error
 
 # A run.
 hfg.run(graph, until_s="3")  # error

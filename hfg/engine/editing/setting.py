@@ -31,13 +31,13 @@ def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
       ValueError: the value is out of the limits of one of them; nothing is changed.
       UsageError: nobody would see it.
     """
+    if engine.core.over:
+        raise NotRunning(f'the run is over: write node.ports.parameters["{port.name}"].value = ... for the next one')
     reached = list(stands_for(port))
     for one in reached:
         wrong = one.spec.check(value)
         if wrong is not None:
             raise ValueError(f'parameter "{one.path}" {wrong}')
-    if engine.core.over:
-        raise NotRunning(f'the run is over: write node.ports.parameters["{port.name}"].value = ... for the next one')
     workers = {worker.node: worker for worker in engine.all_workers() if worker.node is not None}
     if any(one.node not in workers for one in reached):
         raise UsageError(f'"{port.path}" is no parameter of this run: its graph is another one, or it was never added')

@@ -31,6 +31,8 @@ from hfg.graph import Graph
 from hfg.graph.editing.commands import Command
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge, PortEnd
+from hfg.graph.structure.level import level_of
+from hfg.graph.structure.pointing import parameter_at
 from hfg.nodetype import Node
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort
 from hfg.token import Token
@@ -54,6 +56,7 @@ class Run:
 
     # --- bringing in and taking out ---------------------------------------------------------------------------------
 
+    @overload
     async def trigger(
         self,
         port: EventPort[T] | SlotPort[T],
@@ -61,18 +64,28 @@ class Run:
         *,
         activity: int | None = None,
         stamp: float | None = None,
+    ) -> None: ...
+    @overload
+    async def trigger(
+        self, port: str, value: object = None, *, activity: int | None = None, stamp: float | None = None
+    ) -> None: ...
+    async def trigger(
+        self, port: Any, value: Any = None, *, activity: int | None = None, stamp: float | None = None
     ) -> None:
         """Send a signal into a slot, or trigger an event as its node would; waits while a queue is full (F8).
 
         Args:
-          port: a slot or an event of a node in the graph.
+          port: a slot or an event of a node in the graph, or its path.
           value: of the port's type; a token passed on keeps its modifier and stamp.
           activity: the modifier; into a slot it acts as over an active edge.
           stamp: seconds on the run's clock; now, if not given.
 
         Raises:
           TypeError: the value is not of the port's type.
+          GraphError: the path leads nowhere.
+          NotRunning: the run is over.
         """
+        port = self._at(port)
         if not isinstance(port, EventPort | SlotPort):
             raise UsageError(
                 f"run.trigger is for slots and events of nodes, got {port!r}; give tokens to a graph input "
@@ -151,7 +164,9 @@ class Run:
         Raises:
           UsageError: it is in no run or has no edge.
           GraphError: there is no such path.
+          NotRunning: the run is over.
         """
+        self._need_running("nothing will pass there any more")
         return self._parts.taps.add(what, size, max_rate_hz)
 
     def trace(self, consumer: Consumer, *, size: int | None = None) -> Listener:
@@ -168,19 +183,31 @@ class Run:
         """
         return self._parts.consumers.add(consumer, size)
 
-    def set(self, parameter: ParameterPort[T], value: T) -> None:
+    @overload
+    def set(self, parameter: ParameterPort[T], value: T) -> None: ...
+    @overload
+    def set(self, parameter: str, value: object) -> None: ...
+    def set(self, parameter: ParameterPort[Any] | str, value: Any) -> None:
         """Set a parameter of a node between its firings: now, or when the one under way is over (P8).
 
         That of a subgraph sets those inside that it stands for.
 
+        Args:
+          parameter: its port, `node.ports.parameters["gain"]`, or its path, "fetch/filter.gain".
+          value: within its limits.
+
         Raises:
           ValueError: the value is out of the parameter's limits; nothing is changed.
           UsageError: it would have no effect: a generator function has been given the old value.
+          GraphError: the path leads nowhere.
           NotRunning: the run is over.
         """
+        if isinstance(parameter, str):
+            parameter = parameter_at(level_of(self.graph), parameter)
         if not isinstance(parameter, ParameterPort):
             raise UsageError(
-                f'run.set takes the port of a parameter, as in node.ports.parameters["name"], got {parameter!r}'
+                f'run.set takes the path of a parameter, or its port, as in node.ports.parameters["name"], got '
+                f"{parameter!r}"
             )
         set_parameter(self._engine, parameter, value)
 
@@ -244,7 +271,11 @@ class Run:
 
         What is under way goes on to its end, tokens stay where they are, signals from outside are still taken in. Time
         goes on too, also virtual time.
+
+        Raises:
+          NotRunning: the run is over.
         """
+        self._need_running("there is nothing left to pause")
         self._pausing.pause()
 
     def resume(self) -> None:
@@ -292,18 +323,25 @@ class Run:
 
         Raises:
           UsageError: there is no such place in the run, or `when` was given for a node or cannot be called.
+          NotRunning: the run is over.
         """
+        self._need_running("nothing will come there any more")
         return self._pausing.break_at(place, when)
 
     # --- waiting ----------------------------------------------------------------------------------------------------
 
-    async def wait_for(self, event: EventPort[T]) -> Token[T]:
-        """Wait for the next signal of an event.
+    @overload
+    async def wait_for(self, event: EventPort[T]) -> Token[T]: ...
+    @overload
+    async def wait_for(self, event: str) -> Token[Any]: ...
+    async def wait_for(self, event: EventPort[Any] | str) -> Token[Any]:
+        """Wait for the next signal of an event, given itself or by its path.
 
         Raises:
           NotRunning: the run ended without one.
           UsageError: it is no event of a node in this graph, or the graph's `start`, which is over by now.
         """
+        event = self._at(event)
         if not isinstance(event, EventPort):
             raise UsageError(f"run.wait_for waits for an event of a node, got {event!r}; look at others with run.tap")
         if event is self.graph.start:
@@ -311,7 +349,7 @@ class Run:
                 '"start" was triggered as the run began, so waiting for it would never end: leave the line out, or '
                 "write `await run.wait_quiet()` to wait for what it began"
             )
-        waiter: asyncio.Future[Token[T]] = self._engine.loop.create_future()
+        waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
         bind_event(self._engine.worker_of(event.node), event.name)
         subscription = event.subscribe(partial(answer, waiter))
         ending = asyncio.ensure_future(self._engine.ending.wait())
@@ -330,16 +368,16 @@ class Run:
         await self._engine.wait_quiet()
         self._parts.raise_failure()
 
-    async def wait_inputs(self, node: Node) -> None:
+    async def wait_inputs(self, node: Node | str) -> None:
         """Wait for the node's input barrier: every live input holds a token."""
         await self._barrier(node, "inputs")
 
-    async def wait_outputs(self, node: Node) -> None:
+    async def wait_outputs(self, node: Node | str) -> None:
         """Wait for the node's output barrier: every token it sent is processed."""
         await self._barrier(node, "outputs")
 
-    async def _barrier(self, node: Node, which: str) -> None:
-        worker = self._engine.worker_of(node)
+    async def _barrier(self, node: Node | str, which: str) -> None:
+        worker = self._engine.worker_of(self._at(node))
         if worker.scope is not None:
             raise UsageError(f'"{worker.path}" is a subgraph, in which each node waits for itself: name a node inside')
         neighbours = [edge.source for edge in worker.in_edges] + [edge.target for edge in worker.all_out_edges()]
@@ -389,9 +427,9 @@ class Run:
         """Seconds on the run's clock."""
         return self._engine.now()
 
-    def wake(self, node: Node) -> None:
+    def wake(self, node: Node | str) -> None:
         """Ask a node's `ready()` again (F1)."""
-        unblock(self._engine.worker_of(node), UNREADY)
+        unblock(self._engine.worker_of(self._at(node)), UNREADY)
         self._engine.kick()
 
     def stop(self) -> None:
@@ -413,6 +451,14 @@ class Run:
         return self._parts.report()
 
     # --- inside -----------------------------------------------------------------------------------------------------
+
+    def _at(self, what: Any) -> Any:  # noqa: ANN401 - of a path type checkers know nothing
+        """Give what was named by its path, or is given itself."""
+        return self.graph[what] if isinstance(what, str) else what
+
+    def _need_running(self, why: str) -> None:
+        if self._engine.core.over:
+            raise NotRunning(f"the run is over: {why}; do it inside of `async with hfg.running(graph)`, before the end")
 
     def _boundary(self, port: object, ports: Mapping[str, object]) -> str:
         """Find one of the graph's own ports, given itself or by name."""

@@ -1,6 +1,6 @@
 """Edits of a graph as data, carried out exactly and taken back exactly (rule R4).
 
-commands    what is to change            performing  what carries it out: pointing, making, copying, enclosing
+commands    what is to change            performing  what carries it out: making, copying, enclosing
 changes     its steps, to be taken back  transactions  all or nothing, undo and redo       reloading  of modules
 """
 

@@ -113,7 +113,8 @@ class _Names:
         for edge in crossing:
             inwards = owner_of(edge.target) in inner
             end = edge.target if inwards else edge.source
-            wanted = end.name if _is_free(end.name) else f"{end.name}_port"
+            plain = end.name.replace("[", "_").replace("]", "")  # of a vector each is a port of its own here
+            wanted = plain if _is_free(plain) else f"{plain}_port"
             name, number = wanted, 1
             while name in taken:
                 number += 1

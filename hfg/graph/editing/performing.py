@@ -30,7 +30,6 @@ from hfg.graph.editing.changes import (
 from hfg.graph.editing.copying import copy_of
 from hfg.graph.editing.enclosing import dissolve, enclose
 from hfg.graph.editing.making import as_meant, fitting, kept, made
-from hfg.graph.editing.pointing import level_and_name, node_at, parameter_at, source_at, target_at
 from hfg.graph.structure.assigning import move
 from hfg.graph.structure.connecting import declare_edge, refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of, type_of
@@ -40,6 +39,7 @@ from hfg.graph.structure.gating import refuse_gate
 from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import edge_options
+from hfg.graph.structure.pointing import level_and_name, node_at, parameter_at, source_at, target_at
 from hfg.graph.structure.promoting import refuse_standing, stands_for
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node

@@ -9,7 +9,7 @@ edge         Edge, and what is asked of its ends  subgraph     Subgraph: a node 
 options      what is said about nodes, edges and groups besides
 
 adding, connecting, gating, promoting, declaring, assigning      what changes a level, and refuses what cannot be
-membership   where a node is, said to the node    naming, finding      names, and what paths lead to
+membership   where a node is, said to the node    naming, finding, pointing    names, and what paths lead to
 refusals     kept instead of raised, so that a check tells all
 """
 

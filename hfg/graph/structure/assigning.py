@@ -7,6 +7,7 @@ from hfg.graph.structure.level import Level
 from hfg.graph.structure.membership import set_options
 from hfg.graph.structure.naming import path_of, suggest
 from hfg.graph.structure.options import GroupSpec, Policy, group_spec, in_group
+from hfg.graph.structure.pointing import meant, node_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.nodetype import Node
 
@@ -29,15 +30,16 @@ def declare_group(level: Level, name: str, threads: int | None, policy: Policy, 
     return declared if declared is not None else groups.by_name.setdefault(str(name), GroupSpec(str(name)))
 
 
-def move(level: Level, node: Node, group: object) -> None:
+def move(level: Level, node: Node | str, group: object) -> None:
     """Let a node run in another group.
 
     Raises:
       GraphError: the node is not in the graph, or the group is not declared; nothing was changed.
     """
     level.need_rest("moving a node")
+    node = meant(level, node, node_at)
     if not isinstance(node, Node):
-        raise GraphError(f"graph.move takes a node of the graph, got {node!r}; give the node itself, graph[path]")
+        raise GraphError(f"graph.move takes a node of the graph, got {node!r}; give the node or its path")
     if not level.holds(node):
         raise GraphError(f'"{path_of(node)}" is not in {level.title}, so it cannot be moved there; add it first')
     known = level.whole.groups.by_name

@@ -14,10 +14,11 @@ from hfg import errors
 from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, TargetEnd, end_path, is_port, type_of
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.options import PLAIN, EdgeOptions, edge_options
+from hfg.graph.structure.pointing import meant, source_at, target_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.nodetype import Node
-from hfg.ports import InnerSource, InnerTarget, Port, Source, Target
+from hfg.ports import InnerSource, InnerTarget, Port, PortVector, Source, Target
 from hfg.ports.observable import RunObservable
 from hfg.token import Token
 from hfg.types import accepts, describe, why_not
@@ -27,15 +28,17 @@ __all__ = ["connect", "declare_edge", "refuse"]
 _SYNCHRONOUS: Final = ("output", "parameter")
 
 
-def connect(level: Level, source: SourceEnd, target: TargetEnd, said: dict[str, Any]) -> Edge:
+def connect(level: Level, source: SourceEnd | str, target: TargetEnd | str, said: dict[str, Any]) -> Edge:
     """Declare an edge; see `Graph.connect`, whose options `said` holds by name.
 
     Raises:
       ConnectionError: the edge cannot be; nothing was changed.
+      GraphError: a path leads nowhere.
     """
     edge: Edge | None = None
     with Refusable(source, target):
-        edge = declare_edge(_level_for(level, source, target), source, target, said)
+        begin, end = meant(level, source, source_at), meant(level, target, target_at)
+        edge = declare_edge(_level_for(level, begin, end), begin, end, said)
     return Edge(source, target, PLAIN) if edge is None else edge  # something to go on with, where refusals are kept
 
 
@@ -130,6 +133,9 @@ def _wrong_end(found: object, role: str, expected: str, *, swap: bool) -> NoRetu
         place = found._place
         what = f'the node "{place.path if place else found._type.name}"'
         remedy = "name one of its ports, as in node.out, or connect nodes with >>"
+    elif isinstance(found, PortVector):
+        what = repr(found)
+        remedy = f'name one of them, as in "{found.path}[0]"'
     elif getattr(type(found), "kind", None) is not None:  # Input, Output, ... as declared in a class body
         what = f"{found!r}, the declaration in the class"
         remedy = "use the port of a node: node = graph.add(...), then node.port"

@@ -1,17 +1,21 @@
-"""What a path leads to (rule G3): "subgraph/node" a node, "subgraph/node.port" a port. Stands on levels."""
+"""What a path leads to (rule G3): a node, a port behind a dot, the side of a subgraph's port that looks into it.
+
+Stands on levels.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from hfg.errors import GraphError
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.naming import suggest
-from hfg.graph.structure.subgraph import inside
+from hfg.graph.structure.subgraph import inside, is_box
 from hfg.nodetype import Node
-from hfg.ports import Port
+from hfg.ports import InnerSource, InnerTarget, Port
 
-__all__ = ["candidates", "find", "same_port"]
+__all__ = ["candidates", "find", "inner_side", "same_port", "split_inner"]
 
 
 def find(level: Level, path: str) -> Any:  # noqa: ANN401 - of a path type checkers know nothing
@@ -45,8 +49,41 @@ def _node(level: Level, name: str, path: str) -> Node:
     return node
 
 
-def _port(node: Node, name: str, path: str) -> Port:
+def split_inner(name: str, path: str) -> tuple[str, bool]:
+    """Take ".inner" off the name of a port, and say whether it was there.
+
+    Raises:
+      GraphError: something else stands behind the port.
+    """
+    port, dot, side = name.partition(".")
+    if side != ("inner" if dot else ""):
+        raise GraphError(f'there is no "{path}": behind a port only ".inner" may follow')
+    return port, bool(dot)
+
+
+def inner_side(node: Node, found: Sequence[Port], path: str) -> InnerSource[Any] | InnerTarget[Any]:
+    """Give the side of a subgraph's port that looks into it; of several the first.
+
+    Raises:
+      GraphError: the node is no subgraph, or has no such port.
+    """
+    relays = [one for one in found if is_box(node) and one.kind != "parameter"]
+    if relays:
+        side: InnerSource[Any] | InnerTarget[Any] = relays[0].inner  # type: ignore[attr-defined]  # all these have one
+        return side
+    if is_box(node) and not found:
+        raise _no_such_port(node, path.removesuffix(".inner").rpartition(".")[2], path)
+    raise GraphError(
+        f'there is no "{path}": inputs, outputs, events and slots of a subgraph have a side that looks into it, and no '
+        "other ports; leave out .inner"
+    )
+
+
+def _port(node: Node, name: str, path: str) -> Port | InnerSource[Any] | InnerTarget[Any]:
+    name, inner = split_inner(name, path)
     found = candidates(node, name)
+    if inner and len(found) < 2:
+        return inner_side(node, found, path)
     if len(found) == 1:
         return found[0]
     if found:
@@ -55,9 +92,20 @@ def _port(node: Node, name: str, path: str) -> Port:
             f'"{path}" is ambiguous: "{node.place.path}" has an {" and an ".join(port.kind for port in found)} of '
             f"this name; write {ways}"
         )
+    raise _no_such_port(node, name, path)
+
+
+def _no_such_port(node: Node, name: str, path: str) -> GraphError:
     kind = node._type
-    known = [*kind.inputs, *kind.outputs, *kind.events, *kind.slots, *kind.parameters]
-    raise GraphError(
+    if name in kind.vectors:
+        vector = kind.vectors[name]
+        return GraphError(
+            f'"{path}" is a vector of {vector.size} {vector.kind}s; name one of them, as in "{path}[0]", or all by '
+            f"node.{name}"
+        )
+    values = [one for one, spec in kind.parameters.items() if not spec.size]
+    known = [*kind.inputs, *kind.outputs, *kind.events, *kind.slots, *values]
+    return GraphError(
         f'there is no "{path}": "{node.place.path}" has no port "{name}"; {suggest(name, dict.fromkeys(known))}'
     )
 

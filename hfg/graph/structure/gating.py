@@ -6,22 +6,26 @@ from hfg.errors import GraphError
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.naming import path_of
+from hfg.graph.structure.pointing import meant, node_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.nodetype import Node
 
 __all__ = ["refuse_gate", "set_gate"]
 
 
-def set_gate(level: Level, gate: Gate) -> None:
-    """Couple the work of a node to the activity of another.
+def set_gate(level: Level, target: Node | str, by: Node | str | None, idle_rate_hz: float | None) -> Gate:
+    """Couple the work of a node to the activity of another; either may be given by its path.
 
     Raises:
       GraphError: it cannot be; nothing was changed.
     """
     level.need_rest("gating")
-    with Refusable(gate.target):
+    gate = Gate(target, by, idle_rate_hz)  # type: ignore[arg-type]  # what else it is, is refused
+    with Refusable(target):
+        gate = Gate(meant(level, target, node_at), meant(level, by, node_at), idle_rate_hz)
         refuse_gate(level, gate)
         level.gates.append(gate)
+    return gate
 
 
 def refuse_gate(level: Level, gate: Gate) -> None:
@@ -33,7 +37,7 @@ def refuse_gate(level: Level, gate: Gate) -> None:
     for node in (gate.target, gate.by):
         if not isinstance(node, Node):
             raise GraphError(
-                f"a gate couples nodes, got {node!r}; give the node itself, as in graph.gate(detector, by=fetch)"
+                f"a gate couples nodes, got {node!r}; give nodes or their paths, as in graph.gate(detector, by=fetch)"
             )
         if not level.holds(node):
             raise GraphError(

@@ -1,22 +1,23 @@
-"""What the paths in commands point at: nodes, ports of the right direction, inner sides (rule G3).
+"""What paths point at where a certain thing is meant: nodes, ports of the right direction, inner sides (rule G3).
 
-Stands on `finding`.
+A path stands wherever the thing itself could be given, in calls as in commands. Stands on `finding`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from hfg.errors import GraphError
 from hfg.graph.structure.edge import PortEnd
-from hfg.graph.structure.finding import candidates, find
+from hfg.graph.structure.finding import candidates, find, inner_side, split_inner
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.naming import need_name, suggest
-from hfg.graph.structure.subgraph import inside, is_box
+from hfg.graph.structure.subgraph import inside
 from hfg.nodetype import Node
 from hfg.ports import ParameterPort
 
-__all__ = ["level_and_name", "node_at", "parameter_at", "source_at", "target_at"]
+__all__ = ["level_and_name", "meant", "node_at", "parameter_at", "source_at", "target_at"]
 
 _SOURCES = ("output", "event", "parameter")
 _TARGETS = ("input", "slot", "parameter")
@@ -38,6 +39,20 @@ def level_and_name(level: Level, path: str) -> tuple[Level, str]:
     if inner is None:
         raise GraphError(f'"{path}" cannot be: "{around}" is no subgraph, so nothing is inside it')
     return inner, name
+
+
+def meant(level: Level, what: Any, at: Callable[[Level, str], Any]) -> Any:  # noqa: ANN401 - whatever `at` finds
+    """Give what was named by its path, or is given itself.
+
+    Args:
+      level: from where the path leads.
+      what: a path, or anything else, which is given back as it is.
+      at: what finds it, `node_at` or another of these.
+
+    Raises:
+      GraphError: the path leads nowhere.
+    """
+    return at(level, what) if isinstance(what, str) else what
 
 
 def node_at(level: Level, path: str) -> Node:
@@ -88,9 +103,7 @@ def _end(level: Level, path: str, kinds: tuple[str, ...]) -> PortEnd:
     if path in (boundary := level.ports.by_name()):
         return boundary[path]
     node_path, name = _split(level, path, "a port")
-    port, inner, rest = name.partition(".")
-    if rest != ("inner" if inner else ""):
-        raise GraphError(f'there is no "{path}": behind a port only ".inner" may follow')
+    port, inner = split_inner(name, path)
     try:
         node = node_at(level, node_path)
     except GraphError:
@@ -98,11 +111,7 @@ def _end(level: Level, path: str, kinds: tuple[str, ...]) -> PortEnd:
         raise
     found = candidates(node, port)
     if inner:
-        relays = [one for one in found if is_box(node) and one.kind not in kinds and one.kind != "parameter"]
-        if relays:
-            side: PortEnd = relays[0].inner  # type: ignore[attr-defined]  # all ports but parameters have one
-            return side
-        raise GraphError(f'there is no "{path}": only ports of a subgraph have a side that looks into it')
+        return inner_side(node, [one for one in found if one.kind not in kinds], path)
     fitting = [one for one in found if one.kind in kinds]
     if fitting or found:
         return (fitting or found)[0]  # of the wrong direction: the refusal of the edge says so
