@@ -78,7 +78,7 @@ class SomeOf(hfg.Node):
     values = hfg.Inputs(int, 3, optional=True, default=-1)
 
     def process(self, values: list[hfg.Token[int]]) -> list[Any]:
-        return [value.value if isinstance(value, hfg.Token) else value for value in values]
+        return [getattr(value, "value", value) for value in values]
 
 
 def merging(count: int) -> tuple[hfg.Graph, Keep]:
@@ -99,7 +99,7 @@ def merging(count: int) -> tuple[hfg.Graph, Keep]:
 def test_a_vector_of_inputs_joins_as_many_as_the_node_is_made_with(count: int, fast: bool) -> None:
     graph, keep = merging(count)
     run(graph, fast)
-    assert keep.values == [[1] * count, [2] * count][: 2 if count > 0 else 0]
+    assert keep.values == [[1] * count, [2] * count]
 
 
 def test_each_port_has_a_name_a_number_and_a_path() -> None:
