@@ -30,12 +30,6 @@ def rest(value: int) -> int:
     return value
 
 
-@hfg.node
-def keep(value: Any) -> Any:
-    """Pass on."""
-    return value
-
-
 def stages(number: int, tokens: int) -> dict[str, float]:
     """Seconds from the first token to the arrival of the last, and what stages that overlap perfectly would take."""
     times = []
@@ -75,9 +69,9 @@ def example() -> ModuleType:
 def by_groups(looks: int, take: Callable[[Any], None]) -> None:
     """Search the pictures for circles in one thread group; look, and search for lines, in another.
 
-    So both have about as much to do. The loop puts together what they found. Round the branches goes a relay that takes
-    at once: without it the camera, which is free only when everybody has taken its picture (F5), would wait for the
-    circles. It is the place for one value that a queue has by hand.
+    So both have about as much to do. The loop puts together what they found. What goes from thread to thread has a place
+    for one value (P4), as the queues by hand have: without it the camera, which is free only when what has become of
+    its picture is taken (F5), would wait for the circles.
     """
     photographs = example()
     graph = hfg.Graph("camera")
@@ -94,11 +88,9 @@ def by_groups(looks: int, take: Callable[[Any], None]) -> None:
     graph.connect(for_circles.out, circles.picture)
     graph.connect(for_lines.out, lines.picture)
     for port in (source.ports.outputs["name"], source.picture):
-        relay = graph.add(keep(), release="pipelined")
-        graph.connect(port, relay.value)
-        graph.connect(relay.out, sight.ports.inputs[port.name])
-    graph.connect(circles.out, sight.circles)
-    graph.connect(lines.out, sight.lines)
+        graph.connect(port, sight.ports.inputs[port.name], buffer=1)
+    graph.connect(circles.out, sight.circles, buffer=1)
+    graph.connect(lines.out, sight.lines, buffer=1)
 
     def arrived(sight: Any) -> None:
         take(sight)
