@@ -69,9 +69,9 @@ def example() -> ModuleType:
 def by_groups(looks: int, take: Callable[[Any], None]) -> None:
     """Search the pictures for circles in one thread group; look, and search for lines, in another.
 
-    So both have about as much to do. The loop puts together what they found. What goes from thread to thread has a place
-    for one value (P4), as the queues by hand have: without it the camera, which is free only when what has become of
-    its picture is taken (F5), would wait for the circles.
+    So both have about as much to do. The loop puts together what they found. What goes from thread to thread has a
+    place for one value (P4), as the queues by hand have: without it the camera, which is free only when what has
+    become of its picture is taken (F5), would wait for the circles.
     """
     photographs = example()
     graph = hfg.Graph("camera")

@@ -13,7 +13,7 @@ CHECK_ALL = False
 """Whether runs ask after every step for the invariants of all their nodes and edges; the tests of the semantics do."""
 
 FUSE_AFTER = 25
-"""Firings of a head before its region is fused: forming one costs what so many interpreted firings do, 0.2 ms a node."""
+"""Firings of a head before its region is fused: forming one costs what so many interpreted ones do, 0.2 ms a node."""
 
 
 class RunOptions(TypedDict, total=False):
