@@ -59,8 +59,25 @@ def strongly_connected(successors: Sequence[Sequence[int]]) -> list[list[int]]:
 
 def rings(successors: Sequence[Sequence[int]]) -> list[list[int]]:
     """Give the parts in which something can go round, in order of their first node."""
+    if _is_acyclic(successors):  # as most graphs are, and this is told at a third of the cost
+        return []
     found = [part for part in strongly_connected(successors) if len(part) > 1 or part[0] in successors[part[0]]]
     return sorted(found)
+
+
+def _is_acyclic(successors: Sequence[Sequence[int]]) -> bool:
+    """Whether taking away what nothing leads to, again and again, takes all (Kahn, 1962)."""
+    leading = [0] * len(successors)
+    for following in successors:
+        for successor in following:
+            leading[successor] += 1
+    free = [node for node, number in enumerate(leading) if not number]
+    for node in free:  # it grows on the way
+        for successor in successors[node]:
+            leading[successor] -= 1
+            if not leading[successor]:
+                free.append(successor)
+    return len(free) == len(successors)
 
 
 def shortest_ring(part: Sequence[int], successors: Sequence[Sequence[int]]) -> list[int]:
