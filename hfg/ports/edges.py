@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 from hfg.errors import EngineInternalError
 from hfg.token import Token
 
-__all__ = ["BufferEdge", "Edge", "EventEdge", "Overflow", "SyncEdge"]
+__all__ = ["AnyEdge", "BufferEdge", "Edge", "EventEdge", "Overflow", "SyncEdge"]
 
 Overflow = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
 
@@ -460,3 +460,7 @@ class EventEdge(_QueueEdge):
         yield self.full or not holds_back or not self.live, "it is full and does not hold its source back (F8)"
         if self.overflow != "wait" and not self.end_sent:
             yield len(self.queue) <= max(self.capacity, len(self.initial)), f"it holds more than {self.capacity} (P5)"
+
+
+AnyEdge: TypeAlias = SyncEdge | BufferEdge | EventEdge
+"""An edge that something lies on."""

@@ -9,19 +9,23 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from types import FrameType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.errors import EngineInternalError, HfgError
+from hfg.graph.flat import FlatGraph
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.ports.events import EventPort
 from hfg.token import Token
 from hfg.trace import TraceEvent
 
-__all__ = ["PENDING", "Code", "Core", "Host", "Region", "Timer", "Upstairs"]
+if TYPE_CHECKING:
+    from hfg.engine.model.groups import Group
+
+__all__ = ["PENDING", "Code", "Core", "Host", "Iterating", "Region", "Timer", "Upstairs"]
 
 
 class _Pending:
@@ -72,6 +76,22 @@ class Region(Protocol):
 
     def disarm(self) -> None:
         """Let each member's barriers say what it waits for."""
+
+
+class Iterating(Protocol):
+    """The inside of a subgraph that iterates (G4), as those outside of it know it."""
+
+    core: Core
+    looks: bool
+
+    def begin(self, arguments: Sequence[Any]) -> None:
+        """The subgraph fires: its elements go in, one after the other."""
+
+    def look_later(self) -> None:
+        """Something inside has come to its end: it may be quiet now."""
+
+    async def looked(self) -> None:
+        """Wait until it was seen whether it is."""
 
 
 class Timer(Protocol):
@@ -141,7 +161,9 @@ class Code(Protocol):
     ) -> None:
         """Run a hook of activity beside whatever the worker is doing."""
 
-    def drive(self, worker: Worker, coroutine: Any, done: Callable[[Any, BaseException | None], None]) -> None:
+    def drive(
+        self, worker: Worker, coroutine: Coroutine[Any, Any, object], done: Callable[[Any, BaseException | None], None]
+    ) -> None:
         """Take a coroutine of the worker's code to its end."""
 
     def late(
@@ -152,7 +174,7 @@ class Code(Protocol):
     def interrupt(self, worker: Worker) -> None:
         """Cancel or abandon the code of the worker that is under way (X2)."""
 
-    async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
+    async def trigger_wait(self, event: RunningEvent, value: object, activity: int | None, stamp: float | None) -> None:
         """Trigger an event, then wait until no `wait` queue behind the events of its node is full (F8)."""
 
 
@@ -183,7 +205,7 @@ class Upstairs(Protocol):
     def scopes_changed(self, core: Core) -> None:
         """What subgraphs derive their activity from has changed (G2)."""
 
-    def deactivate_inside(self, scope: Scope, cause: Any) -> None:
+    def deactivate_inside(self, scope: Scope, cause: Literal["sent", "slot"]) -> None:
         """Activity leaves everything inside a subgraph (G2)."""
 
     def rewire(self, worker: Worker) -> None:
@@ -195,7 +217,7 @@ class Upstairs(Protocol):
     def bind_ports(self, worker: Worker) -> None:
         """A node is about to be set up: its ports lead into the run."""
 
-    def iteration(self, worker: Worker, flat: Any, groups: Any, loop: Any) -> Any:
+    def iteration(self, worker: Worker, flat: FlatGraph, groups: Mapping[str, Group], loop: Group) -> Iterating:
         """Make the inside of a subgraph that iterates (G4)."""
 
 

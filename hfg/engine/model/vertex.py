@@ -11,11 +11,14 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 from hfg.engine.model.shape import Shape
+from hfg.graph.structure.options import NodeOptions
+from hfg.nodetype import Node, NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS
 from hfg.ports.edges import Edge
+from hfg.ports.events import EventPort
 
 if TYPE_CHECKING:
-    from hfg.engine.model.core import Core
+    from hfg.engine.model.core import Core, Iterating
     from hfg.engine.model.groups import Group
     from hfg.engine.model.scopes import Gate, Scope
     from hfg.engine.model.worker import Worker
@@ -26,10 +29,10 @@ NOTHING: Final[dict[str, Any]] = {}  # shared by the many that have none; never 
 
 # What all nodes of a type share: what absent inputs give, who wants the token, what must be connected, the outputs.
 _Shared = tuple[tuple[Any, ...], tuple[bool, ...], tuple[str, ...], tuple[str, ...]]
-_shared: dict[Any, _Shared] = {}
+_shared: dict[NodeType, _Shared] = {}
 
 
-def slots_first(edge: Any) -> tuple[bool, float]:
+def slots_first(edge: Edge) -> tuple[bool, float]:
     """The order in which the signals of an event leave (F9)."""
     return (edge.target_kind == "input", edge.index)
 
@@ -39,10 +42,10 @@ class RunningEvent:
 
     __slots__ = ("edges", "name", "pipelines", "port", "tap", "worker")
 
-    def __init__(self, worker: Worker, name: str, port: Any) -> None:
+    def __init__(self, worker: Worker, name: str, port: EventPort[Any] | None) -> None:
         self.worker = worker
         self.name = name
-        self.port = port
+        self.port: Any = port
         self.edges: tuple[Any, ...] = ()
         self.tap: tuple[Any, ...] | None = None  # who looks at its signals; () if at one of its edges only
 
@@ -51,7 +54,7 @@ class RunningEvent:
         """Its path, as traces name it."""
         return f"{self.worker.path}.{self.name}" if self.worker.path else self.name
 
-    def bind(self, port: Any) -> None:
+    def bind(self, port: EventPort[Any]) -> None:
         """By this port it is triggered, and heard."""
         self.port = port
 
@@ -132,13 +135,13 @@ class Vertex:
         "wired_out",
     )
 
-    def __init__(self, core: Core, path: str, node: Any, options: Any, group: Group) -> None:
+    def __init__(self, core: Core, path: str, node: Node | None, options: NodeOptions | None, group: Group) -> None:
         self.core = core
         self.index = core.number_workers()
         self.path = path
-        self.node = node
+        self.node: Any = node
         self.type: Any = type(node)._type if node is not None else None
-        self.options = options
+        self.options: Any = options
         self.join(group)
         self.priority: int = options.priority if options is not None else 0
         self.active_for_s: float | None = options.active_for_s if options is not None else None
@@ -182,7 +185,7 @@ class Vertex:
 
     # --- whose code it is -------------------------------------------------------------------------------------------
 
-    def fit(self, node: Any) -> None:
+    def fit(self, node: Node) -> None:
         """Take from a node what its firings need. Edges are yet to be led to it; events that it lacks are gone."""
         self.take_node(node)
         kind = self.type
@@ -198,7 +201,7 @@ class Vertex:
         self.ready_hook = hook("ready")
         self.has_hooks = hook("on_activated") is not None or hook("on_deactivated") is not None
 
-    def take_node(self, node: Any) -> None:
+    def take_node(self, node: Node) -> None:
         """Stand for another node, whose hooks are about to be called; the rest of it follows by `fit`."""
         self.node = node
         self.type = type(node)._type
@@ -209,7 +212,7 @@ class Vertex:
         """Whether there is async code in its node."""
         return self.type is not None and (self.is_async or any(slot.is_async for slot in self.type.slots.values()))
 
-    def iterate(self, iteration: Any) -> None:
+    def iterate(self, iteration: Iterating) -> None:
         """G4: its process function is the inside of a subgraph, which sees the elements one by one."""
         self.iteration = iteration
         self.process = iteration.begin
@@ -255,7 +258,7 @@ class Vertex:
         before, self.own_enabled = self.own_enabled, enabled
         return before != enabled
 
-    def set_options(self, options: Any) -> None:
+    def set_options(self, options: NodeOptions) -> None:
         """These are its options from now on; the group that they name is for `regroup`."""
         self.options = options
 
@@ -396,7 +399,7 @@ class Vertex:
         return event is not None and bool(event.edges or (event.port is not None and event.port._observers))
 
 
-def _share(kind: Any) -> _Shared:
+def _share(kind: NodeType) -> _Shared:
     inputs = kind.inputs.values()
     found = _shared[kind] = (
         tuple(spec.default for spec in inputs),

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from hfg.engine.model.vertex import RunningEvent, Vertex
 from hfg.errors import EngineInternalError
+from hfg.graph.structure.options import NodeOptions
+from hfg.nodetype import Node
 from hfg.ports.barrier import Barrier
-from hfg.ports.edges import Edge, EventEdge
+from hfg.ports.edges import AnyEdge, Edge, EventEdge
+from hfg.ports.events import EventPort
 
 if TYPE_CHECKING:
-    from hfg.engine.model.core import Core, Region
+    from hfg.engine.model.core import Core, Region, Timer
     from hfg.engine.model.groups import Group
     from hfg.engine.model.scopes import Scope
 
@@ -36,6 +39,7 @@ __all__ = [
     "TORN_DOWN",
     "UNREADY",
     "UNWIRED",
+    "Entry",
     "RunningEvent",
     "Worker",
 ]
@@ -55,6 +59,8 @@ TORN_DOWN: Final = 1024  # the run is ending (R5, X3)
 REMOVED: Final = 2048  # an edit took it out of the graph (R4)
 
 CALLS_BLOCKED: Final = FULL | BACKOFF | TORN_DOWN
+
+Entry: TypeAlias = "tuple[Any, int | None, float | None]"  # what is written to an output: value, modifier, stamp
 
 AMID_NOTHING: Final = ("", "edit", "over")  # values of Worker.busy: automatic events leave at once (A9)
 
@@ -145,7 +151,7 @@ class Worker(Vertex):
 
     # --- made -------------------------------------------------------------------------------------------------------
 
-    def __init__(self, core: Core, path: str, node: Any, options: Any, group: Group) -> None:
+    def __init__(self, core: Core, path: str, node: Node | None, options: NodeOptions | None, group: Group) -> None:
         super().__init__(core, path, node, options, group)
         self.inputs = Barrier()
         self.outputs = Barrier()
@@ -184,7 +190,7 @@ class Worker(Vertex):
         self.stamp: float | None = None
         self.taken: tuple[Any, ...] = ()
         self.held = False  # its inputs are released when its outputs are processed (F5 sequential)
-        self.written: list[Any] | None = None
+        self.written: list[Entry | None] | None = None
         self.events_due: list[tuple[str, Any]] | None = None
         self.end_stamp: float | None = None  # of the firing that ended it, and so of END (T5)
         self.given_up = False  # a source that counts as ended, though it has not said END (R5)
@@ -225,12 +231,12 @@ class Worker(Vertex):
         if self.slot_edges and self.calls is None:
             self.calls = deque()
 
-    def lead_out_of_event(self, edge: Edge, name: str, port: Any) -> None:
+    def lead_out_of_event(self, edge: Edge, name: str, port: EventPort[Any] | None) -> None:
         """An edge leads out of one of its events from now on."""
         event = self.make_event(name, port if self.node is not None or name == "start" else None)
         event.feed((*event.edges, edge))
 
-    def make_event(self, name: str, port: Any) -> RunningEvent:
+    def make_event(self, name: str, port: EventPort[Any] | None) -> RunningEvent:
         """Give the running event of this name; one that has neither edge nor subscriber yet is made now."""
         event = self.events.get(name)
         if event is None:
@@ -437,7 +443,7 @@ class Worker(Vertex):
         """F4(2): the firing under way is silent."""
         self.silent += 1
 
-    def write(self, position: int, entry: Any) -> None:
+    def write(self, position: int, entry: Entry) -> None:
         """The firing has written to one output; it leaves when the firing is over."""
         if self.written is None:
             self.written = [None] * len(self.out_edges)
@@ -447,7 +453,7 @@ class Worker(Vertex):
         """The firing or call is over, but for what it releases."""
         self.busy = "over"
 
-    def keep_generator(self, generator: Any) -> None:
+    def keep_generator(self, generator: object) -> None:
         """What a source draws its next values from; None: it has ended, or begins at its next firing."""
         self.generator = generator
 
@@ -467,7 +473,7 @@ class Worker(Vertex):
         self.restarts += 1
         self.block(BACKOFF)
 
-    def time_backoff(self, timer: Any) -> None:
+    def time_backoff(self, timer: Timer | None) -> None:
         """X1: when this timer is over it is set up again; None: it is over."""
         self.backoff_timer = timer
 
@@ -475,12 +481,12 @@ class Worker(Vertex):
         """Whether its setup has begun and its teardown has not."""
         self.is_up = up
 
-    def take_written(self) -> list[Any] | None:
+    def take_written(self) -> list[Entry | None] | None:
         """What the firing has written leaves now, or never."""
         written, self.written = self.written, None
         return written
 
-    def begin_call(self, edge: Any, stamp: float) -> None:
+    def begin_call(self, edge: Edge, stamp: float) -> None:
         """A slot call begins, for the oldest token of the edge."""
         self.busy = "call"
         self.call_number += 1
@@ -488,12 +494,13 @@ class Worker(Vertex):
         self.call_edge = edge
         self.stamp = stamp
 
-    def take_call(self) -> Any:
+    def take_call(self) -> AnyEdge:
         """Whose token waits longest for a slot call: its turn has come."""
         assert self.calls is not None
         if self.placed and self.ahead:
             self.ahead -= 1
-        return self.calls.popleft()
+        edge: AnyEdge = self.calls.popleft()
+        return edge
 
     def expect_call(self, edge: Edge) -> None:
         """The newest token of the edge waits for a slot call (F9)."""
@@ -509,9 +516,10 @@ class Worker(Vertex):
         if position < self.ahead:
             self.ahead -= 1
 
-    def end_call(self) -> Any:
+    def end_call(self) -> AnyEdge:
         """The call is over, but for what it releases; gives back the edge that it took from."""
-        edge, self.call_edge = self.call_edge, None
+        edge: AnyEdge = self.call_edge
+        self.call_edge = None
         self.busy = "over"
         return edge
 
@@ -558,7 +566,7 @@ class Worker(Vertex):
         self.in_flight = True
         self.core.set_out()
 
-    def take_job(self, job: Any) -> None:
+    def take_job(self, job: object) -> None:
         """A thread works for it: by this job, perhaps with others of its region."""
         self.job = job
 
@@ -574,7 +582,7 @@ class Worker(Vertex):
         self.job = None
         self.node._active = self.active
 
-    def be_carried(self, carrier: Any) -> None:
+    def be_carried(self, carrier: object) -> None:
         """Its coroutines run in this dormant task from now on; None: the next one makes another."""
         self.carrier = carrier
 
@@ -590,7 +598,7 @@ class Worker(Vertex):
         """A3: whether it may still carry activity that A5 took earlier in the firing or call under way."""
         self.right = right
 
-    def expect_event(self, name: str, value: Any) -> None:
+    def expect_event(self, name: str, value: object) -> None:
         """An automatic event has arisen; it leaves with the others, in their order (A9)."""
         if self.events_due is None:
             self.events_due = []
@@ -616,7 +624,7 @@ class Worker(Vertex):
         deferred, self.deferred = self.deferred, None
         return deferred or []
 
-    def time_activity(self, timer: Any) -> None:
+    def time_activity(self, timer: Timer | None) -> None:
         """A12: how long it has been active is measured by this timer from now on, or not at all; the last is over."""
         if self.active_timer is not None:
             self.active_timer.cancel()
@@ -656,7 +664,7 @@ class Worker(Vertex):
             if edge.renew is not None and edge.complete is None:
                 edge.renew()
 
-    def limit(self, timer: Any) -> None:
+    def limit(self, timer: Timer | None) -> None:
         """X2: the firing may take as long as this timer."""
         self.limit_timer = timer
 

@@ -41,15 +41,8 @@ class _Bed(asyncio.Future[None]):
 
     def cancel(self, msg: Any = None) -> bool:
         """Hand the cancellation on; without a coroutine under way the task itself ends."""
-        carrier = self.carrier
-        if carrier is not None:
-            if carrier.waiting:
-                carrier._cancelled(msg)
-                return True
-            if asyncio.current_task(carrier._loop) is carrier.task:  # a coroutine cancels itself in its first step
-                carrier._cancelled(msg)
-                carrier._loop.call_soon(carrier._forget_cancellation)
-                return True
+        if self.carrier is not None and self.carrier.take_cancellation(msg):
+            return True
         return super().cancel(msg)
 
 
@@ -154,6 +147,17 @@ class Carrier:
                 _swap(self._loop, previous)
         self.task.cancel()
 
+    def take_cancellation(self, message: Any) -> bool:
+        """Its task was cancelled: whether that is meant for a coroutine under way, which is cancelled then."""
+        if self.waiting:
+            self._cancelled(message)
+            return True
+        if asyncio.current_task(self._loop) is self.task:  # a coroutine cancels itself in its first step
+            self._cancelled(message)
+            self._loop.call_soon(self._forget_cancellation)
+            return True
+        return False
+
     def _cancelled(self, message: Any) -> None:
         """As `asyncio.Task.cancel`: cancel what it waits for, else throw at the next step."""
         future = self._waits_for
@@ -173,7 +177,7 @@ class Carrier:
             self._soon(self._step)
             return
         if getattr(waits_for, "_asyncio_future_blocking", None):
-            waits_for._asyncio_future_blocking = False
+            waits_for._asyncio_future_blocking = False  # noqa: SLF001 (part of that protocol)
             if self._waits is not None:
                 waits, self._waits = self._waits, None
                 waits()

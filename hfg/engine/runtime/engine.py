@@ -242,7 +242,7 @@ class Engine:
         In virtual time not before everything else that is due at this instant has had its turn.
         """
         if not self._scheduled and not self.core.pumping:
-            if self.virtual and self.loop._ready:  # type: ignore[attr-defined]
+            if self.virtual and self._others_are_ready():
                 self.kick()
             else:
                 self._pump()

@@ -72,7 +72,8 @@ class Watch:
         region = worker.region if worker is not None else None
         if region is None or not region.running:
             return worker
-        return region.at_work(sys._current_frames().get(self.thread)) or worker
+        frames = sys._current_frames()  # noqa: SLF001 (documented; there is no other way)
+        return region.at_work(frames.get(self.thread)) or worker
 
 
 class _Watchdog:
