@@ -17,7 +17,7 @@
     │   ├── QueueLimit        a queue would have grown over its `capacity_limit` (rule F8)
     │   └── TeardownError     nodes failed while they were torn down (rule X3)
     ├── QueueOverflow         policy `error`: the queue is full, nothing of the trigger was sent (rule P5)
-    ├── EndOfStream           raised *by* a source to say that it has ended (rule F2)
+    ├── EndOfStream           raised *by* a node to say that it has ended (rule F2)
     └── EngineInternalError   a fault of hfg, never of the user
 
 A class exists when somebody would catch it apart from its neighbours. Each message names the path in the graph, what
@@ -179,7 +179,7 @@ class QueueOverflow(HfgError):
 
 
 class EndOfStream(HfgError):
-    """Raise it in a source to say that nothing more will come."""
+    """Raise it in the process function or in `ready()` of a node to say that nothing more will come of it."""
 
 
 class EngineInternalError(HfgError):

@@ -140,7 +140,7 @@ def picky(value: int, *, at: int = 3) -> int:
 
 @hfg.node
 def gives_up(value: int, *, at: int = 3) -> int:
-    """Speak as a source does, which is an error of any other node."""
+    """End, as any node may, or speak as a generator does, which is an error of a function."""
     if value % at == 0:
         raise (StopIteration if value % 2 else hfg.EndOfStream)
     return value

@@ -203,19 +203,6 @@ def test_a_generator_may_raise_end_of_stream(fast: bool) -> None:
     assert sink.values == [1, 2]
 
 
-@pytest.mark.rule("F2")
-def test_only_a_source_can_end_its_stream(fast: bool) -> None:
-    @hfg.node
-    def give_up(value: int) -> int:
-        raise hfg.EndOfStream
-
-    graph = hfg.Graph()
-    source, node = graph.add(numbers(count=1)), graph.add(give_up())
-    graph.connect(source.out, node.value)
-    with pytest.raises(hfg.errors.NodeError, match="only a source can end its stream"):
-        run(graph, fast)
-
-
 @hfg.node
 def endless() -> int:
     """A source without rate or end."""

@@ -371,7 +371,8 @@ def test_a_run_that_is_over_steps_no_more_and_nobody_waits_for_its_pause() -> No
             await run.wait_finished()
             with pytest.raises(hfg.errors.UsageError, match="has ended"):
                 await waiting
-            run.pause()
+            with pytest.raises(hfg.errors.NotRunning, match="the run is over: there is nothing left to pause"):
+                run.pause()
             with pytest.raises(hfg.errors.UsageError, match="has ended"):
                 await run.step(source)
 

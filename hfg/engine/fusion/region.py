@@ -33,7 +33,7 @@ from hfg.engine.model.core import PENDING
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
 from hfg.engine.rules import agenda, calls, ending, errors, firing
 from hfg.engine.rules.releasing import release
-from hfg.errors import EndOfStream, EngineInternalError
+from hfg.errors import EngineInternalError
 from hfg.ports.edges import EventEdge
 from hfg.token import NO_MESSAGE, Token
 
@@ -320,8 +320,8 @@ class Region:
         worker = self.materialise(k, found)
         if gave_way and (self.core.over or isinstance(error, GeneratorExit)):
             raise error
-        if worker.is_source and isinstance(error, StopIteration | EndOfStream):
-            ending.source_ended(worker)
+        if k not in self.schedule.called and ending.ends_itself(worker, error):
+            ending.end_itself(worker)
         elif isinstance(error, Exception) and k in self.schedule.called:
             errors.fail_call(worker, worker.call_edge.port_name, error)
         elif isinstance(error, Exception) or (gave_way and not isinstance(error, KeyboardInterrupt)):

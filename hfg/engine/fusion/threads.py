@@ -29,7 +29,6 @@ from hfg.engine.rules import ending, errors, firing
 from hfg.engine.rules.agenda import consider, freed, idle_again, let_follow
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import put
-from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import NO_MESSAGE
 
@@ -256,8 +255,8 @@ class ThreadRegion(Region):
             head.unplace()
         if error is None:
             firing.complete_firing(worker, left.result)
-        elif worker.is_source and isinstance(error, StopIteration | EndOfStream):
-            ending.source_ended(worker)
+        elif ending.ends_itself(worker, error):
+            ending.end_itself(worker)
         else:
             errors.fail(worker, f"firing {worker.firings}", error, answer=True)
         self._end()

@@ -12,17 +12,24 @@ from hfg.engine.model.worker import DISABLED, Worker
 from hfg.engine.rules.agenda import freed, idle_again
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import flush_automatic, put_outputs, send_end
+from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge
 from hfg.token import Marker, Token
 from hfg.trace import FiringEnded, TokenDrained, TokenDropped
 
-__all__ = ["drain_left", "end", "source_ended"]
+__all__ = ["drain_left", "end", "end_itself", "ends_itself"]
 
 
-def source_ended(worker: Worker) -> None:
-    """F2: the generator returned or the code raised EndOfStream; what the firing wrote before stays unsent."""
+def ends_itself(worker: Worker, error: BaseException | None) -> bool:
+    """F2: what the process function has raised is no error, but says that the node has ended."""
+    return isinstance(error, EndOfStream) or (
+        worker.is_source and isinstance(error, StopIteration | StopAsyncIteration)  # its generator has returned
+    )
+
+
+def end_itself(worker: Worker) -> None:
+    """F2: end amid a firing of its own; what that has written before leaves with what `end()` writes (F4)."""
     worker.keep_generator(None)  # nothing is left to close
-    worker.take_written()
     end(worker, (), ())
 
 

@@ -22,8 +22,10 @@ def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
     if isinstance(error, NodeError):
         return error
     cause: BaseException | str = error
-    if isinstance(error, EndOfStream) and not worker.is_source:
-        cause = "EndOfStream was raised, but only a source can end its stream: return None for silence"
+    if isinstance(error, EndOfStream):
+        cause = (
+            "EndOfStream was raised, but a node ends in process() or ready() alone: keep it in mind, and raise it there"
+        )
     problem = NodeError(worker.path, what, cause)
     problem.__cause__ = error
     return problem

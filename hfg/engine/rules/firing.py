@@ -15,7 +15,7 @@ from hfg.activity.rules import asked_for
 from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, SAME_MOMENT_S, UNREADY, Worker
 from hfg.engine.rules.agenda import consider, freed, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
-from hfg.engine.rules.ending import end, source_ended
+from hfg.engine.rules.ending import end, end_itself, ends_itself
 from hfg.engine.rules.modifiers import automatic, derive_scopes, receive, touch
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import flush_automatic, put_outputs, put_value
@@ -60,7 +60,9 @@ def _ask_ready(worker: Worker) -> None:
         worker.rest()
         if isinstance(error, EndOfStream) and worker.is_source and worker.placed:
             worker.begin_firing()
-            source_ended(worker)
+            end_itself(worker)
+        elif isinstance(error, EndOfStream) and worker.placed:
+            fire(worker, ends=True)
         elif error is not None:  # no answer is no: else it would be asked, and fail, without end
             worker.block(UNREADY)
             worker.core.upstairs.fail(worker, "ready()", error, answer=False)
@@ -79,11 +81,11 @@ def _ask_ready(worker: Worker) -> None:
     worker.core.code.execute(worker, hook, (), answered)
 
 
-def fire(worker: Worker) -> None:
-    """Take one token from every live input and decide by F4 what becomes of them."""
+def fire(worker: Worker, *, ends: bool = False) -> None:
+    """Take one token from every live input and decide by F4 what becomes of them; `ends`: its `ready()` ends it."""
     core = worker.core
     shape = worker.shape
-    if shape.plain and not worker.special and core.trace is None:
+    if shape.plain and not worker.special and core.trace is None and not ends:
         _fire_plainly(worker)
         return
     worker.begin_firing()
@@ -92,7 +94,7 @@ def fire(worker: Worker) -> None:
     now = core.now()
     worker.took(shape.sequential, now if worker.is_source else _newest_stamp(tokens, now))
     modifiers = [token.activity for token in tokens if token.activity]
-    kind = _kind(worker, edges, tokens)
+    kind = "end" if ends else _kind(worker, edges, tokens)
     if core.trace is not None:
         core.trace(FiringStarted(now, worker.path, worker.firings, kind))
         for edge, token in zip(edges, tokens, strict=True):
@@ -293,8 +295,8 @@ def when_done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
             return  # X2: it came too late, its firing was given up
         if error is None:
             complete_firing(worker, result)
-        elif worker.is_source and isinstance(error, (StopIteration, StopAsyncIteration, EndOfStream)):
-            source_ended(worker)
+        elif ends_itself(worker, error):
+            end_itself(worker)
         else:
             worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
 

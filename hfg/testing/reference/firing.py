@@ -193,8 +193,7 @@ class Firing(RunningCode):
 
     def end_process(self, flight: Flight, result: Any, error: BaseException | None) -> None:
         """Say what the end of the function means: the end of a source, a failure, or outputs."""
-        station = flight.station
-        if result is _OVER or (isinstance(error, EndOfStream) and station.type.is_source):
+        if result is _OVER or isinstance(error, EndOfStream):
             self.end_behind_others(flight)
             return
         if error is None:
@@ -270,7 +269,6 @@ class Firing(RunningCode):
             return
         station.ending = True
         station.stamp = flight.stamp
-        flight.writes.clear()
         for line in flight.taken:  # nothing waits for a node that has ended (F12)
             if not line.edge.is_event:
                 self.process(line)
