@@ -94,7 +94,7 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
     now = core.now()
     worker.took(shape.sequential, now if worker.is_source else _newest_stamp(tokens, now))
     modifiers = [token.activity for token in tokens if token.activity]
-    kind = "end" if ends else _kind(worker, edges, tokens)
+    kind: Any = "end" if ends else _kind(worker, edges, tokens)
     if core.trace is not None:
         core.trace(FiringStarted(now, worker.path, worker.firings, kind))
         for edge, token in zip(edges, tokens, strict=True):
