@@ -18,15 +18,20 @@ import msgspec
 from hfg.token import Token
 
 __all__ = [
+    "ActivityCause",
     "ActivityChanged",
     "ActivityLost",
     "CallEnded",
+    "CallOutcome",
     "CallStarted",
     "Consumer",
+    "DropReason",
     "EditWaits",
     "ErrorRaised",
     "EventTriggered",
     "FiringEnded",
+    "FiringKind",
+    "FiringOutcome",
     "FiringStarted",
     "NodeEnabled",
     "NodeEnded",
@@ -54,6 +59,12 @@ class TraceEvent(msgspec.Struct, frozen=True, tag=True):
 
 Consumer: TypeAlias = Callable[[TraceEvent], Any] | list[TraceEvent] | deque[TraceEvent]
 """Who takes the events of a run: a function of each, or a list to which they are appended."""
+
+FiringKind: TypeAlias = Literal["process", "silent", "end"]
+FiringOutcome: TypeAlias = Literal["done", "silent", "ended", "failed", "abandoned"]
+CallOutcome: TypeAlias = Literal["done", "failed", "abandoned"]
+DropReason: TypeAlias = Literal["overflow", "disabled", "ended", "removed", "stopped"]
+ActivityCause: TypeAlias = Literal["token", "sent", "slot", "reset", "returned"]
 
 
 class RunStarted(TraceEvent, frozen=True):
@@ -84,7 +95,7 @@ class FiringStarted(TraceEvent, frozen=True):
 
     node: str
     number: int
-    kind: Literal["process", "silent", "end"]
+    kind: FiringKind
 
 
 class FiringEnded(TraceEvent, frozen=True):
@@ -95,7 +106,7 @@ class FiringEnded(TraceEvent, frozen=True):
 
     node: str
     number: int
-    outcome: Literal["done", "silent", "ended", "failed", "abandoned"]
+    outcome: FiringOutcome
 
 
 class CallStarted(TraceEvent, frozen=True):
@@ -112,7 +123,7 @@ class CallEnded(TraceEvent, frozen=True):
 
     node: str
     number: int
-    outcome: Literal["done", "failed", "abandoned"]
+    outcome: CallOutcome
 
 
 class TokenSent(TraceEvent, frozen=True, gc=False):
@@ -143,7 +154,7 @@ class TokenDropped(TraceEvent, frozen=True, gc=False):
 
     edge: str
     token: Token[Any]
-    reason: Literal["overflow", "disabled", "ended", "removed", "stopped"]
+    reason: DropReason
 
 
 class TokenDrained(TraceEvent, frozen=True, gc=False):
@@ -165,7 +176,7 @@ class ActivityChanged(TraceEvent, frozen=True):
 
     node: str
     active: bool
-    cause: Literal["token", "sent", "slot", "reset", "returned"]
+    cause: ActivityCause
 
 
 class ActivityLost(TraceEvent, frozen=True):

@@ -162,6 +162,10 @@ class Edge:
         """The consumer begins afresh; who has said END to an optional input has said it (F4)."""
         self.ended = self.ended and not self.mandatory
 
+    def joins(self) -> bool:
+        """Whether a firing takes from it (F3, P8); else slot calls do, or what sets a parameter between firings."""
+        return self.target_kind != "slot"
+
     def enliven(self, live: bool) -> None:
         """Whether both its ends are enabled."""
         self.live = live
@@ -197,8 +201,8 @@ class SyncEdge(Edge):
         self.held = False
         self.sequential = True
 
-    def put(self, token: Token[Any]) -> None:
-        """Lay the one token on it that there is a place for; it counts as unprocessed (P4).
+    def put(self, token: Token[Any]) -> bool:
+        """Lay the one token on it that there is a place for: the producer has to wait (P4).
 
         Raises:
           EngineInternalError: the place is taken.
@@ -207,6 +211,7 @@ class SyncEdge(Edge):
             raise EngineInternalError(f'a second token on synchronous edge "{self.label}"')
         self.token = token
         self.held = True
+        return True
 
     def take(self) -> Token[Any]:
         """Take the token from it; its place stays occupied until `release` (F5)."""
@@ -421,6 +426,10 @@ class EventEdge(_QueueEdge):
     def pipe_afresh_by(self, renew: Callable[[], None]) -> None:
         """P9: so its operators are connected again, for a node that starts afresh."""
         self.renew = renew
+
+    def joins(self) -> bool:
+        """See `Edge`: of the signals only those into inputs take part in a firing (F6, P8)."""
+        return self.target_kind == "input"
 
     def fill(self) -> bool:
         """F8: whether it has just become full, so that its source starts nothing new."""

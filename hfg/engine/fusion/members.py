@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from hfg.engine.model.core import Core
 from hfg.engine.model.policies import Fifo
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.ports.edges import SyncEdge
@@ -17,24 +18,29 @@ __all__ = ["is_plain_and_fed", "lives_by_its_slots", "may_be_called", "may_be_in
 
 def _is_plain(worker: Worker) -> bool:
     """Its firings are calls of a function and nothing else."""
-    options, kind = worker.options, worker.type
     return (
-        options is not None
-        and kind is not None
+        worker.type is not None
+        and worker.options is not None
         and worker.scope is None
         and _nobody_looks(worker)
-        and not (worker.group.threaded and (worker.is_async or worker.listeners))  # which is for the loop to look at
         and isinstance(worker.group.policy, Fifo)
-        and not options.max_duration_s
-        and not worker.gates_over
+        and not (worker.group.threaded and (worker.is_async or worker.listeners))  # which is for the loop to look at
+        and not (worker.options.max_duration_s or worker.gates_over or worker.ready_hook is not None)
         and worker.iteration is None
-        and worker.ready_hook is None
-        and not worker.slot_edges
+        and _values_in_and_out(worker)
+    )
+
+
+def _values_in_and_out(worker: Worker) -> bool:
+    """It takes values and gives back values, and that is all that passes its ports."""
+    kind = worker.type
+    return (
+        not worker.slot_edges
         and "processed" not in worker.events
         and len(worker.out_names) == len(kind.outputs)
         and not any(worker.wants_token)
         and all(edge.target_kind == "input" and not edge.ended for edge in worker.in_edges)
-        and (not worker.is_async or not kind.events)
+        and not (worker.is_async and kind.events)
     )
 
 
@@ -65,7 +71,7 @@ def may_be_inside(worker: Worker) -> bool:
 
 def may_be_called(worker: Worker) -> bool:
     """Whether a slot call of it may be a member: it lives by one slot that an output of its own group feeds."""
-    if len(worker.slot_edges) != 1 or worker.in_edges or worker.is_source or not lives_by_its_slots(worker):
+    if len(worker.slot_edges) != 1 or not lives_by_its_slots(worker):
         return False
     edge = worker.slot_edges[0]
     return bool(
@@ -81,25 +87,23 @@ def may_be_called(worker: Worker) -> bool:
 
 def lives_by_its_slots(worker: Worker) -> bool:
     """Its calls may go the fast path: nobody looks, and nothing depends on its activity but itself."""
-    core = worker.core
-    return (
-        core.fast
-        and not core.debug
-        and core.trace is None
-        and worker.options is not None
-        and not worker.group.threaded
-        and bool(worker.slot_edges)
-        and not worker.in_edges
-        and not worker.is_source
-        and not (worker.gates_over or worker.ready_hook is not None or worker.observed or worker.on_idle is not None)
-        and not (worker.scopes or worker.watched or worker.options.max_rate_hz or worker.options.max_duration_s)
-    )
+    options = worker.options
+    if options is None or worker.group.threaded or worker.is_source or worker.in_edges or not _may_be_fast(worker.core):
+        return False
+    held = worker.gates_over or worker.ready_hook is not None or options.max_rate_hz or options.max_duration_s
+    looked_at = worker.observed or worker.on_idle is not None or worker.scopes or worker.watched
+    return bool(worker.slot_edges) and not held and not looked_at
+
+
+def _may_be_fast(core: Core) -> bool:
+    """Nobody looks at all that happens in the run."""
+    return core.fast and not core.debug and core.trace is None
 
 
 def is_plain_and_fed(worker: Worker) -> bool:
     """Whether it is a source, or a function with an edge into each input that it waits for, and nobody looks."""
     core = worker.core
-    if not core.fast or core.debug or core.trace is not None or core.inside is not None:
+    if not _may_be_fast(core) or core.inside is not None:
         return False
     if worker.type is None or worker.process is None or not _is_plain(worker):
         return False

@@ -31,10 +31,10 @@ from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
-from hfg.engine.rules import agenda, calls, ending, errors, firing
+from hfg.engine.rules import agenda, calls, errors, firing
 from hfg.engine.rules.releasing import release
 from hfg.errors import EngineInternalError
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import NO_MESSAGE, Token
 
 __all__ = ["Region"]
@@ -96,17 +96,20 @@ class Region:
         self._exits = [0] * len(order)
         self._formed_at = head.firings
         self._respecialise = respecialise
-        for worker in order:
-            if worker.region is not None:
-                worker.region.dissolve()
-        for worker in order:
-            worker.region = self
-        self.core.regions.add(self)
+        self._take_members()
         self._plain = self._write(measured=False)
         metered = all(worker.meter is not None for worker in order)  # one that an edit has added has none at first
         self._measured: Wave | None = self._write(measured=True) if metered else None
         self._wave = self._measured or self._plain
         self.step = self._wave.step
+
+    def _take_members(self) -> None:
+        for worker in self.order:
+            if worker.region is not None:
+                worker.region.dissolve()
+        for worker in self.order:
+            worker.region = self
+        self.core.regions.add(self)
 
     def _write(self, *, measured: bool) -> Wave:
         return write_wave(self, Writer(self, measured))
@@ -279,7 +282,7 @@ class Region:
 
     # --- side exits -------------------------------------------------------------------------------------------------
 
-    def leave(self, k: int, found: dict[str, Any]) -> Any:
+    def leave(self, k: int, found: dict[str, Any]) -> object:
         """Something about the firing of member k is not plain: what it gave back, or what happened meanwhile."""
         result = found[f"r{k}"] if f"r{k}" in found else found[f"v{k}_0"]
         if self.detached:
@@ -320,12 +323,10 @@ class Region:
         worker = self.materialise(k, found)
         if gave_way and (self.core.over or isinstance(error, GeneratorExit)):
             raise error
-        if k not in self.schedule.called and ending.ends_itself(worker, error):
-            ending.end_itself(worker)
-        elif isinstance(error, Exception) and k in self.schedule.called:
+        if isinstance(error, Exception) and k in self.schedule.called:
             errors.fail_call(worker, worker.call_edge.port_name, error)
         elif isinstance(error, Exception) or (gave_way and not isinstance(error, KeyboardInterrupt)):
-            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+            firing.when_done(worker)(None, error)
         else:
             self._left(gave_way)
             raise error
@@ -349,29 +350,18 @@ class Region:
         self.waves += found["done"]
         self.settle_counts()
         self.armed = self.running = False
-        order, stamp = self.order, found["stamp"]
-        silent_calls: set[Any] = set()
+        stamp = found["stamp"]
+        silent_calls: set[SyncEdge] = set()
         for j in range(k):
             self._count(j, found)
             for edge, output, to in self.schedule.outs[j]:
                 if to is None or (to > k and not edge.live):  # one end was disabled meanwhile: it goes nowhere (F10)
                     continue
                 edge.sent += 1
-                if to <= k:
-                    continue
-                value = found.get(f"v{j}_{output}")
-                if value is None and to in self.schedule.called:
+                if to > k and not self._lay(edge, to, found.get(f"v{j}_{output}"), stamp):
                     silent_calls.add(edge)
-                    continue
-                value = NO_MESSAGE if value is None else value
-                edge.token = Token(value, 0, stamp, edge.sent)
-                if to in self.schedule.called:
-                    order[to].calls.append(edge)  # type: ignore[union-attr]
-                else:
-                    order[to].inputs.missing -= 1
-                    order[to].special = order[to].special or value is NO_MESSAGE
         self._write_barriers(k, silent_calls)
-        worker = order[k]
+        worker = self.order[k]
         worker.ticket += 1
         worker.stamp = stamp
         if k in self.schedule.called:
@@ -386,16 +376,26 @@ class Region:
         self.core.speaker = worker
         return worker
 
+    def _lay(self, edge: SyncEdge, to: int, value: object, stamp: float) -> bool:
+        """Put what a local holds on the edge to member `to`; a slot is not called by a marker (T4)."""
+        target, called = self.order[to], to in self.schedule.called
+        if value is None and called:
+            return False
+        edge.token = Token(NO_MESSAGE if value is None else value, 0, stamp, edge.sent)
+        if called:
+            target.calls.append(edge)  # type: ignore[union-attr]
+        else:
+            target.inputs.missing -= 1
+            target.special = target.special or value is None
+        return True
+
     def _count(self, j: int, found: dict[str, Any]) -> None:
         """Member j has fired, or was called, in the wave that does not come to its end."""
         worker = self.order[j]
         if j not in self.schedule.called:
             worker.firings += 1
-            return
-        edge = worker.slot_edges[0]
-        source = self.schedule.position[edge.source]
-        output = next(output for one, output, _ in self.schedule.outs[source] if one is edge)
-        worker.call_number += found.get(f"v{source}_{output}") is not None
+        else:
+            worker.call_number += found.get(self.schedule.local(worker.slot_edges[0])) is not None
 
     def _queue_behind(self, k: int) -> None:
         """Who stands behind member k is enabled by now, or by an outside edge that was waited for (R2)."""
@@ -406,7 +406,7 @@ class Region:
                 self.core.followers.append(worker)
         self._let_follow(behind)
 
-    def _write_barriers(self, k: int, silent_calls: Collection[Any] = ()) -> None:
+    def _write_barriers(self, k: int, silent_calls: Collection[SyncEdge] = ()) -> None:
         """F5: who of those that have fired, the first k, still waits for what it has sent.
 
         Args:
@@ -430,7 +430,7 @@ class Region:
 
     # --- code that waits --------------------------------------------------------------------------------------------
 
-    def start(self, waves: Any) -> None:
+    def start(self, waves: CoroutineType[Any, Any, Any]) -> None:
         """Run a wave in which there is async code, with the identity of a task: once a wave, not once a call.
 
         A call that really waits becomes a firing like any other; the wave's coroutine stays around it.
@@ -500,7 +500,7 @@ class Region:
                 if not worker.busy:
                     agenda.idle_again(worker)
 
-    def _late(self, result: Any, error: BaseException | None) -> None:
+    def _late(self, result: object, error: BaseException | None) -> None:
         after, self._after = self._after, None
         assert after is not None
         after(result, error)

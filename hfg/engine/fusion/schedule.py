@@ -12,6 +12,7 @@ from typing import Any
 
 from hfg.engine.fusion.members import may_be_called, may_be_inside
 from hfg.engine.model.worker import Worker
+from hfg.ports.edges import BufferEdge, SyncEdge
 
 __all__ = ["MOST_MEMBERS", "Schedule", "asks_who_hears", "schedule"]
 
@@ -42,7 +43,12 @@ class Schedule:
             [(edge, output, self._inside(edge, output)) for edge, output in _sending(worker)] for worker in order
         ]
 
-    def _inside(self, edge: Any, output: int) -> int | None:
+    def local(self, edge: SyncEdge) -> str:
+        """The local of a wave that holds what an edge between members carries."""
+        source = self.position[edge.source]
+        return f"v{source}_{next(output for one, output, _ in self.outs[source] if one is edge)}"
+
+    def _inside(self, edge: SyncEdge | BufferEdge, output: int) -> int | None:
         """Where the edge leads to, if that is a member and the edge belongs to its waves."""
         return self.position.get(edge.target) if edge.follows and not asks_who_hears(edge.source, output) else None
 
@@ -77,21 +83,25 @@ def _closure(head: Worker) -> set[Worker]:
         worker = todo.pop()
         for edge, output in reversed(_sending(worker)):
             target: Worker = edge.target
-            if not edge.follows or target in inside or asks_who_hears(worker, output):
-                continue
-            if target.region is not None and target.region.head is not target:
+            if not edge.follows or target in inside or asks_who_hears(worker, output) or _is_inside_another(target):
                 continue
             if edge.target_kind == "slot":
-                if may_be_called(target) and len(inside) < MOST_MEMBERS:
-                    inside.add(target)
+                fed = may_be_called(target)
+            elif target in missing or may_be_inside(target):
+                missing[target] = missing.get(target, len(target.live_inputs)) - 1
+                fed = not missing[target]
+            else:
                 continue
-            if target not in missing and not may_be_inside(target):
-                continue
-            missing[target] = missing.get(target, len(target.live_inputs)) - 1
-            if not missing[target] and len(inside) < MOST_MEMBERS:
+            if fed and len(inside) < MOST_MEMBERS:
                 inside.add(target)
-                todo.append(target)
+                if edge.target_kind != "slot":  # from which nothing is sent over outputs
+                    todo.append(target)
     return inside
+
+
+def _is_inside_another(worker: Worker) -> bool:
+    """Whether it belongs to a region that another leads."""
+    return worker.region is not None and worker.region.head is not worker
 
 
 def _simulate(head: Worker, inside: set[Worker]) -> Schedule:

@@ -7,7 +7,7 @@ condition they do not cover they hand over to `sending.trigger` and `firing.step
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from functools import partial
 from types import CoroutineType
 from typing import Any
@@ -15,11 +15,10 @@ from typing import Any
 from hfg.engine.model.worker import CALLS_BLOCKED, RunningEvent, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
-from hfg.engine.rules.calls import await_call, finish_call
-from hfg.engine.rules.listening import may_listen
-from hfg.engine.rules.modifiers import derive_scopes, touch
+from hfg.engine.rules.calls import await_call
+from hfg.engine.rules.modifiers import derive_scopes
 from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import trigger
+from hfg.engine.rules.sending import bring_activity, trigger
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import Token
 
@@ -45,21 +44,21 @@ def calls_step(worker: Worker) -> Step:
     return step
 
 
-def _call_step(worker: Worker, edge: Any) -> Step:
-    """One edge into one slot, whose handler takes the value."""
+def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
+    """One edge into one slot, whose handler takes the value.
+
+    A token that an output has sent is processed when the call is over, or takes it (F6).
+    """
     handler: Any = edge.handler
-    if handler is None:
+    queue = edge.queue if type(edge) is EventEdge else None
+    if handler is None or (edge.while_active and queue is not None):
         return firing.step
-    if type(edge) is SyncEdge:
-        return _call_by_output_step(worker, edge)
-    if edge.while_active:
-        return firing.step
-    core = worker.core
-    node = worker.node
-    general = firing.step
+    core, node, general = worker.core, worker.node, firing.step
     calls: Any = worker.calls
-    queue = edge.queue
-    gives = any(one.active for one in worker.event_edges())  # else it has no activity to give away
+    lies: Any = edge  # a synchronous one, where there is no queue
+    held = (edge,) if queue is None and lies.sequential else ()
+    pipelined = (edge,) if queue is None and not held else ()
+    while_active = edge.while_active
 
     def step(worker: Worker) -> None:
         if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
@@ -67,27 +66,34 @@ def _call_step(worker: Worker, edge: Any) -> Step:
             return
         # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
         calls.popleft()
-        token = queue.popleft()
         worker.call_number += 1
-        if edge.full and len(queue) < edge.capacity:
-            freed(edge)
+        if queue is None:
+            token, lies.token = lies.token, None
+            if pipelined:
+                release(pipelined)
+        else:
+            token = queue.popleft()
+            if lies.full:
+                freed(lies)
         if token.activity:
             worker.active = node._active = token.activity > 0
-        core.speaker = worker
-        worker.stamp = token.stamp
-        try:
-            result = handler(token.value)
-        except Exception as error:
-            _call_taken(worker, edge)
-            errors.fail_call(worker, edge.port_name, error)
-            return
-        if result is not None and type(result) is CoroutineType:
-            _call_taken(worker, edge)
-            await_call(worker, edge.port_name, result)
-            return
-        worker.stamp = None
-        if gives:
+        if not while_active or worker.active:  # T4: it was when the token came
+            core.speaker = worker
+            worker.stamp = token.stamp
+            try:
+                result = handler(token.value)
+            except Exception as error:
+                _call_taken(worker, edge)
+                errors.fail_call(worker, edge.port_name, error)
+                return
+            if type(result) is CoroutineType:
+                _call_taken(worker, edge)
+                await_call(worker, edge.port_name, result)
+                return
+            worker.stamp = None
             worker.right = False
+        if held:
+            release(held)
         worker.queued = False
         if calls or worker.on_idle is not None:
             idle_again(worker)
@@ -95,62 +101,8 @@ def _call_step(worker: Worker, edge: Any) -> Step:
     return step
 
 
-def _call_by_output_step(worker: Worker, edge: SyncEdge) -> Step:
-    """The same behind an output: its token is processed when the call is over, or takes it (F6)."""
-    handler: Any = edge.handler
-    core = worker.core
-    general = firing.step
-    calls: Any = worker.calls
-    only = (edge,)
-    sequential = edge.sequential
-    while_active = edge.while_active
-
-    def step(worker: Worker) -> None:
-        token: Any = edge.token
-        if not calls or worker.blocked & CALLS_BLOCKED or worker.busy or token.activity:
-            general(worker)
-            return
-        calls.popleft()
-        edge.token = None
-        worker.call_number += 1
-        if not sequential:
-            release(only)
-        if while_active and not worker.active:  # T4: it was when the token came
-            _over(worker, only if sequential else (), calls)
-            return
-        core.speaker = worker
-        worker.stamp = token.stamp
-        try:
-            result = handler(token.value)
-        except Exception as error:
-            _call_taken(worker, edge)
-            errors.fail_call(worker, edge.port_name, error)
-            return
-        if result is not None and type(result) is CoroutineType:
-            _call_taken(worker, edge)
-            await_call(worker, edge.port_name, result)
-            return
-        if worker.right or worker.events_due:
-            _call_taken(worker, edge)
-            finish_call(worker, "done")
-            return
-        worker.stamp = None
-        _over(worker, only if sequential else (), calls)
-
-    return step
-
-
-def _over(worker: Worker, held: tuple[SyncEdge, ...], calls: Collection[Any]) -> None:
-    """A call by an output is over: its token is processed."""
-    if held:
-        release(held)
-    worker.queued = False
-    if calls or worker.on_idle is not None:
-        idle_again(worker)
-
-
 def _call_taken(worker: Worker, edge: EventEdge | SyncEdge) -> None:
-    """A short call goes on as one like any other."""
+    """A call by the fast path goes on as one like any other."""
     worker.queued = False
     worker.busy = "call"
     worker.call_edge = edge
@@ -162,69 +114,68 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
 
     Else `sending.trigger`.
     """
-    worker = event.worker
-    core = worker.core
-    host = core.host
-    edges = event.edges
+    interpreted = _interpreted_emitter(event)
+    if plainly or not event.worker.core.fast or len(event.edges) != 1 or not _may_be_short(event, event.edges[0]):
+        return interpreted
+    return _slot_emitter(event, event.edges[0], interpreted)
 
-    def emit_general(value: Any = None, *, activity: int | None = None, stamp: float | None = None) -> None:
+
+def _may_be_short(event: RunningEvent, edge: EventEdge) -> bool:
+    return (
+        edge.target_kind == "slot"
+        and not edge.while_active
+        and edge.overflow == "wait"
+        and edge.pipeline is None
+        and not event.worker.watched
+    )
+
+
+def _interpreted_emitter(event: RunningEvent) -> Callable[..., None]:
+    core = event.worker.core
+    host = core.host
+
+    def emit(value: object = None, *, activity: int | None = None, stamp: float | None = None) -> None:
         if host.on_loop():
             trigger(event, value, activity, stamp)
         else:  # from a thread that the user has started, as drivers do
             host.bring_in(partial(trigger, event, value, activity, core.now() if stamp is None else stamp))
 
-    if plainly or not core.fast or len(edges) != 1:
-        return emit_general
-    edge = edges[0]
-    target: Worker = edge.target
-    node = worker.node
-    if (
-        edge.while_active
-        or edge.target_kind != "slot"
-        or edge.overflow != "wait"
-        or edge.pipeline is not None
-        or worker.watched
-    ):
-        return emit_general
-    port = event.port
+    return emit
+
+
+def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..., None]) -> Callable[..., None]:
+    worker, port = event.worker, event.port
+    core = worker.core
+    host = core.host
     watched = port._observers is not None
+    target: Worker = edge.target
     queue = edge.queue
     calls: Any = target.calls
     carries = edge.active
-    scopes = target.scopes
-    tight = edge.capacity == 1
+    alone = 0 if edge.capacity == 1 else 1  # so many signals fill no queue
 
     # (parameters by keyword alone would cost 20 ns; who gives them by position is refused by the type checker)
-    def emit(value: Any = None, activity: int | None = None, stamp: float | None = None) -> None:
+    def emit(value: object = None, activity: int | None = None, stamp: float | None = None) -> None:
         if (
             activity is not None
-            or core.speaker is not worker  # not out of a short step; perhaps a thread, while the loop is at work
+            or core.speaker is not worker  # not out of a fast path; perhaps a thread, while the loop is at work
             or watched
             or not edge.live
             or type(value) is Token
         ):
-            emit_general(value, activity=activity, stamp=stamp)
+            interpreted(value, activity=activity, stamp=stamp)
             return
         if stamp is None:
             stamp = worker.stamp
             if stamp is None:
                 stamp = core.now()
         edge.sent = number = edge.sent + 1
-        if not carries:
-            queue.append(Token(value, 0, stamp, number))
-        elif worker.active or worker.right:
-            if target.listened is not None:
-                may_listen(target)
+        if carries and (worker.active or worker.right):
             queue.append(Token(value, 1, stamp, number))
-            if worker.active:
-                worker.active = node._active = False
-                worker.right = worker.stamp is not None
-            if scopes:
-                touch(core, scopes)
-                derive_scopes(core)
+            _give_activity(worker, target)
         else:
             queue.append(Token(value, 0, stamp, number))
-        if calls or tight or target.busy:  # else it is the only one that waits
+        if len(queue) > alone or target.busy:
             edge.deepest = max(edge.deepest, len(queue))
             note_full(edge)
             add_call(target, edge)
@@ -242,3 +193,12 @@ def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None
 
     port._look = look
     return emit
+
+
+def _give_activity(worker: Worker, target: Worker) -> None:
+    """A5: what carries activity takes it from the sender; it stays its right until the call is over (A3)."""
+    if worker.active:
+        worker.active = worker.node._active = False
+        worker.right = worker.stamp is not None
+    bring_activity(target)
+    derive_scopes(worker.core)

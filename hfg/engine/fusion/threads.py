@@ -25,11 +25,11 @@ from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import ending, errors, firing
-from hfg.engine.rules.agenda import consider, freed, idle_again, let_follow
-from hfg.engine.rules.releasing import release
+from hfg.engine.rules import firing
+from hfg.engine.rules.agenda import consider, idle_again, let_follow
+from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import put
-from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.ports.edges import SyncEdge
 from hfg.token import NO_MESSAGE
 
 __all__ = ["SOONER_IN_THREADS", "ThreadRegion"]
@@ -117,14 +117,7 @@ class ThreadRegion(Region):
 
     def _fire(self, head: Worker) -> None:
         """Take the tokens and let the thread go on from there."""
-        if (
-            head.special
-            or head.busy
-            or not head.placed
-            or (self._carries and head.active)
-            or not (self._source_is_open() if head.is_source else self._all_plain())
-            or not (self.armed or self.arm())
-        ):
+        if not self._may_begin():
             self.decline(head)
             return
         head.queued = head.placed = False
@@ -137,17 +130,22 @@ class ThreadRegion(Region):
             worker.busy = "firing"
         for worker in self._speaking:
             worker.stamp = stamp
-        for edge, _ in tokens:
-            if type(edge) is EventEdge:
-                freed(edge)
-            elif not edge.sequential:
-                release((edge,))
+        for edge in self.entries:
+            make_room(edge)
         if head.paced:
             head.note_start(head.options.max_rate_hz)
         self._wave = (self._measured if self._measuring else None) or self._plain
         self.flags.clear()
         self.running = True
         self.core.code.execute_wave(self._seeing, self._wave.step, (head, stamp, *arguments), self._back)
+
+    def _may_begin(self) -> bool:
+        """Whether the head's next piece of work is a plain wave."""
+        head = self.head
+        if head.special or head.busy or not head.placed or (self._carries and head.active):
+            return False
+        plain = self._source_is_open() if head.is_source else self._all_plain()
+        return plain and (self.armed or self.arm())
 
     def _source_is_open(self) -> bool:
         return self.head.type.process_kind != "generator" or self.head.generator is not None
@@ -253,12 +251,7 @@ class ThreadRegion(Region):
         worker = self.materialise(k, left.found)
         if head.outputs.missing:
             head.unplace()
-        if error is None:
-            firing.complete_firing(worker, left.result)
-        elif ending.ends_itself(worker, error):
-            ending.end_itself(worker)
-        else:
-            errors.fail(worker, f"firing {worker.firings}", error, answer=True)
+        firing.when_done(worker)(left.result, error)
         self._end()
         if worker is not head and not head.busy:
             idle_again(head)

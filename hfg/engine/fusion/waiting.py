@@ -7,22 +7,17 @@ at each firing. Only a shortening, as in `slots`: what it does not cover goes th
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import CoroutineType
 from typing import Any
 
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import firing
-from hfg.engine.rules.agenda import consider, let_follow
 from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import put
 from hfg.ports.edges import SyncEdge
-from hfg.token import NO_MESSAGE, Token
 
 __all__ = ["waiting_step"]
 
 Step = Callable[[Worker], None]
-_EXCEPTIONAL = frozenset({Token, CoroutineType})
 
 
 def waiting_step(worker: Worker) -> Step:
@@ -34,51 +29,18 @@ def waiting_step(worker: Worker) -> Step:
     core = worker.core
     code = core.code
     process: Any = worker.process
-    inputs, outputs = worker.inputs, worker.outputs
+    inputs = worker.inputs
     count = len(edges)
     unset = worker.unset
-    held = tuple(edge for edge in edges if edge.sequential)
-    pipelined = tuple(edge for edge in edges if not edge.sequential)
-    wired = worker.out_edges
-    outs = tuple(edge for some in wired for edge in some)
-    outs = tuple(sorted(outs, key=lambda edge: edge.target_kind != "slot"))  # F9
-    carries = any(edge.active for edge in worker.all_out_edges())
-    sends = bool(kind.outputs)
+    held, pipelined = worker.shape.sequential, worker.shape.pipelined
     lent: Any = None  # the eager task for which `late` was made
     late: Any = None
 
-    def leave(result: Any, error: BaseException | None) -> None:
-        if (
-            error is not None
-            or type(result) in _EXCEPTIONAL
-            or worker.out_edges is not wired  # the wiring has changed
-            or core.trace is not None  # somebody has begun to look
-            or worker.written is not None
-            or worker.right
-            or worker.events_due
-            or worker.on_idle is not None
-            or worker.follows
-            or (carries and worker.active)
-            or not (sends or result is None)
-        ):
+    def leave(result: object, error: BaseException | None) -> None:
+        if error is None:
+            firing.complete_firing(worker, result)
+        else:
             firing.when_done(worker)(result, error)
-            return
-        stamp: Any = worker.stamp
-        if outs:
-            since = len(core.followers)
-            value = NO_MESSAGE if result is None else result
-            for edge in outs:
-                put(edge, value, 0, stamp)
-            let_follow(core, since)
-            if outputs.missing:
-                worker.placed = False
-        worker.busy = ""
-        worker.stamp = None
-        if outputs.missing:
-            worker.held = True
-        elif held:
-            release(held)
-        consider(worker)
 
     def step(worker: Worker) -> None:
         nonlocal lent, late

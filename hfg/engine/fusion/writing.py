@@ -21,11 +21,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hfg.engine.fusion.schedule import asks_who_hears
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules.agenda import freed
 from hfg.engine.rules.firing import take
-from hfg.engine.rules.releasing import release
+from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import put
-from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.token import NO_MESSAGE, Token
 
 if TYPE_CHECKING:
@@ -104,13 +103,10 @@ def _code_of(worker: Worker) -> Any:
     return worker.process if worker.meter is None else worker.meter.code
 
 
-def _take_queued(edge: Any) -> Token[Any]:
+def _take_queued(edge: BufferEdge | EventEdge) -> Token[Any]:
     """The oldest token of an edge with a queue, with all that follows from its being taken."""
-    token: Token[Any] = take(edge)
-    if type(edge) is EventEdge:
-        freed(edge)
-    elif not edge.sequential:
-        release((edge,))
+    token = take(edge)
+    make_room(edge)
     return token
 
 
@@ -169,6 +165,7 @@ class Writer:
 
     def __init__(self, region: Region, measured: bool) -> None:
         self.order = region.order
+        self.schedule = region.schedule
         self.outs = region.schedule.outs
         self.position = region.schedule.position
         self.entries = region.entries
@@ -226,6 +223,7 @@ class Writer:
         return "\n".join(self.lines) + "\n"
 
     def _bindings(self) -> None:
+        """What the text uses again and again is found once: of the run, of each entry, of each member."""
         say = self.say
         say(f"def build(region, names, {_TOOL_NAMES}):")
         self.indent = 1
@@ -239,28 +237,37 @@ class Writer:
         pipelined = [number for number, edge in enumerate(self.entries) if self._is_pipelined(edge)]
         if pipelined:
             say(f"pipelined = ({', '.join(f'entry{number}' for number in pipelined)},)")
-        for k, worker in enumerate(self.order):
-            if k or not self.is_generator:
-                say(f"f{k} = names.calls[{k}]")
-            if self._speaks(worker) or k in self.called:
-                say(f"w{k} = names.workers[{k}]")
-            elif not self.single[k]:
-                say(f"split{k} = names.splits[{k}]")
-            if self.measured:
-                say(f"took{k} = names.took[{k}]")
-            fed = {edge.position for edge in worker.live_inputs if edge.mandatory}
-            for at in range(len(worker.unset)):
-                if (at not in fed and not self.is_source) or (k and at not in fed):
-                    say(f"d{k}_{at} = names.unset[{k}][{at}]")
-            for output in range(len(worker.out_edges)):
-                if asks_who_hears(worker, output):
-                    say(f"heard{k}_{output} = names.listeners[{k}][{output}]")
-            for number, (_, output, to) in enumerate(self.outs[k]):
-                if to is None and not asks_who_hears(worker, output):
-                    say(f"e{k}_{number} = names.edges[{k}][{number}]")
+        for k in range(len(self.order)):
+            self._bindings_of(k)
         kinds = self._kinds()
         if kinds:
             say(" = ".join([*kinds, "None"]))  # the types of the last results
+
+    def _bindings_of(self, k: int) -> None:
+        """One member: its code, the defaults of absent inputs (P6), and where its outputs cross the border."""
+        say, worker = self.say, self.order[k]
+        if k or not self.is_generator:
+            say(f"f{k} = names.calls[{k}]")
+        if self._speaks(worker) or k in self.called:
+            say(f"w{k} = names.workers[{k}]")
+        elif not self.single[k]:
+            say(f"split{k} = names.splits[{k}]")
+        if self.measured:
+            say(f"took{k} = names.took[{k}]")
+        for at in self._with_default(k):
+            say(f"d{k}_{at} = names.unset[{k}][{at}]")
+        for output in range(len(worker.out_edges)):
+            if asks_who_hears(worker, output):
+                say(f"heard{k}_{output} = names.listeners[{k}][{output}]")
+        for number, (_, output, to) in enumerate(self.outs[k]):
+            if to is None and not asks_who_hears(worker, output):
+                say(f"e{k}_{number} = names.edges[{k}][{number}]")
+
+    def _with_default(self, k: int) -> list[int]:
+        """Which inputs of a member may be absent; a source that leads has none."""
+        worker = self.order[k]
+        fed = {edge.position for edge in worker.live_inputs if edge.mandatory}
+        return [at for at in range(len(worker.unset)) if at not in fed and (k or not self.is_source)]
 
     def _kinds(self) -> list[str]:
         return [f"t{k}" for k in range(len(self.order)) if self.single[k] and self.order[k].out_names]
@@ -345,12 +352,12 @@ class Writer:
         edges = {edge.position: edge for edge in worker.live_inputs}
         arguments = [self._argument(k, at, edges.get(at)) for at in range(len(worker.unset))]
         call = f"f{k}({', '.join(arguments)})"
-        needed = [self._value(edge) for edge in worker.live_inputs if edge.mandatory]
+        needed = [self.schedule.local(edge) for edge in worker.live_inputs if edge.mandatory]
         if needed:
             tests = [f"{value} is None" for value in needed if self._may_be_silent(value)]
             silence = " or ".join(dict.fromkeys(tests))
         else:
-            silence = " and ".join(f"{self._value(edge)} is None" for edge in worker.live_inputs)
+            silence = " and ".join(f"{self.schedule.local(edge)} is None" for edge in worker.live_inputs)
         if not silence:
             self._call(k, call)
             return
@@ -368,7 +375,7 @@ class Writer:
 
     def _slot_call(self, k: int) -> None:
         """A slot that an output feeds: a marker is processed at once, the handler is not called (T4, F6)."""
-        say, value = self.say, self._value(self.order[k].slot_edges[0])
+        say, value = self.say, self.schedule.local(self.order[k].slot_edges[0])
         say(f"if {value} is not None:")
         self.indent += 1
         say(f"core.speaker = w{k}; w{k}.busy = 'call'; w{k}.stamp = stamp")
@@ -379,17 +386,11 @@ class Writer:
         self.indent -= 1
         say(f"else: silent[{k}] += 1")
 
-    def _value(self, edge: Any) -> str:
-        """The local that holds what the edge carries in this wave."""
-        source = self.position[edge.source]
-        output = next(output for one, output, _ in self.outs[source] if one is edge)
-        return f"v{source}_{output}"
-
     def _argument(self, k: int, at: int, edge: Any) -> str:
         """P6: an absent optional input takes its default."""
         if edge is None:
             return f"d{k}_{at}"
-        value = self._value(edge)
+        value = self.schedule.local(edge)
         return value if edge.mandatory else f"(d{k}_{at} if {value} is None else {value})"
 
     def _may_be_silent(self, value: str) -> bool:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import RunningEvent, Worker
@@ -32,6 +32,8 @@ __all__ = ["Tap", "Taps"]
 _SIZE = 100
 
 Look = Callable[[Token[Any]], None]
+
+_Where: TypeAlias = Port | InnerSource[Any] | InnerTarget[Any] | DrawnEdge | Ends
 
 
 class Tap:
@@ -229,8 +231,31 @@ class Taps:
     def _edges(self) -> Iterator[Any]:
         return (edge for core in self._engine.all_cores() for edge in core.edges)
 
-    def _places(self, what: Any) -> list[tuple[Any, list[Any]]]:
+    def _places(self, what: object) -> list[tuple[Any, list[Any]]]:
         """Where to look: edges, events, slots; with an edge come those that carry the same tokens."""
+        if any(what is edge for edge in self._edges()):
+            return [(what, [])]
+        where = self._of_this_run(what)
+        if isinstance(where, Port) and where.kind == "event":
+            events = relays.events_behind(where) if relays.is_relay(where) else [where]
+            return [(event, []) for event in map(self._running, events) if event is not None]
+        places = _with_same_tokens(edges_at(self._engine, where))
+        if isinstance(where, Port) and where.kind == "slot" and not relays.is_relay(where):
+            places += self._before_slot(where)
+        if not places:
+            name = where.path if isinstance(where, Port | InnerSource | InnerTarget) else _label(where)
+            raise UsageError(f'"{name}" has no edge in this run, so no token passes there: connect it before the run')
+        return places
+
+    def _before_slot(self, slot: Port) -> list[tuple[Any, list[Any]]]:
+        """A slot gets edges while the graph runs; there may be one already by which signals come from outside."""
+        worker = self._worker(slot)
+        places: list[tuple[Any, list[Any]]] = [((worker, slot.name), [])]
+        edge = worker.core.outside.get((worker.index, slot.name))
+        return places if edge is None else [*places, (edge, [])]
+
+    def _of_this_run(self, what: object) -> _Where:
+        """Refuse what is no port or edge of the graph that runs."""
         if isinstance(what, Node):
             kind = what._type
             names = dict.fromkeys([*kind.inputs, *kind.outputs, *kind.events, *kind.slots])
@@ -238,8 +263,6 @@ class Taps:
                 f'"{what.place.path}" is a node, and a tap looks at a port or an edge: name one of its ports; '
                 f"{suggest('', names)}"
             )
-        if any(what is edge for edge in self._edges()):
-            return [(what, [])]
         if not isinstance(what, Port | InnerSource | InnerTarget | DrawnEdge | Ends):
             raise UsageError(f"a tap looks at a port or an edge of this run, given itself or by path, got {what!r}")
         if isinstance(what, Port) and (
@@ -249,23 +272,7 @@ class Taps:
                 f'"{what.path}" is in no graph that runs here, so no token passes there: '
                 f'this is a run of graph "{self._engine.graph.name}"'
             )
-        if isinstance(what, Port) and what.kind == "event":
-            events = relays.events_behind(what) if relays.is_relay(what) else [what]
-            return [(event, []) for event in map(self._running, events) if event is not None]
-        carrying: dict[str, list[Any]] = {}
-        for edge in edges_at(self._engine, what):
-            carrying.setdefault(edge.label.partition(" -> ")[0], []).append(edge)
-        places = [(edge, group if len(group) > 1 else []) for group in carrying.values() for edge in group]
-        if isinstance(what, Port) and what.kind == "slot" and not relays.is_relay(what):
-            worker = self._worker(what)
-            places.append(((worker, what.name), []))
-            edge = worker.core.outside.get((worker.index, what.name))
-            if edge is not None:
-                places.append((edge, []))
-        if not places:
-            name = what.path if isinstance(what, Port | InnerSource | InnerTarget) else _label(what)
-            raise UsageError(f'"{name}" has no edge in this run, so no token passes there: connect it before the run')
-        return places
+        return what
 
     def _running(self, event: Any) -> RunningEvent | None:
         worker = self._worker(event)
@@ -277,6 +284,14 @@ class Taps:
             assert boundary is not None
             return boundary
         return next(worker for worker in self._engine.all_workers() if worker.node is port.node)
+
+
+def _with_same_tokens(edges: Iterable[Any]) -> list[tuple[Any, list[Any]]]:
+    """Each edge with those that carry the same tokens: of one output."""
+    carrying: dict[str, list[Any]] = {}
+    for edge in edges:
+        carrying.setdefault(edge.label.partition(" -> ")[0], []).append(edge)
+    return [(edge, group if len(group) > 1 else []) for group in carrying.values() for edge in group]
 
 
 def _label(edge: Any) -> str:

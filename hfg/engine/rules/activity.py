@@ -7,17 +7,19 @@ Only workers marked `watched` come here. Stands on `sending`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import msgspec
 
 from hfg.engine.model.core import Core
-from hfg.engine.model.scopes import Scope
+from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import AMID_NOTHING, RESTING, Worker
 from hfg.engine.rules.agenda import consider, must_wait
 from hfg.engine.rules.modifiers import automatic, set_active, touch
 from hfg.engine.rules.sending import flush_automatic, tell, trigger
 from hfg.engine.rules.sources import judge_sources
+from hfg.ports.edges import AnyEdge
 from hfg.token import Token
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
@@ -45,7 +47,7 @@ def _call_hook(worker: Worker, name: str) -> None:
     if hook is None:
         return
 
-    def done(_result: Any, error: BaseException | None) -> None:
+    def done(_result: object, error: BaseException | None) -> None:
         if error is not None:
             worker.core.upstairs.fail(worker, f"{name}()", error, answer=False)
 
@@ -74,7 +76,7 @@ def _time_out(worker: Worker) -> None:
         flush_automatic(worker)
 
 
-def gate_changed(gates: Any) -> None:
+def gate_changed(gates: Iterable[Gate]) -> None:
     """A11: sources rest while the state is inactive; the others look when they fire."""
     for gate in gates:
         for worker in gate.workers:
@@ -157,7 +159,7 @@ def _forget(worker: Worker) -> None:
     worker.defer_none()
 
 
-def _strip(edge: Any, *, also_taking: bool) -> None:
+def _strip(edge: AnyEdge, *, also_taking: bool) -> None:
     """Set the modifiers of what lies on an edge to 0 (A14): those of +1, also those of -1."""
 
     def stripped(token: Token[Any]) -> Token[Any]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Coroutine
 from types import CoroutineType
 from typing import Any
 
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import builtin_slots
-from hfg.engine.rules.agenda import freed, idle_again
+from hfg.engine.rules.agenda import idle_again
 from hfg.engine.rules.modifiers import derive_scopes, lose, receive, touch
-from hfg.engine.rules.releasing import release
+from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import flush_automatic
-from hfg.ports.edges import EventEdge, SyncEdge
-from hfg.trace import CallEnded, CallStarted, ParameterSet, TokenTaken
+from hfg.ports.edges import AnyEdge, SyncEdge
+from hfg.token import Token
+from hfg.trace import CallEnded, CallOutcome, CallStarted, ParameterSet, TokenTaken
 
 __all__ = ["await_call", "call", "finish_call", "refuse_coroutine", "set_parameter"]
 
@@ -29,23 +31,30 @@ def call(worker: Worker) -> None:
         core.trace(CallStarted(now, worker.path, worker.call_number, name, edge.label))
         core.trace(TokenTaken(now, edge.label, token))
     if token.activity:
-        if worker.scopes:
-            touch(core, worker.scopes)
-        if worker.scope is None:
-            receive(worker, (token.activity,))
-        elif token.activity > 0:  # a subgraph has no activity but that of its nodes (G2)
-            lose(edge)
-    if type(edge) is EventEdge:
-        freed(edge)
-    elif not edge.sequential:
-        release((edge,))
+        _receive(worker, edge, token.activity)
+    make_room(edge)
     if edge.target_kind == "parameter":
         set_parameter(worker, name, token.value)
         finish_call(worker, "done")
-        return
-    if edge.while_active and not worker.active:  # T4: it was about to be active, or it was when the token came
+    elif edge.while_active and not worker.active:  # T4: it was about to be active, or it was when the token came
         finish_call(worker, "done")
-        return
+    else:
+        _run_handler(worker, name, token)
+
+
+def _receive(worker: Worker, edge: AnyEdge, modifier: int) -> None:
+    """A6: what a call has taken acts, and by that on the subgraphs around."""
+    if worker.scopes:
+        touch(worker.core, worker.scopes)
+    if worker.scope is None:
+        receive(worker, (modifier,))
+    elif modifier > 0:  # a subgraph has no activity but that of its nodes (G2)
+        lose(edge)
+
+
+def _run_handler(worker: Worker, name: str, token: Token[Any]) -> None:
+    """Run the handler of a slot, or do what every node has one for."""
+    core = worker.core
     handler = worker.handlers.get(name)
     if handler is None:
         builtin_slots.run(worker, name, token, lambda: finish_call(worker, "done"))
@@ -54,7 +63,7 @@ def call(worker: Worker) -> None:
     derive_scopes(core)
     ticket = worker.ticket
 
-    def done(result: Any, error: BaseException | None) -> None:
+    def done(result: object, error: BaseException | None) -> None:
         if worker.ticket != ticket:
             return
         if type(result) is CoroutineType:
@@ -70,10 +79,10 @@ def call(worker: Worker) -> None:
     core.code.execute(worker, handler, (token,), done)
 
 
-def await_call(worker: Worker, name: str, coroutine: Any) -> None:
-    """A handler of a short step turned out to wait."""
+def await_call(worker: Worker, name: str, coroutine: Coroutine[Any, Any, Any]) -> None:
+    """A handler that was called by a fast path turned out to wait."""
 
-    def done(_result: Any, error: BaseException | None) -> None:
+    def done(_result: object, error: BaseException | None) -> None:
         if error is None:
             finish_call(worker, "done")
         else:
@@ -82,7 +91,7 @@ def await_call(worker: Worker, name: str, coroutine: Any) -> None:
     worker.core.code.drive(worker, coroutine, done)
 
 
-def refuse_coroutine(worker: Worker, coroutine: Any) -> TypeError:
+def refuse_coroutine(worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> TypeError:
     """Close what came from a thread, where nothing can await it, and say what to do."""
     coroutine.close()
     return TypeError(
@@ -91,7 +100,7 @@ def refuse_coroutine(worker: Worker, coroutine: Any) -> TypeError:
     )
 
 
-def finish_call(worker: Worker, outcome: Any) -> None:
+def finish_call(worker: Worker, outcome: CallOutcome) -> None:
     """The automatic events follow (A9), then the call is over: a sequential O->S token is processed (F6)."""
     core = worker.core
     derive_scopes(core)
@@ -105,7 +114,7 @@ def finish_call(worker: Worker, outcome: Any) -> None:
     idle_again(worker)
 
 
-def set_parameter(worker: Worker, name: str, value: Any) -> None:
+def set_parameter(worker: Worker, name: str, value: object) -> None:
     """Give a parameter a value that came by a token; one out of its limits is an error of the node (X1)."""
     try:
         worker.node._set_parameter(name, value)

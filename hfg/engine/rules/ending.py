@@ -59,7 +59,7 @@ def drain_left(edges: Sequence[Any]) -> None:
     All of it before any producer hears of that: one whose outputs are free by it may say END at once, and END is behind
     what lies here already (T4, P5).
     """
-    joined = [edge for edge in edges if not (type(edge) is EventEdge and edge.target_kind == "parameter")]
+    joined = [edge for edge in edges if edge.joins()]
     drained = [edge for edge in joined if edge.untaken]
     for edge in drained:
         worker: Worker = edge.target
@@ -76,7 +76,7 @@ def drain_left(edges: Sequence[Any]) -> None:
     release([edge for edge in joined if type(edge) is not EventEdge and edge.held], drained=drained)
 
 
-def _ended(worker: Worker, result: Any, error: BaseException | None) -> None:
+def _ended(worker: Worker, result: object, error: BaseException | None) -> None:
     core = worker.core
     worker.be_busy("firing")
     if error is None and result is not None:

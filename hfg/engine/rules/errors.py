@@ -5,7 +5,7 @@ Stands on `sending`; the firing and calling modules bring failures here.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 from hfg.engine.model.worker import BACKOFF, Worker
 from hfg.engine.rules import calls, firing, lifecycle
@@ -60,7 +60,7 @@ def _policy(worker: Worker, problem: NodeError) -> str:
     return worker.options.on_error  # type: ignore[no-any-return]
 
 
-def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Any = None) -> None:
+def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Callable[[], None] | None = None) -> None:
     """X1: the node's policy decides."""
     core = worker.core
     policy = _policy(worker, problem)

@@ -11,19 +11,18 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
-from hfg.activity.rules import asked_for
 from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, SAME_MOMENT_S, UNREADY, Worker
-from hfg.engine.rules.agenda import consider, freed, idle_again
+from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
 from hfg.engine.rules.ending import end, end_itself, ends_itself
 from hfg.engine.rules.modifiers import automatic, derive_scopes, receive, touch
-from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import flush_automatic, put_outputs, put_value
+from hfg.engine.rules.releasing import make_room, release
+from hfg.engine.rules.sending import flush_automatic, put_outputs, put_value, unwrapped
 from hfg.engine.rules.wiring import rewire
 from hfg.errors import EndOfStream, UsageError
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import AnyEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
-from hfg.trace import FiringEnded, FiringStarted, TokenTaken
+from hfg.trace import FiringEnded, FiringKind, FiringOutcome, FiringStarted, TokenTaken
 from hfg.types import accepts, describe
 
 __all__ = ["complete_firing", "finish_firing", "fire", "merge", "step", "take", "when_done", "write"]
@@ -56,7 +55,7 @@ def _ask_ready(worker: Worker) -> None:
     assert hook is not None
     worker.be_busy("asking")
 
-    def answered(ready: Any, error: BaseException | None) -> None:
+    def answered(ready: object, error: BaseException | None) -> None:
         worker.rest()
         if isinstance(error, EndOfStream) and worker.is_source and worker.placed:
             worker.begin_firing()
@@ -99,13 +98,7 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         core.trace(FiringStarted(now, worker.path, worker.firings, kind))
         for edge, token in zip(edges, tokens, strict=True):
             core.trace(TokenTaken(now, edge.label, token))
-    for edge in edges:
-        if type(edge) is EventEdge:
-            freed(edge)
-            if not edge.live and not edge.queue:
-                rewire(worker)
-        elif not edge.sequential:
-            release((edge,))
+    _free_places(worker, edges)
     if modifiers:
         _receive(worker, modifiers)
     _set_parameters(worker, edges, tokens)
@@ -117,12 +110,7 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         put_outputs(worker, None)
         finish_firing(worker, "silent")
     else:
-        options = worker.options
-        if options.max_rate_hz:
-            worker.note_start(options.max_rate_hz)
-        worker.note_gated_start(now)
-        if worker.paced:
-            worker.unplace()  # what an input that has ended gave a place to is held by the rate from now on
+        _note_start(worker, now)
         _place_next(worker)
         _run_process(worker, edges, tokens)
 
@@ -160,6 +148,23 @@ def _fire_plainly(worker: Worker) -> None:
         _run_process(worker, worker.live_inputs, tokens)
 
 
+def _free_places(worker: Worker, edges: Sequence[Any]) -> None:
+    """What has been taken gives room on edges where that is enough (F5 pipelined, F6)."""
+    for edge in edges:
+        make_room(edge)
+        if not edge.live and not edge.untaken:  # the last that a source sent that is disabled by now (F10)
+            rewire(worker)
+
+
+def _note_start(worker: Worker, now: float) -> None:
+    """The function is about to run: that counts for a rate (F11) and for a gate that throttles (A11)."""
+    if worker.options.max_rate_hz:
+        worker.note_start(worker.options.max_rate_hz)
+    worker.note_gated_start(now)
+    if worker.paced:
+        worker.unplace()  # what an input that has ended gave a place to is held by the rate from now on
+
+
 def _receive(worker: Worker, modifiers: Sequence[int]) -> None:
     """A6: what a firing has taken acts, and by that on the subgraphs around."""
     if worker.scopes:
@@ -174,12 +179,12 @@ def _place_next(worker: Worker) -> None:
         consider(worker)
 
 
-def take(edge: Any) -> Token[Any]:
+def take(edge: AnyEdge) -> Token[Any]:
     """Remove the oldest token (rule F3); its place is freed by the caller once the firing is on record."""
-    token: Token[Any] = edge.take()
+    token = edge.take()
     if not edge.untaken:
         edge.target.inputs.expect()
-    elif type(edge.queue[0].value) is Marker:
+    elif type(edge.queue[0].value) is Marker:  # type: ignore[union-attr]  # of two tokens one is behind
         edge.target.mark_special()
     return token
 
@@ -190,31 +195,36 @@ def _newest_stamp(tokens: Sequence[Token[Any]], now: float) -> float:
     return max(values or [token.stamp for token in tokens], default=now)
 
 
-def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> Any:
-    """F4: "end", "silent" or "process"; a closed gate makes it silent (A11)."""
-    end = silent = has_value = has_mandatory = False
+def _kind(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> FiringKind:
+    """F4: what becomes of a firing; a closed gate makes it silent (A11)."""
     for edge, token in zip(edges, tokens, strict=True):
-        value = token.value
-        edge.end(value is END)
-        if value is END:
-            end = end or edge.mandatory
-        elif value is NO_MESSAGE:
-            silent = silent or edge.mandatory
-        else:
-            has_value = True
-        has_mandatory = has_mandatory or edge.mandatory
+        edge.end(token.value is END)
     if any(edge.ended for edge in worker.in_edges):
-        if end or _all_ended(worker, edges):
+        if any(edge.ended and edge.mandatory for edge in edges) or _all_ended(worker, edges):
             return "end"
         if any(edge.ended for edge in edges):
             rewire(worker)
-    if silent or (edges and not has_mandatory and not has_value):
+    if _lacks_values(edges, tokens) or (worker.gates_over and _is_held_by_gate(worker)):
         return "silent"
-    if not worker.is_source:
-        for gate in worker.gates_over:
-            if not gate.state.active and not _idle_turn(worker, gate.idle_rate_hz):
-                return "silent"
     return "process"
+
+
+def _lacks_values(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> bool:
+    """F4(2): a mandatory input holds NO_MESSAGE, or there is none and no input holds a value."""
+    absent = bool(edges)
+    for edge, token in zip(edges, tokens, strict=True):
+        if edge.mandatory and token.value is NO_MESSAGE:
+            return True
+        if edge.mandatory or type(token.value) is not Marker:
+            absent = False
+    return absent
+
+
+def _is_held_by_gate(worker: Worker) -> bool:
+    """A11: a gate over it is closed, and no throttled firing is due; sources rest instead."""
+    return not worker.is_source and any(
+        not gate.state.active and not _idle_turn(worker, gate.idle_rate_hz) for gate in worker.gates_over
+    )
 
 
 def _idle_turn(worker: Worker, idle_rate_hz: float | None) -> bool:
@@ -229,11 +239,7 @@ def _all_ended(worker: Worker, taking_part: Sequence[Any]) -> bool:
       worker: whose inputs.
       taking_part: the edges of this firing; also one whose source was disabled and that still delivers (F10).
     """
-    live = [
-        edge
-        for edge in worker.in_edges
-        if edge in taking_part or (edge.live and not (type(edge) is EventEdge and edge.target_kind == "parameter"))
-    ]
+    live = [edge for edge in worker.in_edges if edge in taking_part or (edge.live and edge.joins())]
     counted = [edge for edge in live if not getattr(edge, "initial", ())]
     return bool(counted) and all(edge.ended for edge in counted)
 
@@ -271,7 +277,7 @@ def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[An
     worker.core.code.execute(worker, call, arguments, when_done(worker))
 
 
-def _open(worker: Worker, step: Callable[[Any], Any]) -> Any:
+def _open(worker: Worker, step: Callable[[Any], object]) -> object:
     """Begin a source that is a generator, or a function that gives back an iterator, and take its first value."""
     iterator = worker.process()  # type: ignore[misc]  # a source has one
     method = "__next__" if step is next else "__anext__"
@@ -290,7 +296,7 @@ def when_done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
     """What follows when the process function is over."""
     ticket = worker.ticket
 
-    def done(result: Any, error: BaseException | None) -> None:
+    def done(result: object, error: BaseException | None) -> None:
         if worker.ticket != ticket:
             return  # X2: it came too late, its firing was given up
         if error is None:
@@ -303,7 +309,7 @@ def when_done(worker: Worker) -> Callable[[Any, BaseException | None], None]:
     return done
 
 
-def complete_firing(worker: Worker, result: Any) -> None:
+def complete_firing(worker: Worker, result: object) -> None:
     """The process function ran to its end: its outputs leave together (F3)."""
     if type(result) is CoroutineType and not worker.group.threaded:
         # a plain function has called an async one, or a generator has yielded a call of one
@@ -325,7 +331,7 @@ def complete_firing(worker: Worker, result: Any) -> None:
     finish_firing(worker, "done")
 
 
-def merge(worker: Worker, result: Any) -> list[Any] | None:
+def merge(worker: Worker, result: object) -> list[Any] | None:
     """Join what was returned with what was sent; both for one output is writing twice (F3)."""
     written = worker.written
     node_type = worker.type
@@ -341,7 +347,7 @@ def merge(worker: Worker, result: Any) -> list[Any] | None:
                     f'output "{worker.path}.{worker.out_names[position]}" was written twice in one '
                     f"firing: return or send, once"
                 )
-            written[position] = _entry(value)
+            written[position] = unwrapped(value)
     if worker.core.debug and written is not None:
         for position, name in enumerate(node_type.outputs):
             entry = written[position]
@@ -365,13 +371,7 @@ def _add_parameters(worker: Worker, written: list[Any] | None) -> list[Any]:
     return written
 
 
-def _entry(value: Any) -> tuple[Any, int | None, float | None]:
-    if type(value) is Token:
-        return (value.value, asked_for(None, value.activity), value.stamp)
-    return (value, None, None)
-
-
-def write(worker: Worker, position: int, value: Any, activity: int | None, stamp: float | None) -> None:
+def write(worker: Worker, position: int, value: object, activity: int | None, stamp: float | None) -> None:
     """A node's code writes to an output: it leaves when the firing is over (F3).
 
     Raises:
@@ -389,14 +389,10 @@ def write(worker: Worker, position: int, value: Any, activity: int | None, stamp
         raise UsageError(
             f'output "{path}" was written twice in one firing: it takes one token, merge the values or use an event'
         )
-    if type(value) is Token:
-        activity = asked_for(activity, value.activity)
-        stamp = value.stamp if stamp is None else stamp
-        value = value.value
-    worker.write(position, (value, activity, stamp))
+    worker.write(position, unwrapped(value, activity, stamp))
 
 
-def finish_firing(worker: Worker, outcome: Any) -> None:
+def finish_firing(worker: Worker, outcome: FiringOutcome) -> None:
     """The automatic events follow (A9), then the firing is over and releases what it took (F5)."""
     core = worker.core
     if worker.limit_timer is not None:

@@ -6,7 +6,7 @@ Each setup is followed by a teardown before the next one, whatever happens to a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, ENDED, REMOVED, TORN_DOWN, Worker
@@ -17,7 +17,7 @@ from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import send_end, telling_behind
 from hfg.engine.rules.sources import judge_sources
 from hfg.errors import NodeError
-from hfg.ports.edges import BufferEdge, EventEdge
+from hfg.ports.edges import BufferEdge, Edge, EventEdge
 from hfg.trace import NodeEnabled
 
 __all__ = [
@@ -65,7 +65,7 @@ def _run_hook(worker: Worker, name: str, then: Then) -> None:
         then(None)
         return
 
-    def done(_result: Any, error: BaseException | None) -> None:
+    def done(_result: object, error: BaseException | None) -> None:
         if error is None:
             then(None)
             return
@@ -102,7 +102,7 @@ def tear_down(worker: Worker, then: Then) -> None:
     generator = worker.generator
     worker.keep_generator(None)
 
-    def closed(_result: Any, error: BaseException | None) -> None:
+    def closed(_result: object, error: BaseException | None) -> None:
         if error is not None:
             problem = NodeError(worker.path, "closing its generator", error)
             problem.__cause__ = error
@@ -153,24 +153,27 @@ def _settle_disabled(workers: Sequence[Worker]) -> None:
         wiring.refresh(worker)
     with telling_behind(workers[0].core):
         for worker in workers:
-            incoming = [
-                one for one in worker.edges_in() if not (one.port_name == "enable" and one.target_kind == "slot")
-            ]
-            outgoing = [edge for edges in worker.wired_out for edge in edges]
-            for edge in (*incoming, *outgoing):
-                discard(edge, "disabled")
-            # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
-            worker.release_early()
-            release([edge for edge in incoming if type(edge) is not EventEdge])
-            for edge in (edge for edge in outgoing if edge in untaken):
-                working = type(edge) is BufferEdge and edge.working
-                release((edge,))
-                if working:
-                    edge.go_on_working(True)
+            _empty(worker, untaken)
         for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
             if worker.pending_end and worker.busy in AMID_NOTHING:
                 send_end(worker)
     judge_sources(workers[0].core)
+
+
+def _empty(worker: Worker, untaken: Collection[Edge]) -> None:
+    """Discard what lies on the edges of a disabled node; what lay there untaken holds its producers no more."""
+    incoming = [one for one in worker.edges_in() if not (one.port_name == "enable" and one.target_kind == "slot")]
+    outgoing = [edge for edges in worker.wired_out for edge in edges]
+    for edge in (*incoming, *outgoing):
+        discard(edge, "disabled")
+    # a firing under way is finished, but producers do not wait for it; what consumers have taken they finish
+    worker.release_early()
+    release([edge for edge in incoming if type(edge) is not EventEdge])
+    for edge in (edge for edge in outgoing if edge in untaken):
+        working = type(edge) is BufferEdge and edge.working
+        release((edge,))
+        if working:
+            edge.go_on_working(True)
 
 
 def discard_initial(edges: Iterable[Any]) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from hfg.engine.model.worker import Worker
-from hfg.ports.edges import SyncEdge
+from hfg.ports.edges import Edge, SyncEdge
 
 __all__ = ["Listeners", "find_listeners", "listens", "may_listen"]
 
@@ -110,5 +110,5 @@ class Listeners:
                 target.listened = [one for one in target.listened if one[0] is not self] or None
 
 
-def _index(edge: Any) -> float:
+def _index(edge: Edge) -> float:
     return float(edge.index)

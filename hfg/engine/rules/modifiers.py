@@ -14,9 +14,9 @@ from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import REMOVED, Worker
 from hfg.engine.rules.agenda import freed
 from hfg.engine.rules.listening import may_listen
-from hfg.ports.edges import Edge, EventEdge
+from hfg.ports.edges import AnyEdge, Edge, EventEdge
 from hfg.token import Token
-from hfg.trace import ActivityChanged, ActivityLost, ErrorRaised, TokenDropped
+from hfg.trace import ActivityCause, ActivityChanged, ActivityLost, DropReason, ErrorRaised, TokenDropped
 
 __all__ = [
     "automatic",
@@ -40,7 +40,7 @@ def receive(worker: Worker, modifiers: Sequence[int]) -> None:
         set_active(worker, active, "token")
 
 
-def set_active(worker: Worker, active: bool, cause: Any) -> None:
+def set_active(worker: Worker, active: bool, cause: ActivityCause) -> None:
     """A(v) := active, and everything that follows a change."""
     if worker.active == active:
         return
@@ -75,13 +75,13 @@ def derive_scopes(core: Core) -> None:
         core.upstairs.scopes_changed(core)
 
 
-def automatic(worker: Worker, name: str, value: Any = None) -> None:
+def automatic(worker: Worker, name: str, value: object = None) -> None:
     """An automatic event has arisen; it leaves after the firing or call under way, or at the next flush."""
     if name in worker.events:
         worker.expect_event(name, value)
 
 
-def discard(edge: Any, reason: Any) -> None:
+def discard(edge: AnyEdge, reason: DropReason) -> None:
     """Take everything from an edge, counted and with its activity given back (F10, A8)."""
     tokens = edge.clear()
     target: Worker = edge.target
@@ -89,7 +89,7 @@ def discard(edge: Any, reason: Any) -> None:
         return
     for token in tokens:
         drop(edge, token, reason)
-    if edge.target_kind == "slot" or (edge.target_kind == "parameter" and type(edge) is EventEdge):
+    if not edge.joins():
         for _ in tokens:
             target.forget_call(edge)
     elif edge in target.live_inputs:
@@ -99,7 +99,7 @@ def discard(edge: Any, reason: Any) -> None:
         freed(edge)
 
 
-def drop(edge: Edge, token: Token[Any], reason: Any) -> None:
+def drop(edge: Edge, token: Token[Any], reason: DropReason) -> None:
     """Count a token that goes nowhere; its activity goes back (A8)."""
     count_dropped(edge, token, reason)
     if token.activity > 0:
@@ -107,7 +107,7 @@ def drop(edge: Edge, token: Token[Any], reason: Any) -> None:
         touch(edge.target.core, edge.target.scopes)
 
 
-def count_dropped(edge: Edge, token: Token[Any], reason: Any) -> None:
+def count_dropped(edge: Edge, token: Token[Any], reason: DropReason) -> None:
     """Count a token that goes nowhere; what becomes of its activity is the caller's affair."""
     edge.count_dropped()
     core: Core = edge.target.core

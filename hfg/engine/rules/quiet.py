@@ -26,9 +26,9 @@ from hfg.engine.rules.agenda import freed, must_wait
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.modifiers import derive_scopes, receive
 from hfg.engine.rules.sending import enqueue, put_outputs
-from hfg.engine.rules.sources import joins, judge_sources
+from hfg.engine.rules.sources import judge_sources
 from hfg.errors import QueueLimit, Stalled
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.token import END
 from hfg.trace import QueueGrown
 
@@ -167,7 +167,7 @@ def give_up(core: Core) -> bool:
 
 
 def _joined(worker: Worker) -> list[Any]:
-    return [edge for edge in worker.in_edges if joins(edge)]
+    return [edge for edge in worker.in_edges if edge.joins()]
 
 
 def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
@@ -187,20 +187,11 @@ def only_waiting_for_room(core: Core) -> bool:
 def stall(core: Core) -> Stalled | None:
     """R5: say who waits for what, if a source is blocked or tokens lie where they can never be taken."""
     core.settle_barriers()
-    reasons: list[str] = []
-    stuck: dict[int, list[Any]] = {}
+    stuck: dict[Worker, list[AnyEdge]] = {}
     for edge in core.edges:
-        if (
-            edge.untaken
-            and (edge.live or edge.source.blocked & DISABLED)
-            and not edge.target.blocked & (DISABLED | ENDED)
-            and not (edge.target.is_boundary_output and all(token.value is END for token in edge.contents()))
-        ):
-            stuck.setdefault(edge.target.index, [edge.target]).append(edge)
-    for target, *edges in stuck.values():
-        lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
-        who = "" if target.is_boundary_output else f'"{target.path}" '
-        reasons.append(f"{who}{waits_for(target)}, while tokens lie on {lies}")
+        if _lies_for_good(edge):
+            stuck.setdefault(edge.target, []).append(edge)
+    reasons = [_why_stuck(target, edges) for target, edges in stuck.items()]
     reasons.extend(
         f'source "{source.path}" has not ended and {waits_for(source)}'
         for source in core.sources
@@ -214,6 +205,23 @@ def stall(core: Core) -> Stalled | None:
         f"missing, or run with allow_idle=True "
         f"if something outside will"
     )
+
+
+def _lies_for_good(edge: AnyEdge) -> bool:
+    """Whether what lies on it is still to be taken, now that nothing moves any more."""
+    target: Worker = edge.target
+    return (
+        edge.untaken > 0
+        and bool(edge.live or edge.source.blocked & DISABLED)
+        and not target.blocked & (DISABLED | ENDED)
+        and not (target.is_boundary_output and all(token.value is END for token in edge.contents()))
+    )
+
+
+def _why_stuck(target: Worker, edges: list[AnyEdge]) -> str:
+    lies = ", ".join(f'"{edge.label}"' for edge in edges[:3]) + (" ..." if len(edges) > 3 else "")
+    who = "" if target.is_boundary_output else f'"{target.path}" '
+    return f"{who}{waits_for(target)}, while tokens lie on {lies}"
 
 
 _WAITS = (
@@ -233,11 +241,7 @@ def waits_for(worker: Worker) -> str:
         return f'graph output "{worker.port_name}" is not read (`async for value in run.read(...)` would)'
     blocked = worker.blocked
     if blocked & UNWIRED:
-        fed = {edge.port_name for edge in worker.live_inputs}
-        names = [name for name in worker.mandatory_ports if name not in fed]
-        if names:
-            return "waits for its unconnected input " + ", ".join(f'"{name}"' for name in names)
-        return "has no process function" if worker.process is None else "has no live input"
+        return _lacks(worker)
     waits = next((words for bit, words in _WAITS if blocked & bit), None)
     if waits is not None:
         return waits
@@ -248,3 +252,11 @@ def waits_for(worker: Worker) -> str:
         edges = [edge.label for edge in worker.all_out_edges() if getattr(edge, "held", False)]
         return "waits until its token is processed on " + ", ".join(f'"{label}"' for label in edges[:3])
     return "is held back by its rate" if blocked & RATE else "cannot move"
+
+
+def _lacks(worker: Worker) -> str:
+    fed = {edge.port_name for edge in worker.live_inputs}
+    names = [name for name in worker.mandatory_ports if name not in fed]
+    if names:
+        return "waits for its unconnected input " + ", ".join(f'"{name}"' for name in names)
+    return "has no process function" if worker.process is None else "has no live input"

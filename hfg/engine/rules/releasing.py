@@ -11,11 +11,11 @@ from typing import Any
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules.agenda import consider, freed
 from hfg.engine.rules.sending import send_end
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.token import Token
 from hfg.trace import TokenProcessed, TokenTaken
 
-__all__ = ["outputs_free", "release", "take_from_reader"]
+__all__ = ["make_room", "outputs_free", "release", "take_from_reader"]
 
 
 def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
@@ -40,6 +40,14 @@ def release(edges: Sequence[Any], *, drained: Collection[Any] = ()) -> None:
             freed_by_that = outputs_free(producer)
             if freed_by_that:
                 stack.extend(reversed(freed_by_that))
+
+
+def make_room(edge: AnyEdge) -> None:
+    """Its oldest token has been taken: that frees its place, unless the edge is sequential (F5, F6)."""
+    if type(edge) is EventEdge:
+        freed(edge)
+    elif not edge.sequential:
+        release((edge,))
 
 
 def outputs_free(worker: Worker) -> Sequence[Any]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeAlias
 
 from hfg.activity.rules import asked_for, leaving
 from hfg.engine.model.core import Core
@@ -16,11 +16,12 @@ from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full
 from hfg.engine.rules.listening import listens, may_listen
 from hfg.engine.rules.modifiers import count_dropped, derive_scopes, drop, give_back, receive, set_active, touch
 from hfg.errors import QueueOverflow
-from hfg.ports.edges import Edge, EventEdge, SyncEdge
+from hfg.ports.edges import AnyEdge, BufferEdge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, TokenSent
 
 __all__ = [
+    "bring_activity",
     "enqueue",
     "flush_automatic",
     "put",
@@ -30,10 +31,24 @@ __all__ = [
     "tell",
     "telling_behind",
     "trigger",
+    "unwrapped",
 ]
 
 
-Written = Sequence[tuple[Any, int | None, float | None] | None] | None
+Entry: TypeAlias = tuple[Any, int | None, float | None]
+"""What was written to an output, or is to be triggered: the value, an explicit modifier, an explicit stamp."""
+
+Written: TypeAlias = Sequence[Entry | None] | None
+"""Per output what was written in a firing; None, or None in it, is NO_MESSAGE."""
+
+_SILENCE: Entry = (NO_MESSAGE, None, None)
+
+
+def unwrapped(value: object, explicit: int | None = None, stamp: float | None = None) -> Entry:
+    """A received token that is passed on keeps what it carries, unless something else is asked for (A4, T5)."""
+    if type(value) is not Token:
+        return (value, explicit, stamp)
+    return (value.value, asked_for(explicit, value.activity), value.stamp if stamp is None else stamp)
 
 
 def put_outputs(worker: Worker, written: Written) -> None:
@@ -41,7 +56,7 @@ def put_outputs(worker: Worker, written: Written) -> None:
 
     Args:
       worker: whose firing is over.
-      written: per output (value, explicit modifier, explicit stamp); None, or None in it, is NO_MESSAGE.
+      written: per output (value, explicit modifier, explicit stamp).
     """
     core = worker.core
     since = len(core.followers)
@@ -50,18 +65,18 @@ def put_outputs(worker: Worker, written: Written) -> None:
     _sent(core)
 
 
-def put_value(worker: Worker, value: Any) -> None:
+def put_value(worker: Worker, value: object) -> None:
     """The same for a value without modifier and stamp of its own on the one output of a worker (`Shape.single`)."""
     shape, core = worker.shape, worker.core
+    if value is None:
+        value = NO_MESSAGE
     if worker.listeners or (shape.gives and (worker.active or worker.right)):
-        put_outputs(worker, [(value, None, None)] if value is not None else None)
+        put_outputs(worker, [(value, None, None)])
         return
     since = len(core.followers)
     stamp = worker.stamp
     if stamp is None:
         stamp = core.now()
-    if value is None:
-        value = NO_MESSAGE
     for edge in shape.outgoing:
         put(edge, value, 0, stamp)
     if worker.outputs.missing and (worker.placed or worker.rate_timer is not None):
@@ -73,37 +88,34 @@ def put_value(worker: Worker, value: Any) -> None:
 
 
 def _put_outputs(worker: Worker, written: Written) -> None:
-    may_carry = worker.active or worker.right
-    stamp = worker.stamp
-    if stamp is None:
-        stamp = worker.core.now()
-    for_slots: list[tuple[Edge, Any, int, float]] = []
-    for_inputs: list[tuple[Edge, Any, int, float]] = []
     carried = False
-    for position, edges in enumerate(worker.out_edges):
-        if not edges:
-            continue
-        entry = written[position] if written is not None else None
-        if entry is None:
-            value, explicit, own_stamp = NO_MESSAGE, None, stamp
-        else:
-            value, explicit, given = entry
-            own_stamp = stamp if given is None else given
-        listeners = worker.listeners[position] if worker.listeners else None
-        if listeners is not None:
-            edges = listeners.who_hear()
-        for edge in edges:
-            modifier = leaving(may_carry, edge.active, explicit, value is NO_MESSAGE)
-            carried = carried or modifier == 1
-            (for_slots if edge.target_kind == "slot" else for_inputs).append((edge, value, modifier, own_stamp))
-    for edge, value, modifier, own_stamp in for_slots:
-        put(edge, value, modifier, own_stamp)
-    for edge, value, modifier, own_stamp in for_inputs:
-        put(edge, value, modifier, own_stamp)
+    for edge, value, modifier, stamp in _tokens(worker, written):
+        carried = carried or modifier == 1
+        put(edge, value, modifier, stamp)
     if worker.outputs.missing and (worker.placed or worker.rate_timer is not None):
         worker.unplace()
     if carried:
         _activity_left(worker)
+
+
+def _tokens(worker: Worker, written: Written) -> list[tuple[SyncEdge | BufferEdge, Any, int, float]]:
+    """What is to be put on which edge, those into slots first (F9); by A3 and A4 each has its modifier."""
+    may_carry = worker.active or worker.right
+    present = worker.stamp
+    if present is None:
+        present = worker.core.now()
+    for_slots: list[tuple[SyncEdge | BufferEdge, Any, int, float]] = []
+    for_inputs: list[tuple[SyncEdge | BufferEdge, Any, int, float]] = []
+    for position, edges in enumerate(worker.out_edges):
+        if not edges:
+            continue
+        value, explicit, stamp = (written[position] if written is not None else None) or _SILENCE
+        listeners = worker.listeners[position] if worker.listeners else None
+        for edge in edges if listeners is None else listeners.who_hear():
+            modifier = leaving(may_carry, edge.active, explicit, value is NO_MESSAGE)
+            tokens = for_slots if edge.target_kind == "slot" else for_inputs
+            tokens.append((edge, value, modifier, present if stamp is None else stamp))
+    return for_slots + for_inputs
 
 
 def _activity_left(worker: Worker) -> None:
@@ -122,47 +134,55 @@ def _activity_left(worker: Worker) -> None:
         set_active(worker, False, "sent")
 
 
-def put(edge: Any, value: Any, modifier: int, stamp: float) -> None:
+def put(edge: SyncEdge | BufferEdge, value: object, modifier: int, stamp: float) -> None:
     """Put one token on a synchronous edge."""
     token = Token(value, modifier, stamp, edge.number())
     target: Worker = edge.target
     core = target.core
+    if core.trace is not None or edge.tap is not None:
+        _show(edge, token)
+    slot = edge.target_kind == "slot"
+    if _is_unheard(edge, token) if slot else target.blocked & ENDED:
+        _drain(edge, token)
+        return
+    if modifier > 0:
+        bring_activity(target)
+    if edge.put(token):
+        edge.waits.outputs.expect()
+    elif core.trace is not None:
+        core.trace(TokenProcessed(core.now(), edge.label))
+    if slot:
+        add_call(target, edge)
+        return
+    if type(value) is Marker:
+        target.mark_special()
+    if type(edge) is SyncEdge or len(edge.queue) == 1:  # type: ignore[union-attr]
+        arrived(edge)
+
+
+def _show(edge: AnyEdge, token: Token[Any]) -> None:
+    """The token is sent: whoever looks sees it (R7)."""
+    core: Core = edge.target.core
     if core.trace is not None:
         core.trace(TokenSent(core.now(), edge.label, token))
     if edge.tap is not None:
         edge.tap(token)
-    if edge.target_kind == "slot":
-        if type(value) is Marker or (edge.while_active and modifier <= 0 and not listens(target)):
-            _drain(edge, token)  # T4: processed at once, the handler is not called
-            return
-        if modifier > 0 and target.listened is not None:
-            may_listen(target)
-        edge.put(token)
-        edge.waits.outputs.expect()
-        add_call(target, edge)
-    elif target.blocked & ENDED:
-        _drain(edge, token)
-        return
-    elif type(edge) is SyncEdge:
-        edge.put(token)
-        edge.waits.outputs.expect()
-        if type(value) is Marker:
-            target.mark_special()
-        arrived(edge)
-    else:
-        if edge.put(token):
-            edge.waits.outputs.expect()
-        elif core.trace is not None:
-            core.trace(TokenProcessed(core.now(), edge.label))
-        if type(value) is Marker:
-            target.mark_special()
-        if len(edge.queue) == 1:
-            arrived(edge)
-    if modifier > 0 and target.scopes:
-        touch(core, target.scopes)
 
 
-def _drain(edge: Edge, token: Token[Any]) -> None:
+def _is_unheard(edge: AnyEdge, token: Token[Any]) -> bool:
+    """T4: a slot is not called by a marker, nor while it does not listen: the token is processed at once."""
+    return type(token.value) is Marker or (edge.while_active and token.activity <= 0 and not listens(edge.target))
+
+
+def bring_activity(target: Worker) -> None:
+    """A token with +1 lies before a node: it is about to listen (T4), and subgraphs around it are to look (G2)."""
+    if target.listened is not None:
+        may_listen(target)
+    if target.scopes:
+        touch(target.core, target.scopes)
+
+
+def _drain(edge: AnyEdge, token: Token[Any]) -> None:
     """T4, F12: the token is processed at once, without a firing or call; its modifier acts behind the sending."""
     target: Worker = edge.target
     core = target.core
@@ -221,7 +241,7 @@ def send_end(worker: Worker) -> None:
 
 def trigger(
     event: RunningEvent,
-    value: Any = None,
+    value: object = None,
     explicit: int | None = None,
     stamp: float | None = None,
     *,
@@ -236,41 +256,13 @@ def trigger(
     core = worker.core
     if core.over:
         return  # code that was under way at the end speaks to nobody
-    if type(value) is Token:
-        explicit = asked_for(explicit, value.activity)
-        stamp = value.stamp if stamp is None else stamp
-        value = value.value
+    value, explicit, stamp = unwrapped(value, explicit, stamp)
     if stamp is None:
         stamp = core.now() if worker.stamp is None else worker.stamp
-    edges = event.edges
-    for edge in edges:
-        if edge.overflow == "error" and edge.live and edge.overflows():
-            raise QueueOverflow(
-                f'queue of "{edge.label}" is full: {edge.capacity} signals wait, policy "error" allows no '
-                f"more; nothing was sent: raise "
-                f"capacity= or choose another overflow="
-            )
-    may_carry = worker.active or (extend_right and worker.right)
-    carried = False
-    loudest = 0 if explicit is None else explicit
-    sends: list[tuple[EventEdge, int]] = []
-    for edge in edges:
-        if edge.live:
-            modifier = leaving(may_carry, edge.active, explicit, False)
-            if modifier == 1:
-                carried = True
-                loudest = 1
-            sends.append((edge, modifier))
-    port = event.port
-    if core.trace is not None:
-        core.trace(EventTriggered(core.now(), event.label, Token(value, loudest, stamp)))
-    if port is not None and port._observers:
-        core.heard.append((port, Token(value, loudest, stamp)))
-    if event.tap:
-        token = Token(value, loudest, stamp)
-        for look in event.tap:
-            look(token)
-    for edge, modifier in sends:
+    signals = _signals(event, explicit, may_carry=worker.active or (extend_right and worker.right))
+    carried = any([modifier == 1 for _, modifier in signals])  # noqa: C419 - few, and a list is faster
+    _show_signal(event, Token(value, 1 if carried else explicit or 0, stamp))
+    for edge, modifier in signals:
         if edge.pipeline is not None:
             _into_operators(edge, Token(value, modifier, stamp))
         else:
@@ -282,6 +274,32 @@ def trigger(
         core.host.kick()
     if core.heard:
         _tell_subscribers(core)
+
+
+def _signals(event: RunningEvent, explicit: int | None, *, may_carry: bool) -> list[tuple[EventEdge, int]]:
+    """On which edges a signal leaves, and with which modifier (A3, A4); none of it if one of them refuses it (P5)."""
+    signals: list[tuple[EventEdge, int]] = []
+    for edge in event.edges:
+        if not edge.live:
+            continue
+        if edge.overflow == "error" and edge.overflows():
+            raise QueueOverflow(
+                f'queue of "{edge.label}" is full: {edge.capacity} signals wait, policy "error" allows no '
+                f"more; nothing was sent: raise capacity= or choose another overflow="
+            )
+        signals.append((edge, leaving(may_carry, edge.active, explicit, False)))
+    return signals
+
+
+def _show_signal(event: RunningEvent, signal: Token[Any]) -> None:
+    """Who looks at the event sees the signal; subscribers hear of it when it is on its edges (F3)."""
+    core, port = event.worker.core, event.port
+    if core.trace is not None:
+        core.trace(EventTriggered(core.now(), event.label, signal))
+    if port is not None and port._observers:
+        core.heard.append((port, signal))
+    for look in event.tap or ():
+        look(signal)
 
 
 def _tell_subscribers(core: Core) -> None:
@@ -306,56 +324,51 @@ def _into_operators(edge: EventEdge, token: Token[Any]) -> None:
         edge.target.core.upstairs.operator_failed(edge, error)
 
 
-def enqueue(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
+def enqueue(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:
     """One token on one event edge, a sending of its own."""
     _append(edge, value, modifier, stamp)
     _sent(edge.target.core)
 
 
-def _append(edge: EventEdge, value: Any, modifier: int, stamp: float) -> None:
+def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:
     """Put one token into the queue of an event edge, by its policy (P5, F8)."""
     token = Token(value, modifier, stamp, edge.number())
     target: Worker = edge.target
     core = target.core
-    if core.trace is not None:
-        core.trace(TokenSent(core.now(), edge.label, token))
-    if edge.tap is not None:
-        edge.tap(token)
+    if core.trace is not None or edge.tap is not None:
+        _show(edge, token)
     if edge.end_sent and value is not END:  # END came first: nobody waits for what comes behind it (F13)
         count_dropped(edge, token, "ended")
         if modifier > 0:
             core.returned.append(edge)
         return
-    into_input = edge.target_kind == "input"
-    if into_input and target.blocked & ENDED:
+    joins = edge.joins()
+    if target.blocked & ENDED if joins else _is_unheard(edge, token):
         _drain(edge, token)
         return
-    if edge.while_active and modifier <= 0 and not listens(target):  # T4
-        _drain(edge, token)
+    if modifier > 0:
+        bring_activity(target)
+    holds_one = bool(edge.queue)
+    if edge.overflows() and not _has_made_room(edge, token):
         return
-    if modifier > 0 and target.listened is not None:
-        may_listen(target)
-    if edge.overflows():
-        if edge.overflow == "drop_newest":
-            drop(edge, token, "overflow")
-            return
-        drop(edge, edge.take(), "overflow")
-        if not into_input:
-            target.forget_call(edge)
-        elif not edge.queue:  # for the input nothing has changed: it still holds a token
-            edge.lay(token)
-            return
     edge.lay(token)
     note_full(edge)
-    if into_input:
-        if type(value) is Marker:
-            target.mark_special()
-        if len(edge.queue) == 1:
-            arrived(edge)
-    else:
+    if not joins:
         add_call(target, edge)
-    if modifier > 0 and target.scopes:
-        touch(core, target.scopes)
+        return
+    if type(value) is Marker:
+        target.mark_special()
+    if not holds_one:
+        arrived(edge)
+
+
+def _has_made_room(edge: EventEdge, token: Token[Any]) -> bool:
+    """P5: one token too many: the oldest goes, or this one does."""
+    oldest = edge.overflow != "drop_newest"
+    drop(edge, edge.take() if oldest else token, "overflow")
+    if oldest and not edge.joins():
+        edge.target.forget_call(edge)
+    return oldest
 
 
 def tell(worker: Worker) -> None:

@@ -7,14 +7,12 @@ changes; never per token. Stands on `agenda`.
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import DISABLED, ENDED, FUTILE, RESTING, Worker
 from hfg.engine.rules.agenda import unblock
-from hfg.ports.edges import EventEdge
 
-__all__ = ["joins", "judge_sources"]
+__all__ = ["judge_sources"]
 
 
 def judge_sources(core: Core) -> None:
@@ -34,7 +32,8 @@ def judge_sources(core: Core) -> None:
 def _works_for_somebody(source: Worker) -> bool:
     """Whether it is left and works for one that has not ended and is no source itself."""
     return not source.blocked & (ENDED | DISABLED | RESTING) and any(
-        not joins(edge) or not (edge.target.blocked & ENDED or edge.target.is_source) for edge in source.all_out_edges()
+        not edge.joins() or not (edge.target.blocked & ENDED or edge.target.is_source)
+        for edge in source.all_out_edges()
     )
 
 
@@ -48,14 +47,9 @@ def _for_nobody(sources: Collection[Worker]) -> set[Worker]:
 
 def _feeds_only(source: Worker, given_up: Collection[Worker]) -> bool:
     edges = list(source.all_out_edges())
-    return bool(edges) and all(joins(edge) and (_is_over(edge.target) or edge.target in given_up) for edge in edges)
+    return bool(edges) and all(edge.joins() and (_is_over(edge.target) or edge.target in given_up) for edge in edges)
 
 
 def _is_over(worker: Worker) -> bool:
     """Whether it has said END, too."""
     return bool(worker.blocked & ENDED) and worker.deferred is None
-
-
-def joins(edge: Any) -> bool:
-    """Whether a firing takes from it; slot calls go on when the node has ended (F12)."""
-    return edge.target_kind == "input" or (edge.target_kind == "parameter" and type(edge) is not EventEdge)

@@ -6,18 +6,16 @@ Called when the plan is made and when something is enabled, disabled, ended or e
 
 from __future__ import annotations
 
-from typing import Any
-
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import DISABLED, UNWIRED, Worker
 from hfg.engine.rules.agenda import consider, note_full
 from hfg.engine.rules.listening import find_listeners
-from hfg.ports.edges import EventEdge
+from hfg.ports.edges import AnyEdge, Edge, EventEdge
 
 __all__ = ["is_live", "refresh", "refresh_via", "rewire"]
 
 
-def is_live(edge: Any) -> bool:
+def is_live(edge: Edge) -> bool:
     """Both ends enabled, or the target is an `enable` slot; and no relay on the way disabled."""
     if edge.source.blocked & DISABLED:
         return False
@@ -58,30 +56,28 @@ def refresh_via(scope: Scope) -> None:
 
 def rewire(worker: Worker) -> None:
     """Derive what a worker waits for and sends on from the liveness of its edges; its step is chosen anew."""
-    live = []
-    for edge in worker.in_edges:
-        if edge.ended and not edge.untaken:
-            continue
-        if type(edge) is EventEdge:
-            if edge.target_kind == "parameter":
-                continue  # takes no part in the join (P8)
-            if edge.live or edge.queue:  # signals sent before the source was disabled are still delivered (F10)
-                live.append(edge)
-        elif edge.live:
-            live.append(edge)
-    worker.rewire(tuple(live))
+    worker.rewire(tuple(edge for edge in worker.in_edges if _is_waited_for(edge)))
     find_listeners(worker)
-    fed = {edge.port_name for edge in live if edge.target_kind == "input"}
-    ended = {edge.port_name for edge in worker.in_edges if edge.ended}
-    wired = worker.process is not None and all(name in fed or name in ended for name in worker.mandatory_ports)
-    if not worker.is_source and not live:
-        wired = False
-    if worker.process is None and not worker.is_boundary_output:
-        wired = False
-    if wired or worker.is_boundary_output:
+    if worker.is_boundary_output or _may_fire(worker):
         worker.allow(UNWIRED)
     else:
         worker.block(UNWIRED)
     worker.changed()
     if worker.core.started:
         consider(worker)
+
+
+def _is_waited_for(edge: AnyEdge) -> bool:
+    """Whether the next firing takes from the edge."""
+    if (edge.ended and not edge.untaken) or not edge.joins():
+        return False
+    return edge.live or (type(edge) is EventEdge and bool(edge.queue))  # what was sent before is delivered (F10)
+
+
+def _may_fire(worker: Worker) -> bool:
+    """F1: whether it is a source or has a live input, and each mandatory input has a live edge, or has had END."""
+    if worker.process is None or not (worker.is_source or worker.live_inputs):
+        return False
+    fed = {edge.port_name for edge in worker.live_inputs if edge.target_kind == "input"}
+    fed |= {edge.port_name for edge in worker.in_edges if edge.ended}
+    return fed.issuperset(worker.mandatory_ports)
