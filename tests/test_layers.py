@@ -66,11 +66,12 @@ WINGS = {
         "hfg.engine.model": 0,
         "hfg.engine.rules": 1,
         "hfg.engine.fusion": 2,
-        "hfg.engine.runtime": 3,
-        "hfg.engine.observing": 4,  # who looks at a run and who changes it know nothing of each other
-        "hfg.engine.editing": 4,
-        "hfg.engine.face": 5,
-        "hfg.engine": 6,
+        "hfg.engine.executing": 3,
+        "hfg.engine.runtime": 4,
+        "hfg.engine.observing": 5,  # who looks at a run and who changes it know nothing of each other
+        "hfg.engine.editing": 5,
+        "hfg.engine.face": 6,
+        "hfg.engine": 7,
     },
 }
 NAMED_FROM_BELOW = "hfg.graph.graph"  # nodes and edges give users their graph, so its name stands in annotations

@@ -9,9 +9,9 @@ from typing import Any
 import anyio
 import pytest
 
+from hfg.engine.executing.carrier import Carrier
+from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import PENDING
-from hfg.engine.runtime.carrier import Carrier
-from hfg.engine.runtime.virtual import VirtualTimeLoop
 
 variable: contextvars.ContextVar[str] = contextvars.ContextVar("variable", default="unset")
 

@@ -75,6 +75,6 @@ def test_where_select_does_not_know_the_descriptor_epoll_waits_itself(monkeypatc
         raise ValueError("filedescriptor out of range in select()")
 
     monkeypatch.setattr(select, "select", refuses)
-    monkeypatch.setattr("hfg.engine.runtime.punctual._MOST_DESCRIPTORS", 0)
+    monkeypatch.setattr("hfg.engine.executing.punctual._MOST_DESCRIPTORS", 0)
     with asyncio.Runner(loop_factory=hfg.PunctualLoop) as runner:
         runner.run(asyncio.sleep(0.001))

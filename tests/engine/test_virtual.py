@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from hfg.engine.runtime.virtual import VirtualTimeLoop
+from hfg.engine.executing.virtual import VirtualTimeLoop
 
 
 @pytest.mark.rule("R6")

@@ -12,8 +12,8 @@ import pytest
 
 import hfg
 from hfg import commands as c
+from hfg.engine.executing.groups import Job, ThreadGroup
 from hfg.engine.runtime import settings
-from hfg.engine.runtime.groups import Job, ThreadGroup
 from hfg.testing import ReferenceReport, reference_run
 from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.plans import GraphPlan

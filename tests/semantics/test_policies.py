@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.engine.executing.groups import LoopGroup
 from hfg.engine.model.policies import EarliestDeadline, FairShare, Priority
-from hfg.engine.runtime.groups import LoopGroup
 from hfg.errors import GraphError, RunError, UsageError
 from hfg.testing import Divergence, recorder, reference_run, replay
 from hfg.testing.invariants import broken, of_graph

@@ -22,13 +22,13 @@ from hfg.engine.editing.plan_diff import PlanDiff, diff
 from hfg.engine.editing.plan_index import PlanIndex, node_place
 from hfg.engine.editing.setting import refuse_without_effect
 from hfg.engine.editing.turns import Turns
+from hfg.engine.executing.code import answer
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
 from hfg.engine.rules import lifecycle, subgraphs
 from hfg.engine.runtime import plan
 from hfg.engine.runtime import ports as engine_ports
 from hfg.engine.runtime.callbacks import Edited
-from hfg.engine.runtime.code import answer
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.lifetime import Lifetime
 from hfg.errors import GraphError, HfgError, NodeError, NotRunning

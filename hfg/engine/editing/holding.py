@@ -9,10 +9,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 
+from hfg.engine.executing.code import answer
 from hfg.engine.model.worker import REMOVED, Worker
 from hfg.engine.rules import lifecycle
 from hfg.engine.rules.sending import flush_automatic
-from hfg.engine.runtime.code import answer
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import NotRunning
 from hfg.trace import EditWaits, StructureChanged

@@ -11,8 +11,8 @@ from collections import deque
 from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 
+from hfg.engine.executing.code import whose_code
 from hfg.engine.model.worker import Worker
-from hfg.engine.runtime.code import whose_code
 from hfg.errors import UsageError
 
 __all__ = ["Turns"]

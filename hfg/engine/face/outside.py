@@ -13,10 +13,10 @@ from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from hfg.activity.rules import asked_for
+from hfg.engine.executing.code import answer
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import enqueue, put_outputs
-from hfg.engine.runtime.code import answer
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.plan import prepare_slot
 from hfg.errors import NotRunning, UsageError

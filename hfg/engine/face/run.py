@@ -13,6 +13,7 @@ from typing import Any, TypeVar, overload
 
 from hfg.engine.editing.pausing import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
+from hfg.engine.executing.code import answer
 from hfg.engine.face import outside
 from hfg.engine.face.composition import Composition
 from hfg.engine.model.worker import UNREADY
@@ -24,7 +25,6 @@ from hfg.engine.observing.taps import Tap
 from hfg.engine.rules.activity import reset_activity
 from hfg.engine.rules.agenda import unblock
 from hfg.engine.runtime import relays
-from hfg.engine.runtime.code import answer
 from hfg.engine.runtime.ports import bind_event, bind_start
 from hfg.errors import HfgError, NotRunning, UsageError
 from hfg.graph import Graph

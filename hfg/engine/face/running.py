@@ -11,14 +11,14 @@ from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any, Literal, Unpack
 
+from hfg.engine.executing.punctual import PunctualLoop
+from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.face import outside
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.observing.report import Report
 from hfg.engine.runtime.interrupt import CtrlC
-from hfg.engine.runtime.punctual import PunctualLoop
 from hfg.engine.runtime.settings import RunOptions, Settings
-from hfg.engine.runtime.virtual import VirtualTimeLoop
 from hfg.errors import CheckFailed, GraphError, HfgError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.checks import check_flat

@@ -1,6 +1,6 @@
 """A group of nodes, of which one runs at a time, and the queue of those that can move (rules R1, R2).
 
-What the deciding modules see of it; how the loop or a thread takes from the queue is in `runtime.groups`.
+What the deciding modules see of it; how the loop or a thread takes from the queue is in `executing.groups`.
 """
 
 from __future__ import annotations

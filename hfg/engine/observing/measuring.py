@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from time import monotonic
 from typing import Any
 
+from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import (
     BACKOFF,
@@ -30,7 +31,6 @@ from hfg.engine.observing.meters import Distribution, Meter
 from hfg.engine.observing.statistics import EdgeStatistics, GroupStatistics, NodeStatistics, Statistics, Times
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
-from hfg.engine.runtime.virtual import VirtualTimeLoop
 
 __all__ = ["Measuring", "doing"]
 

@@ -16,6 +16,9 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from hfg.clock import current_clock
+from hfg.engine.executing.code import CodeRunner, answer
+from hfg.engine.executing.groups import CheckedTurn, Dispatching, LoopGroup, SideGroup, ThreadGroup
+from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
 from hfg.engine.model.policies import make_policy
@@ -23,11 +26,8 @@ from hfg.engine.model.worker import Worker
 from hfg.engine.rules import quiet
 from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime.callbacks import Callbacks
-from hfg.engine.runtime.code import CodeRunner, answer
-from hfg.engine.runtime.groups import CheckedTurn, Dispatching, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.runtime.settings import Settings
 from hfg.engine.runtime.upstairs import Deciders
-from hfg.engine.runtime.virtual import VirtualTimeLoop
 from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph

@@ -12,13 +12,13 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from hfg.engine.executing.code import answer
 from hfg.engine.model.core import Core, Host, Timer
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import errors, firing, quiet
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import put_outputs
 from hfg.engine.runtime import plan
-from hfg.engine.runtime.code import answer
 from hfg.errors import HfgError
 from hfg.graph.flat import FlatGraph
 from hfg.ports.events import EventPort

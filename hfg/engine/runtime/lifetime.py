@@ -14,6 +14,9 @@ from typing import Any
 
 import anyio
 
+from hfg.engine.executing.code import answer
+from hfg.engine.executing.groups import ThreadGroup
+from hfg.engine.executing.watchdog import Watch, watchdog
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import STARTING, Worker
 from hfg.engine.rules import lifecycle, wiring
@@ -23,10 +26,7 @@ from hfg.engine.rules.modifiers import discard
 from hfg.engine.rules.sending import trigger
 from hfg.engine.runtime import ports as engine_ports
 from hfg.engine.runtime import rx
-from hfg.engine.runtime.code import answer
 from hfg.engine.runtime.engine import Engine
-from hfg.engine.runtime.groups import ThreadGroup
-from hfg.engine.runtime.watchdog import Watch, watchdog
 from hfg.errors import HfgError, NodeError, TeardownError
 from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.trace import RunEnded, RunStarted

@@ -16,13 +16,13 @@ from functools import partial
 from types import CoroutineType
 from typing import Any, Protocol
 
+from hfg.engine.executing.carrier import Carrier
+from hfg.engine.executing.groups import Job
+from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import PENDING, Core
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.rules import errors
 from hfg.engine.rules.sending import trigger
-from hfg.engine.runtime.carrier import Carrier
-from hfg.engine.runtime.groups import Job
-from hfg.engine.runtime.virtual import VirtualTimeLoop
 
 __all__ = ["CodeRunner", "answer", "whose_code"]
 

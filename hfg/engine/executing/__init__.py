@@ -1,0 +1,9 @@
+"""Where the code of nodes is executed, and by which clock: the first wing that waits.
+
+code        runs node code: on the loop, by a carrier (async), in the thread of one of the groups
+carrier     the dormant task of an async node           groups      who of a group is next; their threads
+virtual     a loop whose clock jumps                    punctual    a loop whose timers ring in time
+watchdog    a node that blocks the loop
+"""
+
+__all__: list[str] = []
