@@ -518,7 +518,7 @@ class Region:
 
     def is_calling(self, worker: Worker) -> bool:
         """Whether the call of this member is the one under way in a running wave."""
-        return self.running and self.at_work(sys._getframe(1)) is worker
+        return self.running and self.at_work(sys._getframe(1)) is worker  # noqa: SLF001 - of frames nobody else knows
 
     def speaks(self, worker: Worker) -> bool:
         """A member sends by itself, which a plain call does not: whether it is the one whose call runs.

@@ -285,7 +285,7 @@ class ThreadRegion(Region):
     def abandon(self) -> Worker:
         """The wave under way does not come back: whose call it is in; those before it have fired."""
         group: Any = self.head.group
-        frame = self._frame(sys._current_frames().get(group.thread_id()))
+        frame = self._frame(sys._current_frames().get(group.thread_id()))  # noqa: SLF001 - as above: of frames
         k = self._wave.calls.get(frame.f_lineno, 0) if frame is not None else 0
         self._rest()
         if frame is None:

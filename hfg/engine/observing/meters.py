@@ -217,13 +217,14 @@ class Meter:
                 took(monotonic() - began)
                 raise
             if type(result) is CoroutineType and not worker.group.threaded:
-                return self._await(result, began, stamp)
+                return self.awaited(result, began, stamp)
             took(monotonic() - began, None if stamp is None else now() - stamp)
             return result
 
         return measured
 
-    async def _await(self, coroutine: Any, began: float, stamp: float | None) -> Any:
+    async def awaited(self, coroutine: Any, began: float, stamp: float | None) -> Any:
+        """Await code that waits; only its own steps keep the group busy."""
         busy = [0.0]
         try:
             return await _stepped(coroutine, busy)
@@ -289,4 +290,4 @@ class _AsyncDrawn(AsyncIterator[Any]):
     def __anext__(self) -> Coroutine[Any, Any, Any]:
         if self._meter.left <= 0:
             return self._generator.__anext__()  # type: ignore[no-any-return]
-        return self._meter._await(self._generator.__anext__(), monotonic(), None)
+        return self._meter.awaited(self._generator.__anext__(), monotonic(), None)
