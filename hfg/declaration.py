@@ -113,6 +113,10 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
                 EventSpec(spec.name, spec.type),
                 SlotSpec(spec.name, spec.type or object),
             )
+    for hook in HOOKS:
+        found = inspect.getattr_static(cls, hook)
+        if getattr(cls, hook) is not getattr(base, hook) and inspect.isfunction(found):
+            _behind_self(found, hook, where)
     result: Result = "none" if not outputs else "single" if len(outputs) == 1 else "fields"
     kind = NodeType(
         name=snake_case(cls.__name__),

@@ -9,9 +9,10 @@ graphs nor who runs it.
 from __future__ import annotations
 
 import copy
+import difflib
 import logging
 from collections.abc import Callable, MutableMapping
-from typing import Any, ClassVar, Final, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 
 import msgspec
 
@@ -36,7 +37,7 @@ from hfg.ports.views import Ports
 from hfg.token import Token
 from hfg.vectors import Vectors
 
-__all__ = ["Node", "NodeType", "Place"]
+__all__ = ["NoSuchAttribute", "Node", "NodeType", "Place"]
 
 Other = TypeVar("Other")
 
@@ -213,6 +214,21 @@ class Node:
         raise UsageError(
             f'node "{_name(self)}" has no inner side; .inner belongs to the ports of a subgraph: self.port.inner'
         )
+
+    if not TYPE_CHECKING:  # type checkers say of themselves what there is not
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_") or hasattr(type(self), name):
+                return object.__getattribute__(self, name)  # raises what the attribute itself has raised
+            raise NoSuchAttribute(self, name)
+
+        def __call__(self, *values: Any, **named: Any) -> Any:
+            """Refused: a node is no function."""
+            function = f", the function itself is {self._type.qualname}.function" if self._type.is_function else ""
+            raise UsageError(
+                f'"{_name(self)}" is a node, which its graph fires{function}: make one firing of it with '
+                "hfg.testing.fire(node, name=value), or give parameters where it is made"
+            )
 
     def __rshift__(self, other: Other) -> Other:
         """Connect the only port that sends to a target, or to the only free one of a node; gives back `other`."""
@@ -419,6 +435,23 @@ class Node:
             candidates = [port for port in candidates if not is_taken(port)]
         target: Target[Any] = _only(self, candidates, "free input or slot")
         return target
+
+
+class NoSuchAttribute(AttributeError):
+    """A node has neither a port nor anything else of this name; the sentence is made when somebody reads it."""
+
+    def __init__(self, node: Node, name: str) -> None:
+        super().__init__(name)
+        self._node = node
+
+    def __str__(self) -> str:
+        node, name = self._node, str(self.args[0])
+        kind = node._type
+        ports = dict.fromkeys([*kind.vectors, *kind.inputs, *kind.outputs, *kind.events, *kind.slots, *kind.parameters])
+        known = [port for port in ports if port.isidentifier()]
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+        has = f"its ports and parameters are {', '.join(known)}" if known else "it has no ports"
+        return f'node "{_name(node)}" has no "{name}"; ' + (f'did you mean "{near[0]}"? ' if near else "") + has
 
 
 def _only(node: Node, candidates: list[Any], what: str) -> Any:

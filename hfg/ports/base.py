@@ -8,7 +8,7 @@ what they must offer.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Protocol, TypeVar, cast
 
 from hfg.errors import NotRunning, UsageError
 
@@ -52,6 +52,10 @@ class Source(Generic[T_co]):
 
         Gives back `other`, so that chains read from left to right.
         """
+        if isinstance(other, str):
+            raise UsageError(
+                f'>> takes nodes and ports, got the path "{other}"; write graph.connect(source, "{other}")'
+            )
         finder = getattr(other, "_free_target", None)
         target = other if finder is None else finder()
         if not isinstance(target, Target):
@@ -91,6 +95,20 @@ class Port:
 
     def __repr__(self) -> str:
         return f"<{self.kind} {self.path}>"
+
+    if not TYPE_CHECKING:  # type checkers say of themselves what there is not
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_"):
+                raise AttributeError(name)  # asked for by many that can do without
+            if name == "value":
+                what, remedy = (
+                    "a port holds no value",
+                    "look at what passes with run.tap(port), or connect it to a node",
+                )
+            else:
+                what, remedy = "it is an end of edges", "ask for its name, type, node or path"
+            raise AttributeError(f'{self.kind} "{self.path}" has no "{name}": {what}; {remedy}')
 
     def _not_running(self, call: str) -> NotRunning:
         return NotRunning(

@@ -8,8 +8,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable, Coroutine
-from contextlib import asynccontextmanager
-from typing import Any, Literal, Unpack
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, Unpack
 
 from hfg.engine.executing.punctual import PunctualLoop
 from hfg.engine.executing.virtual import VirtualTimeLoop
@@ -67,6 +68,7 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
             'clock="virtual" needs a loop in virtual time: hfg.run(graph, clock="virtual"), or '
             "asyncio.Runner(loop_factory=hfg.VirtualTimeLoop).run(main()) around the whole program"
         )
+    _need_use_of_seed(graph, settings)
     flat = flatten(graph)
     problems = check_flat(flat)
     if any(problem.severity == "error" for problem in problems):
@@ -77,6 +79,16 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
     run = Run(graph, parts)
     level.whole.begin_run(run)
     return run, parts
+
+
+def _need_use_of_seed(graph: Graph, settings: Settings) -> None:
+    """A seed that no policy asks for would be without effect."""
+    policies = [settings.policy] if settings.policy else [group.policy for group in graph.groups.values()]
+    if settings.seed is not None and "random" not in policies:
+        raise UsageError(
+            f'seed={settings.seed} has no effect, for no group of graph "{graph.name}" has the policy "random": write '
+            f'policy="random", seed={settings.seed}, or leave it out'
+        )
 
 
 def _refuse_endless(flat: FlatGraph) -> None:
@@ -186,18 +198,51 @@ def _run_blocking(graph: Graph, clock: Clock, settings: Settings, begin: Callabl
     raise KeyboardInterrupt(ctrl_c.sentence(graph.name))
 
 
-@asynccontextmanager
-async def running(
+class _Block(AbstractAsyncContextManager[Run]):
+    """What `running` gives: a block in async code, and a sentence for whoever forgets that."""
+
+    def __init__(self, block: AbstractAsyncContextManager[Run], name: str) -> None:
+        self._block = block
+        self._name = name
+
+    async def __aenter__(self) -> Run:
+        return await self._block.__aenter__()
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> bool | None:
+        return await self._block.__aexit__(kind, error, traceback)
+
+    if not TYPE_CHECKING:
+
+        def __enter__(self) -> NoReturn:
+            raise UsageError(
+                f'hfg.running(graph) of "{self._name}" is a block of async code: write '
+                "`async with hfg.running(graph) as run:` in an async function, or hfg.run(graph) to run it to its end"
+            )
+
+        __await__ = __enter__
+
+        def __exit__(self, *exc_info: object) -> None:
+            """Never reached; Python looks for it first."""
+
+
+def running(
     graph: Graph,
     *,
     clock: Clock | None = None,
     **options: Unpack[RunOptions],
-) -> AsyncIterator[Run]:
+) -> AbstractAsyncContextManager[Run]:
     """Run a graph as long as the block lasts; the block holds the run open until it calls `wait_finished`.
 
     Leaving the block stops the run and tears it down. A failure of the run cancels what the block waits for and
     comes out here.
     """
+    return _Block(_running(graph, clock, options), getattr(graph, "name", "graph"))
+
+
+@asynccontextmanager
+async def _running(graph: Graph, clock: Clock | None, options: RunOptions) -> AsyncIterator[Run]:
     run, parts = _prepare(graph, clock or "real", _settings(options))
     engine = parts.engine
     guard = _Guard(parts)

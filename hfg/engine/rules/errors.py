@@ -5,6 +5,7 @@ Stands on `sending`; the firing and calling modules bring failures here.
 
 from __future__ import annotations
 
+import dis
 from collections.abc import Callable
 
 from hfg.engine.model.worker import BACKOFF, Worker
@@ -13,6 +14,7 @@ from hfg.engine.rules.modifiers import automatic, report_error
 from hfg.engine.rules.sending import flush_automatic, put_outputs
 from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit, in_words
 from hfg.ports.edges import EventEdge
+from hfg.types import accepts, describe
 
 __all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "operator_failed", "time_out"]
 
@@ -26,9 +28,38 @@ def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
         cause = (
             "EndOfStream was raised, but a node ends in process() or ready() alone: keep it in mind, and raise it there"
         )
+    elif isinstance(error, Exception) and what.startswith("firing"):
+        blame = _wrong_value(worker, error)
+        cause = f"{in_words(error)}; {blame}" if blame else error
     problem = NodeError(worker.path, what, cause)
     problem.__cause__ = error
     return problem
+
+
+def _wrong_value(worker: Worker, error: Exception) -> str:
+    """Say which value the code was given that its input was never declared for: the fault of whoever has sent it.
+
+    The values are looked up where the code failed, so that a firing that does not fail keeps none of them.
+    """
+    code = getattr(getattr(worker.type.origin, "function", type(worker.node).process), "__code__", None)
+    traceback = error.__traceback__
+    while traceback is not None and traceback.tb_frame.f_code is not code:
+        traceback = traceback.tb_next
+    if code is None or traceback is None:
+        return ""
+    written = {step.argval for step in dis.get_instructions(code) if step.opname.startswith("STORE_FAST")}
+    given = traceback.tb_frame.f_locals
+    for edge in worker.in_edges:
+        name = edge.port_name
+        spec = worker.type.inputs.get(name)
+        if spec is None or spec.token or name not in given or name in written or accepts(given[name], spec.type):
+            continue
+        source = edge.label.partition(" -> ")[0]
+        return (
+            f'its input "{name}" is declared {describe(spec.type)} and was given {given[name]!r:.80} by "{source}": '
+            "look there, with debug=True the run does it"
+        )
+    return ""
 
 
 def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> None:

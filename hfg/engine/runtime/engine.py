@@ -423,7 +423,9 @@ class Engine:
                 "failed",
                 RunError(
                     f"virtual time has stood still at {now:g} s for {self._instant_steps:,} firings, so until_s would "
-                    f'never come; "{busiest.path}" fired most: give the source in front of it max_rate_hz='
+                    f'never come; "{busiest.path}" fired most: give '
+                    f"{'it' if busiest.is_source else 'the source in front of it'} max_rate_hz=, or let "
+                    f"{'it' if busiest.is_source else 'that'} end"
                 ),
             )
 

@@ -16,10 +16,19 @@ from hfg.graph.checks.flow import (
     signal_rings,
     silent_events,
     synchronous_rings,
+    unconnected_graph,
     unconnected_inputs,
     unfed_slots,
 )
-from hfg.graph.checks.nodes import async_in_threads, names, unknown_groups, unused_scheduling
+from hfg.graph.checks.nodes import (
+    async_in_threads,
+    empty_subgraphs,
+    limits_without_effect,
+    names,
+    unknown_attributes,
+    unknown_groups,
+    unused_scheduling,
+)
 from hfg.graph.flat.flattening import FlatGraph, flatten
 from hfg.problem import SEVERITIES, Problem
 
@@ -33,11 +42,15 @@ Check: TypeAlias = Callable[[FlatGraph], Iterable[Problem]]
 _OF_EACH_LEVEL: Final[list[Check]] = [
     unknown_groups,
     async_in_threads,
+    limits_without_effect,
+    unknown_attributes,
+    empty_subgraphs,
     joined_edges,
     unseen_parameters,
     synchronous_rings,
     borders,
     unconnected_inputs,
+    unconnected_graph,
     signal_rings,
     filling_rings,
     silent_events,

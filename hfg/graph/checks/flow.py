@@ -20,6 +20,7 @@ __all__ = [
     "signal_rings",
     "silent_events",
     "synchronous_rings",
+    "unconnected_graph",
     "unconnected_inputs",
     "unfed_slots",
 ]
@@ -64,6 +65,21 @@ def unconnected_inputs(flat: FlatGraph) -> Iterator[Problem]:
                 remedy=f"connect it, or declare {name} as optional",
                 check="unconnected-input",
             )
+
+
+def unconnected_graph(flat: FlatGraph) -> Iterator[Problem]:
+    """Several nodes, and no edge at all: somebody has forgotten to connect them."""
+    if len(flat.nodes) > 1 and not flat.edges and not flat.gates and flat.level.owner is None:
+        if _lonely_inputs(flat) or all(node.node._type.process_kind == "none" for node in flat.nodes):
+            return  # told of already: what they wait for, or that nothing leads to their slots
+        yield Problem(
+            path=flat.graph.name,
+            severity="warning",
+            what=f"it has {len(flat.nodes)} nodes and no edge",
+            why="so nothing goes from one to another (rule P1)",
+            remedy="connect them, as in graph.connect(source.out, target.value)",
+            check="unconnected-graph",
+        )
 
 
 def never_fires(flat: FlatGraph) -> set[int]:

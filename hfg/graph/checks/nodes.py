@@ -6,15 +6,26 @@ Stands on `flat`.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import CodeType
 from typing import Any
 
 from hfg.graph.flat.flattening import FlatGraph
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.options import NodeOptions
+from hfg.graph.structure.subgraph import Subgraph, inside
 from hfg.nodetype import Node
+from hfg.ports import Port
 from hfg.problem import Problem
 
-__all__ = ["async_in_threads", "names", "unknown_groups", "unused_scheduling"]
+__all__ = [
+    "async_in_threads",
+    "empty_subgraphs",
+    "limits_without_effect",
+    "names",
+    "unknown_attributes",
+    "unknown_groups",
+    "unused_scheduling",
+]
 
 
 def unknown_groups(flat: FlatGraph) -> Iterator[Problem]:
@@ -69,16 +80,94 @@ def async_in_threads(flat: FlatGraph) -> Iterator[Problem]:
     for node in flat.nodes if threads else ():
         kind = node.node._type
         group = threads.get(node.options.group or "loop")
-        waits = kind.process_kind.startswith("async") or any(slot.is_async for slot in kind.slots.values())
-        if waits and group is not None:
+        waiting = [f"its slot {slot.name}" for slot in kind.slots.values() if slot.is_async]
+        if kind.process_kind.startswith("async"):
+            waiting.insert(0, "it")
+        if waiting and group is not None:
             yield Problem(
                 path=node.path,
                 severity="error",
-                what=f'it is async, but its group "{group.name}" is a thread',
+                what=f'{waiting[0]} is async, but its group "{group.name}" is a thread',
                 why="async code runs on the loop (rule R1)",
                 remedy="leave out group=, declare the group with threads=0, or make the function a plain one",
                 check="async-in-thread",
             )
+
+
+def empty_subgraphs(flat: FlatGraph) -> Iterator[Problem]:
+    """Subgraphs with ports and nothing inside: what comes is lost (rule G1)."""
+    for path, node, _ in _members(flat):
+        level, kind = inside(node), node._type
+        ports = [*kind.inputs, *kind.outputs, *kind.events, *kind.slots]
+        if level is not None and ports and not level.nodes and not level.edges:
+            build = "build() adds nothing" if type(node).build is not Subgraph.build else "it has no build()"  # type: ignore[attr-defined]
+            yield Problem(
+                path=path,
+                severity="warning",
+                what=f"nothing is inside: {build}",
+                why="a port of a subgraph only passes on, so what comes is lost (rule G1)",
+                remedy=f"write `def build(self, graph)` in {kind.qualname}, and connect its ports there",
+                check="empty-subgraph",
+            )
+
+
+def limits_without_effect(flat: FlatGraph) -> Iterator[Problem]:
+    """Time limits of plain functions on the loop, which nothing can interrupt (rule X2)."""
+    threads = {name for name, group in flat.groups.items() if group.threads}
+    for node in flat.nodes:
+        kind, limit = node.node._type, node.options.max_duration_s
+        waits = kind.process_kind.startswith("async") or kind.process_kind == "none" or node.iteration is not None
+        if limit is not None and not waits and (node.options.group or "loop") not in threads:
+            yield Problem(
+                path=node.path,
+                severity="warning",
+                what=f"max_duration_s={limit:g} has no effect",
+                why="it is a plain function on the loop, and nothing can interrupt that before it is over (rule X2)",
+                remedy='give it a thread, graph.group("work") and group="work", or make it async',
+                check="limit-without-effect",
+            )
+
+
+def unknown_attributes(flat: FlatGraph) -> Iterator[Problem]:
+    """What was written on a node from outside and nothing in its class knows: a typo, most likely."""
+    for path, node, _ in _members(flat):
+        written = [name for name, value in vars(node).items() if not isinstance(value, Port) and name.isidentifier()]
+        known = _known_names(type(node)) if written else set()
+        for name in written:
+            if name not in known and not name.startswith("_"):
+                yield Problem(
+                    path=path,
+                    severity="warning",
+                    what=f'"{name}" was written on it, and nothing in {node._type.qualname} knows that name',
+                    why=f"so it has no effect; {suggest(name, _names_of(node))}",
+                    remedy=f"correct the name, or declare `{name} = hfg.Parameter(...)` or hfg.State",
+                    check="unknown-attribute",
+                )
+
+
+def _names_of(node: Node) -> list[str]:
+    kind = node._type
+    return [name for name in (*kind.parameters, *kind.states, *kind.inputs, *kind.outputs) if name.isidentifier()]
+
+
+def _known_names(cls: type) -> set[str]:
+    """The attributes of a class and all names in its methods; what else may be reached nobody can tell."""
+    known: set[str] = set()
+    for one in cls.__mro__[: cls.__mro__.index(Node)]:
+        known.update(vars(one), getattr(one, "__annotations__", ()))
+        for value in vars(one).values():
+            code = getattr(getattr(value, "handler", getattr(value, "__func__", value)), "__code__", None)
+            known.update(_names_in(code) if code is not None else ())
+    return known
+
+
+def _names_in(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, str):
+            yield constant
+        elif isinstance(constant, CodeType):
+            yield from _names_in(constant)
 
 
 _SCHEDULING = {"priority": ("priority", 0), "deadline": ("deadline_s", None)}  # policy: the option it looks at
