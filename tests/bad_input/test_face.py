@@ -35,25 +35,25 @@ def empty_class() -> None:
 
 def process_without_self() -> None:
     class Blur(hfg.Node):
-        def process(value: int) -> int:  # type: ignore[override]  # noqa: N805
+        def process(value: int) -> int:  # type: ignore[misc]  # noqa: N805
             return value
 
 
 def process_without_anything() -> None:
     class Source(hfg.Node):
-        def process() -> int:  # type: ignore[override,misc]
+        def process() -> int:  # type: ignore[misc]
             return 1
 
 
 def slot_without_self() -> None:
     class Listens(hfg.Node):
         @hfg.slot
-        def hear(value: int) -> None: ...  # type: ignore[misc]  # noqa: N805
+        def hear(value: int) -> None: ...  # noqa: N805
 
 
 def hook_without_self() -> None:
     class Opens(hfg.Node):
-        def setup() -> None: ...  # type: ignore[override,misc]
+        def setup() -> None: ...  # type: ignore[misc]
 
 
 def stars() -> None:
