@@ -10,8 +10,8 @@ import statistics
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from benchmarks.figures import caption, figure
 from benchmarks.measure import Record
-from benchmarks.page import caption, figure
 
 __all__ = ["Goal", "Side", "Verdict", "cases_of", "judge", "verdicts"]
 

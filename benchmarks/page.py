@@ -10,10 +10,12 @@ from __future__ import annotations
 import argparse
 import json
 import re
-import statistics
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from benchmarks.bench_goals import GOALS
+from benchmarks.figures import Records, caption, cell, figure, measured_on
+from benchmarks.goals import judge
 from benchmarks.measure import ROOT, Record, read
 from benchmarks.works import WORKS
 
@@ -24,47 +26,6 @@ PAGE = ROOT / "docs" / "speed.md"
 SOURCE = ROOT / "docs" / "speed.jsonl"
 BLOCK = re.compile(r"(?P<begin><!-- (?P<name>[a-z]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
 OURS = "hfg, functions"
-MOST_DISTURBED = 1.2
-MOST_LOAD = 2.0
-WARNING = " **The machine was busy with something else: do not quote these.**"
-
-Records = Mapping[str, Record]
-
-
-def figure(value: float) -> str:
-    """Three digits, as one writes them by hand."""
-    if abs(value) >= 100:
-        return f"{value:,.0f}"
-    return f"{value:.1f}" if abs(value) >= 10 else f"{value:.2f}" if abs(value) >= 0.1 else f"{value:.3f}"
-
-
-def cell(record: Record) -> str:
-    """Median, in rounds also the 99th percentile, and the spread."""
-    text = figure(record.median)
-    if "p99" in record.figures:
-        text += f" / {figure(statistics.median(record.figures['p99']))}"
-    return f"{text} ({record.spread:.0%})"
-
-
-def measured_on(record: Record) -> str:
-    """The machine, the versions, and what else it had to do."""
-    packages = ", ".join(f"{name} {version}" for name, version in record.versions.items())
-    return f"{record.machine}; {packages}; load {record.load[0]:.1f} before and {record.load[1]:.1f} after"
-
-
-def caption(records: Records) -> str:
-    """What the figures were measured on, and how far to trust them."""
-    several = list(records.values())
-    first = several[0]
-    spreads = sorted(record.spread for record in several)
-    ratios = [record.median / statistics.median(record.figures["cpu"]) for record in several if "cpu" in record.figures]
-    disturbed = statistics.median(ratios) if ratios else 1.0
-    clock = f"; the clock ran {disturbed:.2f} times the processor time" if ratios else ""
-    busy = disturbed > MOST_DISTURBED or first.load[0] > MOST_LOAD
-    return (
-        f"*{measured_on(first)}{clock}; fresh processes a case: {len(first.values)}; "
-        f"spread {statistics.median(spreads):.0%} in the median, {spreads[-1]:.0%} at worst.*"
-    ) + (WARNING if busy else "")
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
@@ -128,6 +89,18 @@ def threads(records: Records) -> str:
     return f"{table(['', 's'], rows)}\n\n{caption(records)}"
 
 
+def goals(records: Records) -> str:
+    """What is to be reached: in each round ours over the other's, the median of that, and whether it is enough."""
+    rows = []
+    for goal in GOALS:
+        if all(side.case in records for side in goal.sides):
+            verdict = judge(goal, records)
+            sign = " %" if goal.alone else ""
+            ends = f"{figure(min(verdict.judged))} to {figure(max(verdict.judged))}"
+            rows.append([goal.name, figure(verdict.median) + sign, ends, f"{goal.at_most:g}{sign}"])
+    return f"{table(['ours / theirs', 'median', 'lowest to highest', 'at most'], rows)}\n\n{caption(records)}"
+
+
 def day(records: Records) -> str:
     """A day of virtual time."""
     return f"{table(['', 's'], [[name, cell(record)] for name, record in records.items()])}\n\n{caption(records)}"
@@ -161,6 +134,7 @@ TABLES: dict[str, tuple[str, Callable[[Records], str]]] = {
     "ratios": ("bench_peers", ratios),
     "shape": ("bench_shape", shape),
     "threads": ("bench_threads", threads),
+    "goals": ("bench_goals", goals),
     "day": ("bench_virtual_day", day),
     "profile": ("profile_hop", profile),
 }

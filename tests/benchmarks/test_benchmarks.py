@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks import bench_goals, bench_peers, page, profile_hop, threaded
+from benchmarks import bench_goals, bench_peers, figures, page, profile_hop, threaded
 from benchmarks.__main__ import SUITES
 from benchmarks.goals import Goal, Side, judge, verdicts
 from benchmarks.measure import BEFORE, ROOT, Record, measure, one, read, write
@@ -164,7 +164,7 @@ def test_lines_come_back_as_they_were_written(tmp_path: Path) -> None:
 
 
 def test_a_cell_shows_median_and_spread() -> None:
-    assert page.cell(RECORD) == "3.00 / 5.00 (67%)"
+    assert figures.cell(RECORD) == "3.00 / 5.00 (67%)"
 
 
 def test_the_page_is_made_from_the_lines_beside_it() -> None:
@@ -213,6 +213,6 @@ def test_a_profile_that_met_nothing_is_an_error() -> None:
 def test_figures_of_a_busy_machine_say_so() -> None:
     quiet = Record("suite", "case", "us", 10, {"wall": [1.0], "cpu": [1.0]}, "m", {}, (0.5, 1.0))
     slow = quiet._replace(figures={"wall": [2.0], "cpu": [1.0]})
-    assert page.WARNING not in page.caption({"case": quiet})
-    assert page.WARNING in page.caption({"case": slow})
-    assert page.WARNING in page.caption({"case": quiet._replace(load=(7.0, 7.0))})
+    assert figures.WARNING not in figures.caption({"case": quiet})
+    assert figures.WARNING in figures.caption({"case": slow})
+    assert figures.WARNING in figures.caption({"case": quiet._replace(load=(7.0, 7.0))})
