@@ -118,7 +118,6 @@ def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = 
     """
     seen = list(events)
     replaying = Replay(build() if callable(build) else build, until_s=until_s)
-    replaying.sees_inside = any(replaying.is_inside(event) for event in seen)
     try:
         for event in seen:
             replaying.see(event)
@@ -128,14 +127,7 @@ def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = 
 
 
 class Replay:
-    """A reference machine beside a run; `see` its events one by one as they come.
-
-    Attributes:
-      sees_inside: whether the run tells what happens inside iterating subgraphs (G4); else only their results are
-        compared.
-    """
-
-    sees_inside = False
+    """A reference machine beside a run; `see` its events one by one as they come."""
 
     def __init__(self, graph: Any, *, until_s: float | None = None, held_open: bool = False) -> None:
         self.machine = ReferenceMachine(graph, until_s=until_s, held_open=held_open)
@@ -222,22 +214,11 @@ class Replay:
 
     def _is_idle(self, event: TraceEvent) -> bool:
         """Whether nobody could tell: events without edges, and what is not compared."""
-        if not self.sees_inside and self.is_inside(event):
-            return True
         if isinstance(event, EventTriggered):
             return event.event not in self._connected
         if isinstance(event, TokenProcessed):  # a delay or buffer: nobody waits, so nobody is told when
             return event.edge in self._delays
         return isinstance(event, RunPaused | RunResumed)
-
-    def is_inside(self, event: TraceEvent) -> bool:
-        """Whether an event happened inside an iterating subgraph."""
-        machine = self.machine
-        line = machine.labels.get(getattr(event, "edge", ""))
-        if line is not None:
-            return line.edge.within is not None
-        node = machine.paths.get(getattr(event, "node", None) or getattr(event, "event", "").rpartition(".")[0], -1)
-        return node >= 0 and machine.stations[node].leaf.within is not None
 
     def _match(self, event: TraceEvent) -> bool:
         wanted = key(event)
@@ -335,7 +316,7 @@ class Replay:
         for move in moves:  # steps of which nothing was seen
             if move.kind == "timer" and not (move.node and self.machine.times_out(self.machine.paths[move.node])):
                 return move
-        return None if self.sees_inside else next((move for move in moves if self._moves_inside(move)), None)
+        return None
 
     def _strangeness(self, move: Move, event: TraceEvent) -> tuple[bool, bool]:
         """Of several firings of one node (F14) the step of which is least likely to be behind the event.
@@ -348,14 +329,6 @@ class Replay:
         number = getattr(event, "number", flight.number)
         token = getattr(event, "token", None)
         return number != flight.number, token is not None and abs(token.stamp - flight.stamp) > _SAME_TIME
-
-    def _moves_inside(self, move: Move) -> bool:
-        """Whether a move belongs to an iterating subgraph, of which nothing more is told than its results."""
-        line = self.machine.labels.get(move.edge)
-        node = self.machine.paths.get(move.node, -1) if move.node else -1
-        return (line is not None and line.edge.within is not None) or (
-            node >= 0 and self.machine.stations[node].leaf.within is not None
-        )
 
     def _source_of(self, label: str) -> str:
         return self.machine.path_of(self.machine.labels[label].edge.source.owner)
@@ -384,9 +357,7 @@ class Replay:
             steps = [
                 move
                 for move in self.machine.moves()
-                if move.kind in ("go on", "timer")
-                or (move.kind == "feed" and not self._reaches(move.edge))
-                or (not self.sees_inside and self._moves_inside(move))
+                if move.kind in ("go on", "timer") or (move.kind == "feed" and not self._reaches(move.edge))
             ]
             if not steps:
                 return

@@ -12,6 +12,7 @@ import hfg
 from hfg.errors import GraphError, NotRunning, RunError, UsageError
 from hfg.testing.conformance import Divergence, Replay
 from hfg.testing.edits import drawn, random_edit
+from hfg.testing.iterated import random_iterated
 from hfg.testing.making import Allowed, SeededChooser, random_plan
 from hfg.testing.planned import planned, planned_afresh
 from hfg.testing.reference import Move
@@ -30,6 +31,7 @@ class EditedRun:
       allowed: what may occur in the graph.
       edits: how often it is edited; commands that are refused count too.
       quiet: edit at quiet moments only.
+      iterated: the graph is inside of subgraphs that iterate.
 
     Attributes:
       trace: all that was seen of the run.
@@ -37,9 +39,11 @@ class EditedRun:
       problems: what is wrong, as sentences: refused edits that changed something, plans that are not those made afresh.
     """
 
-    def __init__(self, seed: int, allowed: Allowed, *, edits: int = 8, quiet: bool = False) -> None:
+    def __init__(
+        self, seed: int, allowed: Allowed, *, edits: int = 8, quiet: bool = False, iterated: bool = False
+    ) -> None:
         self.seed = seed
-        self.plan = random_plan(seed, allowed)
+        self.plan = random_iterated(seed, allowed) if iterated else random_plan(seed, allowed)
         self.graph = self.plan.build()
         self.trace: list[TraceEvent] = []
         self.carried_out = 0

@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar
 from hfg.testing import nodes as types
 from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
 
-__all__ = ["FEEDS", "Allowed", "Chooser", "SeededChooser", "make_plan", "random_plan"]
+__all__ = ["FEEDS", "Allowed", "Chooser", "SeededChooser", "description", "make_plan", "random_plan"]
 
 T = TypeVar("T")
 End = tuple[str, str, str]
@@ -72,6 +72,8 @@ class Allowed:
     readiness: bool = True
     threads: bool = False
     feeds: bool = False
+    sources: bool = True
+    start: bool = True
     failing_calls: bool = True
     plain: bool = False  # mostly functions close to each other: the shapes of which regions are fused
 
@@ -143,7 +145,7 @@ class _Making:
         count = choose.number(2, allowed.max_nodes)
         plain = self._plain_kinds()
         for number in range(count):
-            if number == 0 or choose.chance(self._seldom(20)):
+            if allowed.sources and (number == 0 or choose.chance(self._seldom(20))):
                 kind = choose.one_of(sources)
             else:
                 kind = choose.one_of(plain if allowed.plain and not choose.chance(15) else inner)
@@ -204,7 +206,7 @@ class _Making:
 
     def type_of(self, name: str) -> Any:
         plan = next(node for node in self.nodes if node.name == name)
-        return _description(plan.type)
+        return description(plan.type)
 
     def outputs(self, nodes: Sequence[NodePlan]) -> list[End]:
         return [(node.name, "output", port) for node in nodes for port in self.type_of(node.name).outputs]
@@ -226,7 +228,8 @@ class _Making:
             for port, spec in self.type_of(node.name).events.items()
             if spec.type is None
         ]
-        return own + [(node.name, "event", self.choose.one_of(automatic)) for node in nodes] + [("", "event", "start")]
+        start = [("", "event", "start")] if self.allowed.start else []
+        return own + [(node.name, "event", self.choose.one_of(automatic)) for node in nodes] + start
 
     # --- edges
 
@@ -287,7 +290,7 @@ class _Making:
                 candidates += self.signals(nearby)
             if candidates:
                 self._edge(choose.one_of(candidates), (node.name, "slot", port))
-        if allowed.activity and slots and choose.chance(60):
+        if allowed.activity and allowed.start and slots and choose.chance(60):
             begins = [(node.name, "slot", port) for node, port in slots if port in _ANY_SLOTS]
             begins += [(node.name, "slot", "activate") for node in self.nodes]
             self._edge(("", "event", "start"), choose.one_of(begins), active=True)
@@ -303,7 +306,8 @@ class _Making:
         index = choose.number(0, len(self.nodes) - 1)
         nearby = self.nodes[:index] if name in ("reset", "enable") else self.nodes
         candidates = self.events(nearby) + self.signals(nearby)
-        self._edge(choose.one_of(candidates), (self.nodes[index].name, "slot", name))
+        if candidates:
+            self._edge(choose.one_of(candidates), (self.nodes[index].name, "slot", name))
 
     def _make_parameter_edge(self) -> None:
         choose = self.choose
@@ -402,7 +406,9 @@ class _Making:
         if slots:
             slot = choose.one_of(slots)
             nearby = self.nodes if slot in ("disable", "deactivate") else before
-            self._edge(choose.one_of(self.events(nearby) + self.signals(nearby)), (name, "slot", slot))
+            candidates = self.events(nearby) + self.signals(nearby)
+            if candidates:
+                self._edge(choose.one_of(candidates), (name, "slot", slot))
 
     def _hear_box(self, name: str) -> None:
         choose = self.choose
@@ -413,7 +419,8 @@ class _Making:
         self._edge((name, "event", event), choose.one_of(slots))
 
 
-def _description(kind: str) -> Any:
+def description(kind: str) -> Any:
+    """Give the type of a node of a plan, by its name."""
     made: Any = getattr(types, kind)
     return (made if isinstance(made, type) else type(made()))._type  # type: ignore[attr-defined]
 

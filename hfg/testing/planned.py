@@ -22,9 +22,7 @@ def planned(engine: Any) -> dict[str, Any]:
     core = engine.core
     workers = [worker for worker in core.workers if worker.node is not None or _edges(worker)]
     return {
-        "workers": {
-            f"{worker.path}{worker.port_name} {number}": _worker(worker, core) for number, worker in enumerate(workers)
-        },
+        "workers": {_name(worker, number): _worker(worker, core) for number, worker in enumerate(workers)},
         "edges": [_edge(edge) for edge in core.edges if edge not in core.outside.values()],
         "in order": [
             [one.index for one in listed] == sorted(one.index for one in listed) for listed in (core.edges, core.scopes)
@@ -44,6 +42,14 @@ def planned(engine: Any) -> dict[str, Any]:
         "paths": sorted((path, id(worker.node)) for path, worker in core.by_path.items()),
         "sources": [worker.path for worker in core.sources],
     }
+
+
+def _name(worker: Any, number: int) -> str:
+    """Those who stand for ports of the graph, or of what iterates, are in no order."""
+    if worker.node is not None:
+        return f"{worker.path} {number}"
+    around = "" if worker.within is None else worker.within.worker.path
+    return f"{around}.{worker.port_name} {'in' if worker.is_boundary_output else 'out'}"
 
 
 def _edges(worker: Any) -> list[Any]:
@@ -67,6 +73,7 @@ def _worker(worker: Any, core: Any) -> dict[str, Any]:
         "mandatory": worker.mandatory_ports,
         "kind": (worker.is_source, worker.is_async, worker.silent_code, worker.paced, worker.is_boundary_output),
         "around": [scope.path for scope in worker.around],
+        "within": worker.within and worker.within.worker.path,
         "gates": [(getattr(gate.state, "path", ""), gate.idle_rate_hz) for gate in worker.gates_over],
         "state of": sorted(one.path for gate in worker.gates for one in gate.workers),
         "handlers": sorted({edge.port_name for edge in worker.slot_edges} & set(worker.handlers)),

@@ -7,6 +7,7 @@ same graph in the sense of rule G1.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -70,6 +71,10 @@ class GraphPlan:
         return _Building(self).graph
 
     __call__ = build
+
+    def build_inside(self, graph: Graph, border: Mapping[str, Any]) -> None:
+        """Make it inside of a subgraph instead, whose ports stand for those of the graph."""
+        _Building(self, graph, border)
 
     def flat(self) -> GraphPlan:
         """The same without boxes, and without what is said about them."""
@@ -145,7 +150,7 @@ class _Drawing:
         begin, end = self._boxes(edge.source), self._boxes(edge.target)
         if edge.source[:2] == ("", "event"):  # `start` may be named anywhere; draw it where the target is
             begin = end
-        if edge.target[0] == "":
+        if edge.target[0] == "" and edge.target[1] != "input":
             end = begin
         shared = 0
         while shared < min(len(begin), len(end)) and begin[shared] == end[shared]:
@@ -201,6 +206,8 @@ def _port(end: tuple[str, str, str]) -> str:
     node, kind, name = end
     if node == "" and kind == "output":
         return f"graph.inputs[{name!r}]"
+    if node == "" and kind == "input":
+        return f"graph.outputs[{name!r}]"
     return f"graph.{name}" if node == "" else f"{node}.ports.{kind}s[{name!r}]"
 
 
@@ -210,14 +217,13 @@ _RELAYS: Final[dict[str, Any]] = {"input": Input, "output": Output, "event": Eve
 class _Building:
     """Builds what is drawn."""
 
-    def __init__(self, plan: GraphPlan) -> None:
+    def __init__(self, plan: GraphPlan, around: Graph | None = None, border: Mapping[str, Any] | None = None) -> None:
         self.drawing = _Drawing(plan)
         self.made: dict[str, Any] = {}
-        self.graph = Graph()
-        for group in plan.groups:
+        self.graph = Graph() if around is None else around
+        for group in plan.groups if around is None else ():
             self.graph.group(group, threads=1)
-        for feed in plan.feeds:
-            self.graph.input(feed, int)
+        self.border = {feed: self.graph.input(feed, int) for feed in plan.feeds} if border is None else border
         self._fill("", self.graph, None)
         for gate in plan.gates:
             self.graph.gate(self.made[gate.target], by=self.made[gate.by], idle_rate_hz=gate.idle_rate_hz)
@@ -236,8 +242,8 @@ class _Building:
             )
 
     def _end(self, text: str, graph: Graph, owner: Any) -> Any:
-        if text.startswith("graph.inputs["):
-            return graph.inputs[text[13:].strip("']")]
+        if text.startswith(("graph.inputs[", "graph.outputs[")):
+            return self.border[text.partition("[")[2].strip("']")]
         if text.startswith("graph."):
             return getattr(graph, text[6:])
         if text.startswith("self."):

@@ -99,7 +99,6 @@ def replay_depth_first(build: Any, events: Iterable[TraceEvent]) -> None:
     """
     seen = list(events)
     replaying = DepthFirst(build())
-    replaying.sees_inside = any(replaying.is_inside(event) for event in seen)
     try:
         for event in seen:
             replaying.see(event)

@@ -162,11 +162,14 @@ def test_inside_of_what_iterates_one_can_pause_and_step_and_stop_at_nodes() -> N
         assert (await run.step("each/two")).moved == ("each/two",)
         assert (await run.step("each/one")).moved == ("each/one",)
         assert (await run.step("take")).why_not == '"take" waits for "values"'
-        with pytest.raises(UsageError, match=r"tokens can be looked at by run\.tap alone"):
-            run.break_at("each/one.out")
+        at_edge = run.break_at("each/one.out", when=lambda token: token.value == 6)
         run.resume()
         assert await run.wait_paused() == "each/two"
         point.remove()
+        run.resume()
+        assert await run.wait_paused() == "each/one.out"
+        assert at_edge.token is not None
+        assert at_edge.token.value == 6
         run.resume()
         await run.wait_finished()
         assert point.hits == 2

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hfg.engine.editing.plan_diff import PlanDiff
-from hfg.engine.editing.plan_index import PlanIndex, edge_place, home_of, node_place
+from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
@@ -30,7 +30,9 @@ from hfg.graph import Graph
 from hfg.graph.flat import End, FlatEdge
 from hfg.graph.flat import Scope as FlatScope
 from hfg.graph.structure.edge import is_feed
-from hfg.graph.structure.level import level_of
+from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.places import edge_place, home_of, node_place
+from hfg.ports import InnerSource, InnerTarget
 from hfg.ports.automatic import AUTOMATIC_EVENTS
 from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.trace import ActivityLost
@@ -68,13 +70,14 @@ class _Ends(plan.Ends):
     """Finds workers by the nodes of ports: numbers mean nothing in a diff."""
 
     def __init__(self, core: Core, index: PlanIndex, loop: Group) -> None:
-        assert core.boundary is not None
-        super().__init__(core, [], core.boundary, loop)
+        super().__init__(core, loop)
         self._index = index
 
     def of(self, end: End) -> Worker:
         worker = self._index.by_node.get(getattr(end.port, "node", None))
-        return self._at_border(end) if worker is None else worker
+        if worker is None or isinstance(end.port, InnerSource | InnerTarget):
+            return self.at_border(end, None if worker is None else worker.iteration)
+        return worker
 
     def scopes_of(self, flat: FlatEdge) -> tuple[Scope, ...]:
         return tuple(_scope_of(self._index, box) for box in flat.via)
@@ -156,6 +159,8 @@ class _Applying:
         self._take_all_out()
         for worker in (*found.renamed, *found.placed, *found.boxes_placed):
             worker.rename(worker.node._place.path)
+        for worker in self.come:  # who iterates is asked for by those inside
+            self.index.by_node[worker.node] = worker
         boxes = {worker.node: worker for worker in found.boxes_placed} | dict.fromkeys(found.boxes_come)
         for box in sorted(boxes, key=node_place):
             self._put_in_scope(box, boxes[box])
@@ -179,6 +184,9 @@ class _Applying:
                 member.enable_itself(False)  # without it they stay as disabled as they were (G1)
         for worker in (*found.gone, *found.placed):
             self._take_out(worker)
+        for border in [worker.iteration for worker in found.gone if worker.iteration is not None]:
+            for outside in (*border.feeds, *border.readers):
+                core.workers.remove(outside)
         for worker in (*found.boxes_gone, *found.boxes_placed):
             self._take_out_scope(worker)
         for worker in (*found.gone, *found.boxes_gone):
@@ -196,6 +204,8 @@ class _Applying:
             self.scopes[scope] = None
         self._list_source(worker, False)
         del core.workers[index.leaves.remove(worker)]
+        if worker.within is not None:
+            worker.within.leave(worker)
 
     def _put_in(self, worker: Worker) -> None:
         core, index = self.core, self.index
@@ -211,7 +221,18 @@ class _Applying:
             self.scopes[scope] = None
         self._list_source(worker, worker.is_source)
         worker.lie_in(around)
+        self._join(worker)
         self.elsewhere[worker] = None
+
+    def _join(self, worker: Worker) -> None:
+        """It is inside of what iterates, if anything around it does (G4)."""
+        level: Level | None = level_of(worker.node._place.graph)
+        while level is not None and level.owner is not None:
+            around = self.index.by_node[level.owner]
+            if around.iteration is not None:
+                around.iteration.join(worker)
+                return
+            level = level.around
 
     def _list_source(self, worker: Worker, is_one: bool) -> None:
         """Let a worker be in the list of sources, or not."""
@@ -224,8 +245,13 @@ class _Applying:
             sources.insert(position, worker)
 
     def _around(self, node: Any) -> tuple[Scope, ...]:
+        scope = self._scope_around(node)
+        return () if scope is None else scope.and_around()
+
+    def _scope_around(self, node: Any) -> Scope | None:
+        """That of the subgraph directly around it; what iterates is none (G4)."""
         owner = level_of(node._place.graph).owner
-        return () if owner is None else _scope_of(self.index, owner).and_around()
+        return None if owner is None else self.index.by_node[owner].scope
 
     def _take_out_scope(self, worker: Worker) -> None:
         core, index, scope = self.core, self.index, worker.scope
@@ -235,11 +261,12 @@ class _Applying:
             self.scopes[scope.parent] = None
         position = index.scopes.remove(worker)
         del core.scopes[position], core.workers[len(index.leaves.items) + position]
+        if worker.within is not None:
+            worker.within.leave(worker)
 
     def _put_in_scope(self, box: Any, worker: Worker | None) -> None:
         core, index = self.core, self.index
-        owner = level_of(box._place.graph).owner
-        parent = None if owner is None else _scope_of(index, owner)
+        parent = self._scope_around(box)
         if worker is None:
             path = box._place.path
             said = FlatScope(0, path, box, None, self.found.boxes_come[box], [])
@@ -262,6 +289,7 @@ class _Applying:
             parent.children.sort(key=_index)
             self.scopes[parent] = None
         worker.lie_in(scope.and_around())
+        self._join(worker)
         self.scopes[scope] = None
         self.elsewhere[worker] = None
 
@@ -270,8 +298,6 @@ class _Applying:
         self.core.by_path[worker.path] = worker
         if worker.scope is not None:
             worker.scope.rename(worker.path)
-        if worker.iteration is not None:
-            _rename_inside(worker.iteration.core)
 
     def _regroup(self, worker: Worker, options: Any) -> None:
         """It may run elsewhere from now on."""
@@ -379,7 +405,9 @@ class _Applying:
         bases = {_base(edge.label): None for edge in found.old}
         bases |= {way.label: None for way, _ in found.ways}
         for worker in found.renamed:
-            for edge in (*worker.edges_in(), *worker.all_out_edges()):
+            feeds = () if worker.iteration is None else worker.iteration.feeds
+            at_border = [edge for feed in feeds for edge in feed.all_out_edges()]
+            for edge in (*worker.edges_in(), *worker.all_out_edges(), *at_border):
                 if edge.segments:
                     bases |= {_base(edge.label): None, _name(edge): None}
         taken: dict[Any, None] = {}
@@ -541,20 +569,6 @@ class _Applying:
         if worker.node is not None and worker.scope is None:
             self.core.upstairs.bind_ports(worker)
         specialise(worker)
-
-
-def _rename_inside(core: Core) -> None:
-    """A subgraph that iterates has another path, and so has all inside it."""
-    for worker in core.workers:
-        if worker.node is not None:
-            worker.rename(worker.node._place.path)
-        if worker.iteration is not None:
-            _rename_inside(worker.iteration.core)
-    for edge in core.edges:
-        if edge.segments:
-            edge.rename(edge.label.replace(_base(edge.label), _name(edge)))
-    core.by_path.clear()
-    core.by_path.update((worker.path, worker) for worker in core.workers if worker.path)
 
 
 def _index(edge: Any) -> float:

@@ -19,7 +19,7 @@ import msgspec
 from hfg.engine.editing.applying import apply
 from hfg.engine.editing.holding import Held
 from hfg.engine.editing.plan_diff import PlanDiff, diff
-from hfg.engine.editing.plan_index import PlanIndex, node_place
+from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.editing.setting import refuse_without_effect
 from hfg.engine.editing.turns import Turns
 from hfg.engine.executing.code import answer
@@ -39,6 +39,7 @@ from hfg.graph.editing.changes import Change, NodeSwap, OptionsChange, Parameter
 from hfg.graph.editing.commands import Command, encode
 from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat import FlatNode, flatten
+from hfg.graph.structure.places import node_place
 from hfg.trace import ParameterSet, StructureChanged
 
 __all__ = ["Edits"]
@@ -192,7 +193,7 @@ class Edits:
 
     def _values_of_running_nodes(self, changes: Sequence[Change]) -> list[ParameterChange]:
         values = [change for change in changes if isinstance(change, ParameterChange)]
-        running = {worker.node for worker in self._engine.all_workers()} if values else set()
+        running = {worker.node for worker in self._engine.core.workers} if values else set()
         return [value for value in values if value.node in running]
 
     def _refuse_without_effect(self, edit: _Following) -> None:
@@ -203,17 +204,13 @@ class Edits:
         afresh = {*how.gone, *(worker for worker, _, _ in how.swapped), *self._to_start_afresh(edit.switched)}
         refuse_without_effect(
             [(value.node, value.name) for value in edit.values],
-            [worker for worker in self._engine.all_workers() if worker not in afresh],
+            [worker for worker in self._engine.core.workers if worker not in afresh],
         )
 
     def _touched(self, edit: _Following) -> list[Worker]:
-        """Those who must rest: also all inside a subgraph that is enabled, and nodes inside what iterates."""
+        """Those who must rest: also all inside a subgraph that is enabled."""
         scopes = [worker.scope for worker, enabled in edit.switched.items() if worker.scope is not None and enabled]
-        set_ = {value.node for value in edit.values}
-        everybody = self._engine.all_workers() if set_ else ()
-        inside = [one for one in everybody if one.node in set_ and one.core is not self._engine.core]
-        members = [member for scope in scopes for member in scope.members]
-        return list(dict.fromkeys([*edit.how.touched, *members, *inside]))
+        return list(dict.fromkeys([*edit.how.touched, *(member for scope in scopes for member in scope.members)]))
 
     def _refuse_errors(self) -> None:
         """A graph that runs has no errors, and gets none."""

@@ -1,6 +1,7 @@
 """Holds nodes for an edit: as they come to rest, until it has taken effect or is given up (rule R4).
 
-While the code of one of them waits until a queue has room, none is held: they may be the ones that make it.
+While the code of one of them waits until a queue has room, none is held: they may be the ones that make it. Those
+inside of a subgraph that iterates are held behind it, for its firing is over when they have come to rest (G4).
 Stands on `lifecycle`.
 """
 
@@ -31,7 +32,8 @@ class Held:
         self._engine = engine
         self._workers = workers
         self._held: dict[Worker, Callable[[], None]] = {}  # who rests, and what lets it go
-        self._free: list[Worker] = []  # who may go on until a queue has room
+        self._wanted = frozenset(workers)
+        self._left = list(workers)  # who goes on until others rest, or until a queue has room
         self._waiter: asyncio.Future[None] = engine.loop.create_future()
         self._given_up = False
         self.done = False
@@ -42,12 +44,10 @@ class Held:
         engine = self._engine
         core = engine.core
         core.holding = self
-        for worker in self._workers:
-            lifecycle.when_idle(worker, self._rests, lifecycle.nothing)
+        self._hold()
         if len(self._held) < len(self._workers):
             self._said = True
-            if core.trace is not None:
-                core.trace(EditWaits(core.now(), tuple(worker.path for worker in self._workers)))
+            self._say()
             try:
                 await self._or_end(self._waiter)
             except BaseException:
@@ -55,18 +55,45 @@ class Held:
                 raise
         return self
 
+    def _hold(self) -> None:
+        """Hold those who are left, as they come to rest, but for those inside of what has to rest first."""
+        for worker in [worker for worker in self._left if not self._is_amid(worker)]:
+            if worker in self._left:
+                self._left.remove(worker)
+                lifecycle.when_idle(worker, self._rests, lifecycle.nothing)
+
+    def _is_amid(self, worker: Worker) -> bool:
+        """Whether it is inside of something that iterates, is to be held too, and is not yet."""
+        around = worker.within
+        while around is not None:
+            if around.worker in self._wanted and around.worker not in self._held:
+                return True
+            around = around.worker.within
+        return False
+
+    def _say(self) -> None:
+        """Tell whoever traces who starts nothing any more until this is over."""
+        core = self._engine.core
+        if core.trace is not None:
+            waiting = tuple(worker.path for worker in self._workers if worker not in self._left)
+            core.trace(EditWaits(core.now(), waiting))
+
     def _rests(self, worker: Worker, over: Callable[[], None]) -> None:
         """One of them has come to rest."""
         if self._given_up:
             over()
             return
         if self._is_room_awaited():
-            self._free.append(worker)
+            self._left.append(worker)
             over()
             return
         worker.be_busy("edit")
         self._held[worker] = over
-        if len(self._held) == len(self._workers):
+        if self._left:
+            self._hold()
+            if self._said and len(self._held) < len(self._workers):
+                self._say()
+        elif len(self._held) == len(self._workers):
             if self._said:  # until we have our turn it is not quiet, or queues would grow (F8)
                 self._engine.core.set_out()
                 self._counts = True
@@ -81,13 +108,12 @@ class Held:
             return
         if self._is_room_awaited():
             held, self._held = self._held, {}
-            self._free += held
+            self._left += held
+            self._say()
             for over in held.values():
                 over()
         else:
-            free, self._free = self._free, []
-            for worker in free:
-                lifecycle.when_idle(worker, self._rests, lifecycle.nothing)
+            self._hold()
 
     async def _or_end(self, waiter: asyncio.Future[None]) -> None:
         """Wait until all rest, or the run is over."""

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import msgspec
 
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
-from hfg.engine.rules import quiet
+from hfg.engine.rules import iterating, quiet
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.places import behind, edges_at, is_gone, is_near, place_of
@@ -127,8 +127,7 @@ class Pausing:
         engine.kick()
 
     def _hold_groups(self, held: bool) -> None:
-        for core in self._engine.all_cores():
-            core.hold(held)
+        self._engine.core.hold(held)
         for group in self._engine.groups.values():
             group.hold(held)
 
@@ -152,7 +151,7 @@ class Pausing:
         """
         engine = self._engine
         while not engine.core.over:
-            if self.paused and not self._engine.is_under_way() and not self._stepping:
+            if self.paused and not self._engine.core.in_flight and not self._stepping:
                 return self.why
             await self._change()
         raise UsageError("the run has ended: nothing can pause it any more")
@@ -164,13 +163,13 @@ class Pausing:
         worker = self._single(node, "step")
         self._begin(worker.path)
         try:
-            await self._settled()
+            self._let_elements_in()
             why_not = self._why_not(worker)
             if why_not:
                 return Step((), why_not)
             self._let(worker)
             await self._over([worker])
-            await self._settled()
+            self._let_elements_in()
         finally:
             self._stepping = False
         return Step((worker.path,))
@@ -182,7 +181,7 @@ class Pausing:
         done: set[tuple[Worker, str]] = set()
         workers: list[Worker] = []
         try:
-            await self._settled()
+            self._let_elements_in()
             while not self._engine.core.over:
                 worker = self._next_in_wave(done)
                 if worker is not None:
@@ -192,7 +191,7 @@ class Pausing:
                     self._let(worker)
                 elif _any_works(workers):
                     await self._change()
-                elif not await self._settled():
+                elif not self._let_elements_in():
                     break
         finally:
             self._stepping = False
@@ -203,7 +202,7 @@ class Pausing:
 
         They stay in their queues, for what they do next may change: who fired may be called.
         """
-        for worker in list(self._queued()):
+        for worker in [worker for worker in self._queued() if not worker.is_boundary_output]:
             kind = _next_kind(worker)
             if not kind:
                 self._let(worker)  # what it was queued for is gone: it leaves the queue, so that it can be queued again
@@ -211,21 +210,19 @@ class Pausing:
                 return worker
         return None
 
-    async def _settled(self) -> bool:
-        """Wait until what iterates has seen whether its inside is quiet: the next element goes in by itself (G4).
+    def _let_elements_in(self) -> bool:
+        """What iterates lets the next element in by itself where it is quiet inside, for that is no firing (G4).
 
-        Whether there was anything to wait for.
+        Whether there was any, or something came out.
         """
-        waited = False
+        went_on = False
         while True:
-            looking = [
-                core.inside for core in self._engine.all_cores() if core.inside is not None and core.inside.looks
-            ]
-            if not looking:
-                return waited
-            waited = True
-            for iteration in looking:
-                await iteration.looked()
+            readers = [worker for worker in self._queued() if worker.is_boundary_output]
+            for reader in readers:  # what comes out is read by nobody who could be paused
+                self._let(reader)
+            if not iterating.settle(self._engine.core) and not readers:
+                return went_on
+            went_on = True
 
     def _begin(self, what: str) -> None:
         if self._engine.core.over:
@@ -235,9 +232,8 @@ class Pausing:
         if self._stepping:
             raise UsageError(f"{what} cannot step while another step is under way: await that first")
         self._stepping = True
-        for core in self._engine.all_cores():
-            for region in list(core.regions):
-                region.dissolve()
+        for region in list(self._engine.core.regions):
+            region.dissolve()
 
     def _queued(self) -> Iterator[Worker]:
         """Those that could move now, group by group."""
@@ -287,8 +283,7 @@ class Pausing:
     def _single(self, node: Any, what: str) -> Worker:
         if isinstance(node, str):
             node = self._engine.graph[node]
-        inside = (worker for worker in self._engine.all_workers() if worker.node is node and node is not None)
-        worker = next(inside, None) or self._engine.worker_of(node)
+        worker = self._engine.worker_of(node)
         if worker.scope is not None:
             raise UsageError(f'"{worker.path}" is a subgraph: {what} a node inside (G1)')
         return worker
@@ -308,11 +303,6 @@ class Pausing:
           UsageError: there is none.
         """
         labels = self._labels(place)
-        if not labels and edges_at(self._engine, place):
-            raise UsageError(
-                f"{place!r} is inside a subgraph that iterates, where tokens can be looked at by run.tap alone; "
-                "a breakpoint may be at a node there"
-            )
         if not labels:
             raise UsageError(f"{place!r} has no edge in this run, so no token can come there")
         point = Breakpoint(place, _path(place, labels), self.remove)
@@ -335,8 +325,7 @@ class Pausing:
         return point
 
     def _labels(self, place: Any) -> list[str]:
-        core = self._engine.core
-        return [edge.label for edge in edges_at(self._engine, place) if edge.target.core is core]
+        return [edge.label for edge in edges_at(self._engine, place)]
 
     def _find_again(self, edited: Edited) -> None:
         """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4)."""
@@ -397,7 +386,9 @@ def _any_works(workers: list[Worker]) -> bool:
 
 
 def _next_kind(worker: Worker) -> str:
-    """What a worker in a run queue would do; "" if what it was queued for is gone."""
+    """What a worker in a run queue would do; "" if what it was queued for is gone, or is no firing of a node."""
+    if worker.is_boundary_output:
+        return ""
     calls = worker.calls
     if worker.placed and not (calls and worker.ahead):
         return "firing"

@@ -13,9 +13,8 @@ from typing import Any
 
 import msgspec
 
-from hfg.engine.editing.plan_index import PlanIndex, edge_place, home_of
+from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.model.worker import Worker
-from hfg.errors import UsageError
 from hfg.graph import Graph
 from hfg.graph.editing.changes import (
     Change,
@@ -32,8 +31,8 @@ from hfg.graph.editing.changes import (
 from hfg.graph.flat import ROOT, EdgeFollower, End, FlatEdge, FlatGraph
 from hfg.graph.structure.edge import Edge, is_feed, type_of
 from hfg.graph.structure.level import Level, level_of
-from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.options import NodeOptions, in_group
+from hfg.graph.structure.places import edge_place, home_of, side_of
 from hfg.graph.structure.subgraph import inside, is_box, iterated
 from hfg.ports import InnerSource, InnerTarget
 from hfg.ports.edges import BufferEdge
@@ -88,12 +87,7 @@ def diff(graph: Graph, index: PlanIndex, changes: Sequence[Change]) -> PlanDiff:
       index: of the plan, which is as it was before them; nothing of it is changed but the order of its nodes, which
         also holds without them.
       changes: all since the plan was made or edited last.
-
-    Raises:
-      UsageError: a change is one that no run can follow: inside a subgraph that iterates.
     """
-    for change in changes:
-        _refuse_iterating(change)
     comparing = _Comparing(graph, index, changes)
     comparing.nodes()
     comparing.edges()
@@ -148,13 +142,13 @@ class _Comparing:
         found.gates = any(isinstance(change, GateChange) for change in self.changes)
 
     def _within(self, node: Any, was: Level | None, levels: list[Level] | None) -> Iterator[Any]:
-        """A node and all inside it, unless it iterates; notes the levels inside."""
+        """A node and all inside it; notes the levels inside."""
         waiting = [(node, was)]
         while waiting:
             one, was = waiting.pop()
             yield one
             level = inside(one) or was
-            if level is None or self._is_leaf(one):
+            if level is None:
                 continue
             if levels is not None:
                 levels.append(level)
@@ -170,14 +164,11 @@ class _Comparing:
         if not stays:
             if worker is not None:
                 (found.gone if leaf else found.boxes_gone).append(worker)
-                if worker.iteration is not None:
-                    raise _cannot_iterate(worker.path)
             return
         options = _options_of(node)
         self.found.doubtful |= options.group is not None and options.group not in self.graph.groups
         if worker is None:
-            if leaf and iterated(node):
-                raise _cannot_iterate(node._place.path)
+            found.doubtful |= node._type.is_source and side_of(level_of(node._place.graph)).owner is not None
             (found.come if leaf else found.boxes_come)[node] = options
             return
         if moved:
@@ -272,11 +263,12 @@ class _Comparing:
         roomy = bool(way.initial or way.buffer) and not way.is_event_edge  # another kind of edge
         source, target = way.source, way.target
         begin, end = self._of_node(source.port) or source.port, self._of_node(target.port) or target.port
-        return begin, source.kind, source.name, end, target.kind, target.name, roomy
+        return begin, _kind(source.port), source.name, end, _kind(target.port), target.name, roomy
 
     def _of_node(self, port: Any) -> Worker | None:
+        """The worker of a port's node; that of a port's inner side is known by the port alone (G4)."""
         node = getattr(port, "node", None)
-        return None if node is None else self.worker_of(node)
+        return None if node is None or isinstance(port, InnerSource | InnerTarget) else self.worker_of(node)
 
     # --- soundness
 
@@ -340,13 +332,19 @@ class _Comparing:
             if key in into:
                 return True
             into.add(key)
-            worker = self._of_node(target)
+            worker = self._at_border(target) if isinstance(target, InnerTarget) else self._of_node(target)
             for other in () if worker is None else worker.edges_in():
                 if other in lost or other in kept or other.target_port is not target:
                     continue
                 if other.target_kind == way.target.kind and (alone or other.source_port is source):
                     return True
         return False
+
+    def _at_border(self, port: InnerTarget[Any]) -> Worker | None:
+        """Who reads what comes out of a subgraph that iterates, if anybody does."""
+        box = self.worker_of(port.node)
+        readers = () if box is None or box.iteration is None else box.iteration.readers
+        return next((reader for reader in readers if reader.port_name == port.name), None)
 
     # --- who must rest
 
@@ -381,8 +379,12 @@ def _ends_of_running(edge: Any) -> tuple[Any, ...]:
     begin = edge.source if edge.source.node is not None else edge.source_port
     end = edge.target if edge.target.node is not None else edge.target_port
     source, target = edge.source_port, edge.target_port
-    kind, name = ("observable", "observable") if is_feed(source) else (source.kind, source.name)
-    return begin, kind, name, end, target.kind, target.name, type(edge) is BufferEdge
+    name = "observable" if is_feed(source) else source.name
+    return begin, _kind(source), name, end, _kind(target), target.name, type(edge) is BufferEdge
+
+
+def _kind(port: Any) -> str:
+    return "observable" if is_feed(port) else str(port.kind)
 
 
 def _is_in(node: Any, graph: Graph) -> bool:
@@ -492,17 +494,16 @@ class _Follower(EdgeFollower):
         if is_feed(port):
             return End(ROOT, "observable", "observable", port)
         if isinstance(port, InnerSource | InnerTarget):
-            return None  # of what iterates: no edge leads there from outside (rule G4)
-        node = port.node
-        if node is self.flat.graph:
-            return End(ROOT, port.kind, port.name, port)
-        around: Level | None = level_of(node._place.graph)
-        while around is not None:
-            if iterated(around.owner):
-                self._report_border(port)
-                return None
-            around = around.around
-        return End(0, port.kind, port.name, port)
+            return super()._make_end(port)
+        return End(ROOT if port.node is self.flat.graph else 0, port.kind, port.name, port)
+
+    def _finish(self, source: Any, target: Any, segments: tuple[Edge, ...], via: tuple[Any, ...]) -> None:
+        """An edge has both ends inside of the same subgraphs that iterate: nothing else crosses their borders (G4)."""
+        inside = {_side_of_port(port, self.flat.graph) for port in (source, target) if not is_feed(port)}
+        if len(inside) > 1:
+            self._report_border(target)
+        else:
+            super()._finish(source, target, segments, via)
 
     def _label(self, source: End, target: End) -> str:
         return f"{_end_path(source.port)} -> {_end_path(target.port)}"
@@ -512,26 +513,10 @@ def _end_path(port: Any) -> str:
     return "observable" if is_feed(port) else str(port.path)
 
 
-# --- refusals ---
-
-
-def _refuse_iterating(change: Change) -> None:
-    around: Level | None = getattr(change, "level", None)
-    if around is None:
-        place = getattr(getattr(change, "node", None) or getattr(change, "new", None), "_place", None)
-        around = None if place is None else level_of(place.graph)
-    if isinstance(change, ParameterChange):
-        return
-    while around is not None and around.owner is not None:
-        if iterated(around.owner) and not isinstance(change, Renaming):
-            raise _cannot_iterate(path_of(around.owner))
-        around = around.around
-    if isinstance(change, NodeChange) and change.options.iterate_over:
-        raise _cannot_iterate(change.name)
-
-
-def _cannot_iterate(path: str) -> UsageError:
-    return UsageError(
-        f'"{path}" iterates over collections, and what iterates is not added, removed or changed inside while the '
-        "graph runs: stop the run, then graph.edit(...)"
-    )
+def _side_of_port(port: Any, graph: Graph) -> Level:
+    """On which side of the borders of what iterates a port is; the inner side of such a border is inside."""
+    if port.node is graph:
+        return level_of(graph)
+    level = inside(port.node) if isinstance(port, InnerSource | InnerTarget) else level_of(port.node._place.graph)
+    assert level is not None
+    return side_of(level)

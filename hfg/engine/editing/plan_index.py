@@ -12,12 +12,10 @@ from typing import Any
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import Worker
-from hfg.graph import Graph
-from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.sequence import Sequence
 from hfg.ports.edges import EventEdge
 
-__all__ = ["PlanIndex", "TopologicalOrder", "edge_place", "home_of", "node_place"]
+__all__ = ["PlanIndex", "TopologicalOrder"]
 
 _JOINED = ("input", "parameter")
 
@@ -64,31 +62,6 @@ class PlanIndex:
     def block(self, begin: Any) -> list[Any]:
         """Give the running edges that begin with a drawn one, in order."""
         return [edge for edge in self.passing.get(begin, ()) if edge.segments[0] is begin]
-
-
-def node_place(node: Any) -> tuple[float, ...]:
-    """Give what tells where a node or subgraph comes in depth-first order of adding."""
-    place: list[float] = []
-    while node is not None:
-        level = level_of(node._place.graph)
-        place.append(level.members.order.label(node))
-        node = level.owner
-    return tuple(reversed(place))
-
-
-def edge_place(level: Level, edge: Any) -> tuple[tuple[float, ...], float]:
-    """Give what tells where the edges that begin with a declared one come in the order of the plan."""
-    around = () if level.owner is None else node_place(level.owner)
-    return around, level.connections.order.label(edge)
-
-
-def home_of(edge: Any, graph: Graph) -> Level:
-    """Give the level at which an edge is declared; ports of the whole may be named anywhere."""
-    for end in (edge.target, edge.source):
-        around = getattr(end, "graph", None)
-        if isinstance(around, Graph) and edge in level_of(around).connections.order:
-            return level_of(around)
-    return level_of(graph)
 
 
 class TopologicalOrder:

@@ -38,7 +38,7 @@ def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
         wrong = one.spec.check(value)
         if wrong is not None:
             raise ValueError(f'parameter "{one.path}" {wrong}')
-    workers = {worker.node: worker for worker in engine.all_workers() if worker.node is not None}
+    workers = {worker.node: worker for worker in engine.core.workers if worker.node is not None}
     if any(one.node not in workers for one in reached):
         raise UsageError(f'"{port.path}" is no parameter of this run: its graph is another one, or it was never added')
     refuse_without_effect([(one.node, one.name) for one in reached], workers.values())

@@ -11,7 +11,7 @@ import contextlib
 import contextvars
 import inspect
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import CoroutineType
 from typing import Any, Protocol
@@ -46,9 +46,6 @@ class _Pump(Protocol):
     """What is told that code has come back: the engine."""
 
     beside_work: int
-
-    def all_workers(self) -> Iterator[Worker]:
-        """Those inside iterations too."""
 
     def guard(self, call: Callable[[], None]) -> None:
         """Call something of ours; what it raises ends the run."""
@@ -158,11 +155,8 @@ class CodeRunner:
                 done(result, error)
             except Exception as fault:
                 self._engine.internal_fault(fault)
-            if inside is not None:
-                inside.look_later()
             engine.go_on()
 
-        inside = worker.core.inside
         outer = self.core
         engine = self._engine
         carrier = worker.carrier
@@ -198,8 +192,6 @@ class CodeRunner:
                 self.came_back.set()
             if not self.core.over or closing or always:
                 done(job.result, job.error)
-            if worker.core.inside is not None:
-                worker.core.inside.look_later()
 
         worker_job = Job(worker, back, call, arguments, done)
         worker.take_job(worker_job)
@@ -221,7 +213,7 @@ class CodeRunner:
         """X3: after so many real seconds virtual time goes on without the work that is in threads now."""
         loop = self.loop
         if isinstance(loop, VirtualTimeLoop):
-            for worker in self._engine.all_workers():
+            for worker in self.core.workers:
                 if worker.job is not None and worker.job.held is not None:
                     worker.job.held.limit(seconds, partial(self._hold_no_more, worker.job))
 

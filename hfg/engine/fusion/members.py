@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from hfg.engine.model.core import Core
 from hfg.engine.model.policies import Fifo
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.ports.edges import SyncEdge
@@ -88,22 +87,22 @@ def may_be_called(worker: Worker) -> bool:
 def lives_by_its_slots(worker: Worker) -> bool:
     """Its calls may go the fast path: nobody looks, and nothing depends on its activity but itself."""
     options = worker.options
-    if options is None or worker.group.threaded or worker.is_source or worker.in_edges or not _may_be_fast(worker.core):
+    if options is None or worker.group.threaded or worker.is_source or worker.in_edges or not _may_be_fast(worker):
         return False
     held = worker.gates_over or worker.ready_hook is not None or options.max_rate_hz or options.max_duration_s
     looked_at = worker.observed or worker.on_idle is not None or worker.scopes or worker.watched
     return bool(worker.slot_edges) and not held and not looked_at
 
 
-def _may_be_fast(core: Core) -> bool:
-    """Nobody looks at all that happens in the run."""
-    return core.fast and not core.debug and core.trace is None
+def _may_be_fast(worker: Worker) -> bool:
+    """Nobody looks at all that happens in the run, and no border behind each step (G4)."""
+    core = worker.core
+    return core.fast and not core.debug and core.trace is None and worker.within is None
 
 
 def is_plain_and_fed(worker: Worker) -> bool:
     """Whether it is a source, or a function with an edge into each input that it waits for, and nobody looks."""
-    core = worker.core
-    if not _may_be_fast(core) or core.inside is not None:
+    if not _may_be_fast(worker):
         return False
     if worker.type is None or worker.process is None or not _is_plain(worker):
         return False

@@ -126,6 +126,7 @@ def _may_be_short(event: RunningEvent, edge: EventEdge) -> bool:
         and not edge.while_active
         and edge.overflow == "wait"
         and edge.pipeline is None
+        and event.worker.within is None
         and not event.worker.watched
     )
 

@@ -14,7 +14,7 @@ from hfg.engine.fusion.slots import calls_step
 from hfg.engine.fusion.threads import SOONER_IN_THREADS, ThreadRegion
 from hfg.engine.fusion.waiting import waiting_step
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import firing
+from hfg.engine.rules import firing, iterating
 
 __all__ = ["specialise"]
 
@@ -33,12 +33,10 @@ def specialise(worker: Worker) -> None:
 
 
 def _step_of(worker: Worker) -> Step:
-    core = worker.core
+    if worker.within is not None:  # its border looks behind each step whether that was the last (G4)
+        return iterating.step
     if worker.is_boundary_output:
         return worker.process if worker.process is not None else _leave_lying
-    if core.inside is not None:  # one that iterates itself, too: whoever is around it counts what is queued (G3, G4)
-        step: Step = core.inside.step
-        return step
     if lives_by_its_slots(worker):
         return calls_step(worker)
     if not is_plain_and_fed(worker):

@@ -9,23 +9,23 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter, deque
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.errors import EngineInternalError, HfgError
-from hfg.graph.flat import FlatGraph
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.ports.events import EventPort
 from hfg.token import Token
 from hfg.trace import TraceEvent
 
 if TYPE_CHECKING:
-    from hfg.engine.model.groups import Group
+    pass
 
-__all__ = ["PENDING", "Code", "Core", "Host", "Iterating", "Region", "Timer", "Upstairs"]
+__all__ = ["PENDING", "Code", "Core", "Host", "Region", "Timer", "Upstairs"]
 
 
 class _Pending:
@@ -76,22 +76,6 @@ class Region(Protocol):
 
     def disarm(self) -> None:
         """Let each member's barriers say what it waits for."""
-
-
-class Iterating(Protocol):
-    """The inside of a subgraph that iterates (G4), as those outside of it know it."""
-
-    core: Core
-    looks: bool
-
-    def begin(self, arguments: Sequence[Any]) -> None:
-        """The subgraph fires: its elements go in, one after the other."""
-
-    def look_later(self) -> None:
-        """Something inside has come to its end: it may be quiet now."""
-
-    async def looked(self) -> None:
-        """Wait until it was seen whether it is."""
 
 
 class Timer(Protocol):
@@ -217,8 +201,8 @@ class Upstairs(Protocol):
     def bind_ports(self, worker: Worker) -> None:
         """A node is about to be set up: its ports lead into the run."""
 
-    def iteration(self, worker: Worker, flat: FlatGraph, groups: Mapping[str, Group], loop: Group) -> Iterating:
-        """Make the inside of a subgraph that iterates (G4)."""
+    def iterate(self, worker: Worker, arguments: Sequence[Any]) -> None:
+        """A subgraph that iterates fires (G4)."""
 
 
 class Core:
@@ -243,7 +227,6 @@ class Core:
         self.debug = False
         self.fast = True
         self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
-        self.inside: Any = None  # the iteration whose inside this is (G4)
         self.started = False
         self.over = False
         self.held = False  # the run is paused: nodes move one by one
@@ -271,6 +254,7 @@ class Core:
 
     def _has_nothing_under_way(self) -> None:
         self.in_flight = 0
+        self.iterating: list[Iteration] = []  # subgraphs amid a firing in which they iterate, inner ones behind (G4)
         self.full_edges = 0  # queues that hold their sources back (F8)
         self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
         self.timers = 0

@@ -18,8 +18,9 @@ from hfg.ports.edges import Edge
 from hfg.ports.events import EventPort
 
 if TYPE_CHECKING:
-    from hfg.engine.model.core import Core, Iterating
+    from hfg.engine.model.core import Core
     from hfg.engine.model.groups import Group
+    from hfg.engine.model.iteration import Iteration
     from hfg.engine.model.scopes import Gate, Scope
     from hfg.engine.model.worker import Worker
 
@@ -82,6 +83,7 @@ class Vertex:
       plain_handlers: slot -> callable(value), where that is the same.
       silent_code: a function: it can neither send nor trigger by itself.
       port_name: of a graph input or output.
+      iteration: its border, if it is a subgraph that iterates; `within`: that of the innermost one around it (G4).
       scope: it stands for this subgraph's automatic ports.
       around: the subgraphs around it; `scopes`: those of them that are watched.
       paced: a rate or a throttling gate may hold its firings.
@@ -133,6 +135,7 @@ class Vertex:
         "wants_token",
         "watched",
         "wired_out",
+        "within",
     )
 
     def __init__(self, core: Core, path: str, node: Node | None, options: NodeOptions | None, group: Group) -> None:
@@ -152,6 +155,7 @@ class Vertex:
         self.port_name = ""
         self.is_boundary_output = False
         self.scope: Scope | None = None
+        self.within: Iteration | None = None
         self.around: tuple[Scope, ...] = ()
         self.scopes: tuple[Scope, ...] = ()
         self.gates_over: tuple[Gate, ...] = ()
@@ -170,7 +174,7 @@ class Vertex:
         self.process: Callable[..., Any] | None = None
         self.ready_hook: Callable[[], Any] | None = None
         self.has_hooks = False
-        self.iteration: Any = None
+        self.iteration: Iteration | None = None
 
     def _has_no_edges(self) -> None:
         self.in_edges: tuple[Any, ...] = ()
@@ -212,11 +216,15 @@ class Vertex:
         """Whether there is async code in its node."""
         return self.type is not None and (self.is_async or any(slot.is_async for slot in self.type.slots.values()))
 
-    def iterate(self, iteration: Iterating) -> None:
+    def iterate(self, iteration: Iteration) -> None:
         """G4: its process function is the inside of a subgraph, which sees the elements one by one."""
         self.iteration = iteration
-        self.process = iteration.begin
+        self.process = self.core.upstairs.iterate  # to which `firing` comes by itself; without one it would be no node
         self.is_source = False
+
+    def lie_within(self, iteration: Iteration) -> None:
+        """G4: the innermost subgraph around it that iterates is this one's."""
+        self.within = iteration
 
     def run_by(self, process: Callable[..., Any]) -> None:
         """This runs in place of its node's own process function: it measures that, or takes what came out."""

@@ -715,6 +715,16 @@ class Worker(Vertex):
         """Its wiring, or somebody's interest in it, is another: how it does its next piece of work is chosen anew."""
         self.core.upstairs.choose_step(self)
 
+    def moves_by_itself(self) -> bool:
+        """Whether something of it is under way or will be, without anybody else; not who only waits for room (F8)."""
+        return (
+            self.queued
+            or (self.busy != "" and not self.waiting_room)
+            or self.rate_timer is not None
+            or self.backoff_timer is not None
+            or (self.active_timer is not None and self.timeout_leads_somewhere())
+        )
+
     def is_on_fast_path(self) -> bool:
         """Whether a call of its code is under way that `busy` does not tell, by a fast path."""
         return self.stamp is not None or (self.region is not None and self.region.is_calling(self))

@@ -64,7 +64,7 @@ def glance_at(engine: Engine) -> Glance:
     nodes = []
     engine.core.settle_counts()
     engine.core.settle_barriers()
-    for worker in engine.all_workers():
+    for worker in engine.core.workers:
         if worker.type is None or worker.scope is not None:
             continue
         meter = worker.meter

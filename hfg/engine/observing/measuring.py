@@ -103,7 +103,7 @@ class Measuring:
             self._end()
 
     def _workers(self) -> Iterator[Worker]:
-        return (worker for worker in self._engine.all_workers() if worker.type is not None and worker.scope is None)
+        return (worker for worker in self._engine.core.workers if worker.type is not None and worker.scope is None)
 
     def _meter(self, worker: Worker) -> Meter:
         meter: Meter | None = worker.meter
@@ -185,7 +185,7 @@ class Measuring:
         self._marks = {edge: edge.sent for edge in self._edges()}
 
     def _edges(self) -> Iterator[Any]:
-        return (edge for core in self._engine.all_cores() for edge in core.edges)
+        return iter(self._engine.core.edges)
 
     # --- the snapshot -----------------------------------------------------------------------------------------------
 

@@ -225,11 +225,10 @@ class Taps:
 
     def _outside(self, path: Any) -> Any:
         """An edge by which signals come from outside the graph."""
-        edges = (edge for core in self._engine.all_cores() for edge in core.outside.values())
-        return next((edge for edge in edges if edge.label == path), None)
+        return next((edge for edge in self._engine.core.outside.values() if edge.label == path), None)
 
     def _edges(self) -> Iterator[Any]:
-        return (edge for core in self._engine.all_cores() for edge in core.edges)
+        return iter(self._engine.core.edges)
 
     def _places(self, what: object) -> list[tuple[Any, list[Any]]]:
         """Where to look: edges, events, slots; with an edge come those that carry the same tokens."""
@@ -283,7 +282,7 @@ class Taps:
             boundary = self._engine.core.boundary
             assert boundary is not None
             return boundary
-        return next(worker for worker in self._engine.all_workers() if worker.node is port.node)
+        return next(worker for worker in self._engine.core.workers if worker.node is port.node)
 
 
 def _with_same_tokens(edges: Iterable[Any]) -> list[tuple[Any, list[Any]]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dis
 from collections.abc import Callable
 
+from hfg.engine.model.iteration import amid_element
 from hfg.engine.model.worker import BACKOFF, Worker
 from hfg.engine.rules import calls, firing, lifecycle
 from hfg.engine.rules.modifiers import automatic, report_error
@@ -28,10 +29,10 @@ def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
         cause = (
             "EndOfStream was raised, but a node ends in process() or ready() alone: keep it in mind, and raise it there"
         )
-    elif isinstance(error, Exception) and what.startswith("firing"):
+    elif isinstance(error, Exception) and what.startswith("firing") and worker.iteration is None:
         blame = _wrong_value(worker, error)
         cause = f"{in_words(error)}; {blame}" if blame else error
-    problem = NodeError(worker.path, what, cause)
+    problem = NodeError(worker.path, what + amid_element(worker), cause)
     problem.__cause__ = error
     return problem
 
@@ -125,7 +126,7 @@ def time_out(worker: Worker) -> None:
     """X2: the firing has taken longer than `max_duration_s`: it is given up, its late result ignored."""
     worker.out_of_time()
     limit = worker.options.max_duration_s
-    what = f"firing {worker.firings}"
+    what = f"firing {worker.firings}{amid_element(worker)}"
     worker.core.code.interrupt(worker)
     problem = FiringTimeout(worker.path, what, f"it took longer than max_duration_s = {limit:g} s and was given up")
     worker.count_failure()
@@ -135,7 +136,7 @@ def time_out(worker: Worker) -> None:
 def operator_failed(edge: EventEdge, error: BaseException) -> None:
     """An operator on the edge raised: the consumer's `on_error` decides (ARCHITECTURE §3)."""
     target: Worker = edge.target
-    problem = NodeError(target.path, f'an operator on edge "{edge.label}"', error)
+    problem = NodeError(target.path, f'an operator on edge "{edge.label}"{amid_element(target)}', error)
     problem.__cause__ = error
     if target in (target.core.current, target.core.speaker):  # it has triggered into itself: that is over first
         target.core.after(0.0, lambda: apply_policy(target, problem, answer=False))

@@ -262,9 +262,8 @@ def _arguments(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]
 
 def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
     arguments = tuple(_arguments(worker, edges, tokens))
-    iteration = worker.iteration
-    if iteration is not None:
-        iteration.begin(arguments)
+    if worker.iteration is not None:
+        worker.core.upstairs.iterate(worker, arguments)
         return
     kind = worker.type.process_kind
     call: Any = worker.process

@@ -43,7 +43,8 @@ def find_listeners(worker: Worker) -> None:
 
 def _listeners(worker: Worker, edges: tuple[Any, ...]) -> Listeners | None:
     quiet = [edge for edge in edges if edge.while_active and type(edge) is SyncEdge and not edge.active]
-    if len(quiet) < _FEW or not worker.core.fast or any(edge.tap is not None for edge in quiet):
+    fast = worker.core.fast and worker.within is None
+    if len(quiet) < _FEW or not fast or any(edge.tap is not None for edge in quiet):
         return None
     return Listeners(worker, edges, quiet)
 

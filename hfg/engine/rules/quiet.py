@@ -6,6 +6,7 @@ Decides only; `run` asks when it sees that no code runs, no worker is queued and
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from hfg.engine.model.core import Core
@@ -46,15 +47,21 @@ __all__ = [
 ]
 
 
-def grow(core: Core) -> bool:
-    """F8: if only full queues hold nodes back, the smallest of them gets one more place."""
+def grow(core: Core, among: Sequence[Worker] | None = None) -> bool:
+    """F8: if only full queues hold nodes back, the smallest of them gets one more place.
+
+    Args:
+      core: the run.
+      among: those inside of a subgraph that iterates, where nothing else moves (G4); else all.
+    """
     if not core.full_edges:
         return False
-    if any(reader.inputs_ready() for reader in core.readers):
+    if among is None and any(reader.inputs_ready() for reader in core.readers):
         return False  # somebody outside holds a node back: growing would not help, only fill memory
-    if any([_rate_holds(worker) for worker in core.workers]):  # noqa: C419 - each sets its timer
+    workers = core.workers if among is None else among
+    if any([_rate_holds(worker) for worker in workers]):  # noqa: C419 - each sets its timer
         return False
-    held = [worker for worker in core.workers if _held_by_queue_alone(worker)]
+    held = [worker for worker in workers if _held_by_queue_alone(worker)]
     full = [edge for worker in held for edge in worker.event_edges() if edge.full]
     if not full:
         return False
@@ -115,13 +122,14 @@ def complete_edge(edge: EventEdge) -> bool:
 def end_events(core: Core) -> bool:
     """F13: all live event edges into inputs whose queue is empty get END, at the same moment and once.
 
-    Graph inputs that nobody feeds likewise.
+    Graph inputs that nobody feeds likewise; not what is inside of what iterates, where nobody ever ends (G4).
     """
     edges = [
         edge
         for edge in core.edges
         if type(edge) is EventEdge
         and edge.target_kind == "input"
+        and edge.target.within is None
         and edge.live
         and not edge.end_sent
         and not edge.queue
@@ -212,6 +220,7 @@ def _lies_for_good(edge: AnyEdge) -> bool:
     target: Worker = edge.target
     return (
         edge.untaken > 0
+        and target.within is None  # what is kept inside of what iterates waits for its next firing (G4)
         and bool(edge.live or edge.source.blocked & DISABLED)
         and not target.blocked & (DISABLED | ENDED)
         and not (target.is_boundary_output and all(token.value is END for token in edge.contents()))

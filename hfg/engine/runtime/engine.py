@@ -12,7 +12,7 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from hfg.clock import current_clock
@@ -23,7 +23,7 @@ from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
 from hfg.engine.model.policies import make_policy
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import quiet
+from hfg.engine.rules import iterating, quiet
 from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime.callbacks import Callbacks
 from hfg.engine.runtime.settings import Settings
@@ -151,18 +151,6 @@ class Engine:
 
     # --- groups -----------------------------------------------------------------------------------------------------
 
-    def all_cores(self) -> Iterator[Core]:
-        """The run itself and those inside iterations."""
-        stack = [self.core]
-        while stack:
-            core = stack.pop()
-            yield core
-            stack.extend(worker.iteration.core for worker in core.workers if worker.iteration is not None)
-
-    def all_workers(self) -> Iterator[Worker]:
-        """Those inside iterations too."""
-        return (worker for core in self.all_cores() for worker in core.workers)
-
     def worker_of(self, node: Node | Graph) -> Worker:
         """Find who runs a node, or what stands for the graph itself.
 
@@ -203,9 +191,8 @@ class Engine:
         Raises:
           EngineInternalError: one of them does not hold.
         """
-        for core in self.all_cores():
-            if len(core.workers) <= _MOST_CHECKED:
-                core.check_invariants()
+        if len(self.core.workers) <= _MOST_CHECKED:
+            self.core.check_invariants()
 
     def on_loop(self) -> bool:
         """Whether the caller is on the run's own thread."""
@@ -263,7 +250,8 @@ class Engine:
             call()
         if self.ended_how is not None or self._rests():
             return
-        if policy or self._ready_groups:
+        went_on = bool(self.core.iterating) and iterating.settle(self.core)
+        if policy or self._ready_groups or went_on:
             self.kick()
         else:
             self._settle()
@@ -299,18 +287,11 @@ class Engine:
     def _rests(self) -> bool:
         """R3: paused, so nothing new starts: it is quiet when nothing is under way, but does not end by that."""
         if self.core.held:
-            if not self.is_under_way():
+            if not self.core.in_flight:
                 self._answer_quiet()
             for call in self.callbacks.rested:
                 call()
         return self.core.held
-
-    def is_under_way(self) -> bool:
-        """Whether something comes to its end by itself; what iterates does not while its inside is held (R3, G4)."""
-        return any(
-            core.in_flight > sum(worker.in_flight for worker in core.workers if worker.iteration is not None)
-            for core in self.all_cores()
-        )
 
     def internal_fault(self, error: BaseException) -> None:
         """A fault of ours must end the run, not hang it."""
@@ -507,8 +488,7 @@ class Engine:
         for region in self.core.regions:
             region.interrupt()
         self.ended_at = self.now()
-        for worker in self.all_workers():
-            worker.core.over = True
+        for worker in self.core.workers:
             worker.run_over()
         for call in self.callbacks.finished:
             call()

@@ -79,7 +79,7 @@ class Lifetime:
         engine.kick()
 
     async def _set_up_all(self, core: Core) -> bool:
-        """Set up every node in order of adding, those inside an iteration right behind it; whether all went well."""
+        """Set up every node in order of adding; whether all went well."""
         engine = self._engine
         for worker in core.workers:
             self.carry(worker)
@@ -93,10 +93,6 @@ class Lifetime:
                 await self._set_up_one(worker)
             if engine.ended_how is not None:
                 return False
-            if worker.iteration is not None:
-                if not await self._set_up_all(worker.iteration.core):
-                    return False
-                worker.iteration.core.started = True
         for worker in core.workers:
             engine_ports.bind_automatic(worker)
             worker.watch()
@@ -109,17 +105,11 @@ class Lifetime:
         lifecycle.discard_initial(
             edge for edge in core.edges if isinstance(edge, BufferEdge | EventEdge) and edge.initial
         )
-        for worker in core.workers:
-            if worker.iteration is not None:
-                self._discard_initial(worker.iteration.core)
 
     def _connect_operators(self, core: Core) -> None:
         """P9: before anything is triggered; what they give out by themselves is the first of all."""
         for edge, operators in core.piped:
             self.pipe(edge, operators)
-        for worker in core.workers:
-            if worker.iteration is not None:
-                self._connect_operators(worker.iteration.core)
 
     def _open_sources(self, core: Core) -> None:
         """Sources may fire from now on, as far as their gates allow."""
@@ -128,8 +118,6 @@ class Lifetime:
                 gate_changed(worker.gates_over)
             worker.allow(STARTING)
             consider(worker)
-            if worker.iteration is not None:
-                self._open_sources(worker.iteration.core)
 
     def carry(self, worker: Worker) -> None:
         """Give an async node its dormant task."""
@@ -255,7 +243,7 @@ class Lifetime:
     def _let_go(self) -> None:
         """Whatever happened: nothing of the run goes on, and the graph is free."""
         engine = self._engine
-        for worker in engine.all_workers():
+        for worker in engine.core.workers:
             engine_ports.release_ports(worker)
             worker.cancel_timers()
         for carrier in self._carriers():
@@ -268,7 +256,7 @@ class Lifetime:
 
     def _carriers(self) -> list[Any]:
         engine = self._engine
-        return [worker.carrier for worker in engine.all_workers() if worker.carrier is not None] + list(
+        return [worker.carrier for worker in engine.core.workers if worker.carrier is not None] + list(
             engine.code.given_up
         )
 
@@ -327,7 +315,7 @@ class Lifetime:
     async def _cancel_code(self) -> dict[Worker, NodeError]:
         """Cancel what still waits; threads get their time to come back. Gives back who did not."""
         code = self._engine.code
-        busy = [worker for worker in self._engine.all_workers() if worker.in_flight and worker.iteration is None]
+        busy = [worker for worker in self._engine.core.workers if worker.in_flight]
         for worker in busy:
             worker.give_up_firing()
             if worker.carrier is not None:

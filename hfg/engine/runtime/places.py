@@ -61,7 +61,7 @@ def edges_at(engine: Engine, place: Any) -> list[Any]:
 
 
 def _edges(engine: Engine) -> Iterator[Any]:
-    return (edge for core in engine.all_cores() for edge in core.edges if edge.segments)
+    return (edge for edge in engine.core.edges if edge.segments)
 
 
 def is_near(place: Any, nodes: Set[Any]) -> bool:

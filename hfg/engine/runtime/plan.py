@@ -5,17 +5,19 @@ Stands on `graph.flat`, `worker` and `wiring`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
+from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import DISABLED, STARTING, UNWIRED, Worker
 from hfg.engine.rules.wiring import is_live, rewire
 from hfg.errors import GraphError, UsageError
 from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat import Scope as FlatScope
+from hfg.graph.structure.places import edge_place, home_of, node_place
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 
 __all__ = [
@@ -39,39 +41,89 @@ _OF_ACTIVITY = ("activated", "deactivated", "timeout")  # the events that tell i
 
 
 def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Group) -> None:
-    """Make the workers and edges of a run; nothing is set up and nothing lies on the edges yet."""
-    workers = [make_worker(core, flat_node, groups) for flat_node in flat.nodes]
-    core.workers.extend(workers)
-    core.by_path.update((worker.path, worker) for worker in workers)
-    _add_scopes(core, flat, workers, loop)
+    """Make the workers and edges of a run; nothing is set up and nothing lies on the edges yet.
+
+    What is inside of subgraphs that iterate is part of it, in depth-first order of adding like all else (G4).
+    """
+    parts = [_Part(flat, None)]
+    for part in parts:  # grows while it is walked through
+        part.make_workers(core, groups, loop)
+        parts += [
+            _Part(node.iteration, worker.iteration)
+            for node, worker in zip(part.flat.nodes, part.workers, strict=True)
+            if node.iteration is not None
+        ]
+    leaves = [worker for part in parts for worker in part.workers]
+    owners = [owner for part in parts for owner in part.owners]
+    if len(parts) > 1:
+        leaves.sort(key=lambda worker: node_place(worker.node))
+        owners.sort(key=lambda owner: node_place(owner.node))
     boundary = core.boundary = Worker(core, "", None, None, loop)
-    core.workers.append(boundary)
-    ends = Ends(core, workers, boundary, loop)
-    for flat_edge in flat.edges:
-        _add_edge(core, flat_edge, ends)
+    core.workers += [*leaves, *owners, boundary]
+    for part in parts:
+        ends = Ends(core, loop, part.around, part.workers, part.scopes)
+        for flat_edge in part.flat.edges:
+            _add_edge(core, flat_edge, ends)
+    if len(parts) > 1:
+        core.edges.sort(key=lambda edge: edge_place(home_of(edge.segments[0], flat.graph), edge.segments[0]))
+        for index, edge in enumerate(core.edges):
+            edge.renumber(index)
+    for owner in owners:
+        assert owner.scope is not None
+        owner.scope.renumber(len(core.scopes))
+        core.scopes.append(owner.scope)
     for worker in core.workers:
         if not worker.own_enabled or any(not scope.enabled for scope in worker.around):
             worker.block(DISABLED)
-    _set_gates(core, flat, workers)
+    for part in parts:
+        part.set_gates(core)
     for scope in core.scopes:
         mark_scope(scope)
     for worker in core.workers:
         worker.watch()
     for edge in core.edges:
         edge.enliven(is_live(edge))
-    core.sources.extend(worker for worker in workers if worker.is_source)
+    core.sources.extend(worker for worker in leaves if worker.is_source)
 
 
-def _add_scopes(core: Core, flat: FlatGraph, workers: list[Worker], loop: Group) -> None:
-    """Make the subgraphs, which stand behind all nodes; each node knows those around it, outermost first."""
-    for flat_scope in flat.scopes:
-        parent = core.scopes[flat_scope.parent] if flat_scope.parent is not None else None
-        scope, owner = add_scope(core, flat_scope, parent, loop)
-        core.scopes.append(scope)
-        owner.lie_in(scope.and_around())
-        core.workers.append(owner)
-    for flat_scope, scope in zip(flat.scopes, core.scopes, strict=True):
-        scope.take_in([workers[index] for index in flat_scope.members])
+class _Part:
+    """What becomes of one flat graph: of the whole, or of the inside of a subgraph that iterates.
+
+    Attributes:
+      around: the border of that subgraph.
+      workers, scopes: by their numbers in the flat graph; `owners`: the workers of the scopes.
+    """
+
+    def __init__(self, flat: FlatGraph, around: Iteration | None) -> None:
+        self.flat = flat
+        self.around = around
+        self.workers: list[Worker] = []
+        self.scopes: list[Scope] = []
+        self.owners: list[Worker] = []
+
+    def make_workers(self, core: Core, groups: Mapping[str, Group], loop: Group) -> None:
+        """Make the workers of nodes and subgraphs; each node knows those around it, outermost first."""
+        self.workers = [make_worker(core, flat_node, groups) for flat_node in self.flat.nodes]
+        core.by_path.update((worker.path, worker) for worker in self.workers)
+        for flat_scope in self.flat.scopes:
+            parent = self.scopes[flat_scope.parent] if flat_scope.parent is not None else None
+            scope, owner = add_scope(core, flat_scope, parent, loop)
+            owner.lie_in(scope.and_around())
+            self.scopes.append(scope)
+            self.owners.append(owner)
+        for flat_scope, scope in zip(self.flat.scopes, self.scopes, strict=True):
+            scope.take_in([self.workers[index] for index in flat_scope.members])
+        if self.around is not None:
+            for worker in (*self.workers, *self.owners):
+                self.around.join(worker)
+
+    def set_gates(self, core: Core) -> None:
+        """Couple the work of gated nodes to the activity of others (A11)."""
+        for flat_gate in self.flat.gates:
+            by, target = flat_gate.by, flat_gate.target
+            state = self.scopes[scope_end(by)] if by < 0 else self.workers[by]
+            gated = self.scopes[scope_end(target)].members if target < 0 else [self.workers[target]]
+            core.gates.append(Gate(state, flat_gate.idle_rate_hz, gated))
 
 
 def add_scope(core: Core, flat_scope: FlatScope, parent: Scope | None, loop: Group) -> tuple[Scope, Worker]:
@@ -95,59 +147,75 @@ def _add_edge(core: Core, flat: FlatEdge, ends: Ends) -> None:
         edge.pipe(_not_piped_yet, None)
 
 
-def _set_gates(core: Core, flat: FlatGraph, workers: list[Worker]) -> None:
-    """Couple the work of gated nodes to the activity of others (A11)."""
-    for flat_gate in flat.gates:
-        by, target = flat_gate.by, flat_gate.target
-        state = core.scopes[scope_end(by)] if by < 0 else workers[by]
-        gated = core.scopes[scope_end(target)].members if target < 0 else [workers[target]]
-        core.gates.append(Gate(state, flat_gate.idle_rate_hz, gated))
-
-
 class Ends:
-    """Finds the worker at the end of an edge; the graph's own inputs and outputs each have one."""
+    """Finds the worker at the end of an edge; each input and output of the graph, or of what iterates, has one."""
 
-    def __init__(self, core: Core, workers: list[Worker], boundary: Worker, loop: Group) -> None:
+    def __init__(
+        self,
+        core: Core,
+        loop: Group,
+        around: Iteration | None = None,
+        workers: Sequence[Worker] = (),
+        scopes: Sequence[Scope] = (),
+    ) -> None:
         self.core = core
-        self.workers = workers
-        self.boundary = boundary
         self.loop = loop
-        self.feeds: dict[str, Worker] = {worker.port_name: worker for worker in core.feeds}
-        self.readers: dict[str, Worker] = {worker.port_name: worker for worker in core.readers}
+        self._around = around
+        self._workers = workers
+        self._scopes = scopes
 
     def of(self, end: End) -> Worker:
         """Give the worker."""
         if end.node >= 0:
-            return self.workers[end.node]
+            return self._workers[end.node]
         if end.node < -1:
-            owner = self.core.scopes[-2 - end.node].worker
+            owner = self._scopes[scope_end(end.node)].worker
             assert owner is not None
             return owner
-        return self._at_border(end)
+        return self.at_border(end, self._around)
 
     def scopes_of(self, flat: FlatEdge) -> tuple[Scope, ...]:
         """Give the scopes through whose ports an edge passes."""
-        return tuple(self.core.scopes[scope] for scope in flat.via)
+        return tuple(self._scopes[scope] for scope in flat.via)
 
-    def _at_border(self, end: End) -> Worker:
+    def at_border(self, end: End, around: Iteration | None) -> Worker:
+        """Give who stands for a port of the graph itself, or for the inner side of one of what iterates."""
+        border = self.core if around is None else around
         if end.kind == "output":
-            return self._outside(self.feeds, end.name, self.core.feeds, Worker.be_graph_input)
+            return _known(border.feeds, end.name) or self._feed(border, end.name, around)
         if end.kind == "input":
-            return self._outside(self.readers, end.name, self.core.readers, Worker.be_graph_output)
+            return _known(border.readers, end.name) or self._reader(border, end.name, around)
         if end.kind == "observable":
-            return self._outside({}, end.name, [], Worker.stand_outside)
-        return self.boundary
+            outside = self._make()
+            outside.stand_outside(end.name)
+            return outside
+        assert self.core.boundary is not None
+        return self.core.boundary
 
-    def _outside(
-        self, known: dict[str, Worker], name: str, listed: list[Worker], become: Callable[[Worker, str], None]
-    ) -> Worker:
-        worker = known.get(name)
-        if worker is None:
-            worker = known[name] = Worker(self.core, "", None, None, self.loop)
-            become(worker, name)
-            self.core.workers.append(worker)
-            listed.append(worker)
+    def _feed(self, border: Core | Iteration, name: str, around: Iteration | None) -> Worker:
+        feed = self._make()
+        feed.be_graph_input(name)
+        border.feeds.append(feed)
+        if around is not None:
+            feed.lie_within(around)
+        return feed
+
+    def _reader(self, border: Core | Iteration, name: str, around: Iteration | None) -> Worker:
+        reader = self._make()
+        reader.be_graph_output(name)
+        border.readers.append(reader)
+        if around is not None:
+            around.join(reader)
+        return reader
+
+    def _make(self) -> Worker:
+        worker = Worker(self.core, "", None, None, self.loop)
+        self.core.workers.append(worker)
         return worker
+
+
+def _known(border: Sequence[Worker], name: str) -> Worker | None:
+    return next((worker for worker in border if worker.port_name == name), None)
 
 
 def make_worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) -> Worker:
@@ -156,8 +224,8 @@ def make_worker(core: Core, flat_node: FlatNode, groups: Mapping[str, Group]) ->
     group = groups[options.group or "loop"]
     worker = Worker(core, flat_node.path, flat_node.node, options, group)
     worker.fit(flat_node.node)
-    if flat_node.iteration is not None:
-        worker.iterate(core.upstairs.iteration(worker, flat_node.iteration, groups, groups["loop"]))
+    if options.iterate_over:
+        worker.iterate(Iteration(worker))
     if worker.is_source:
         worker.block(STARTING)
     if group.threaded and worker.may_wait():

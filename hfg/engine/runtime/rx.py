@@ -17,13 +17,14 @@ from typing import Any, Final
 
 import reactivex
 from reactivex import abc, typing
-from reactivex.disposable import Disposable, SerialDisposable, SingleAssignmentDisposable
+from reactivex.disposable import CompositeDisposable, Disposable, SerialDisposable, SingleAssignmentDisposable
 from reactivex.observer import Observer
 from reactivex.scheduler.periodicscheduler import PeriodicScheduler
 from reactivex.subject import Subject
 from typing_extensions import override
 
 from hfg.engine.model.core import Host
+from hfg.engine.model.iteration import Iteration
 from hfg.engine.rules.errors import operator_failed
 from hfg.engine.rules.modifiers import drop
 from hfg.engine.rules.sending import enqueue
@@ -81,11 +82,13 @@ class RunScheduler(PeriodicScheduler):
 class _EdgeScheduler(RunScheduler):
     """For operators on one edge: what is to be done now is done at once, one after the other (P9).
 
-    As reactivex does it where nobody names a scheduler. What never comes to an end lets the loop have its turn.
+    As reactivex does it where nobody names a scheduler. What never comes to an end lets the loop have its turn. Inside
+    of what iterates the next element waits until nothing is pending any more (G4).
     """
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: Host, within: Iteration | None) -> None:
         super().__init__(host)
+        self._within = within
         self._due: deque[Callable[[], None]] = deque()
         self._at_work = False
 
@@ -103,6 +106,22 @@ class _EdgeScheduler(RunScheduler):
             self._work()
         return inner
 
+    @override
+    def _at(self, when: float, action: abc.ScheduledAction[Any], state: Any) -> abc.DisposableBase:
+        within = self._within
+        if within is None:
+            return super()._at(when, action, state)
+        pending = SingleAssignmentDisposable()
+        pending.disposable = Disposable(within.timer_over)  # once, whether it rings or is given up
+        within.set_timer()
+
+        def ring(scheduler: abc.SchedulerBase, state: Any) -> abc.DisposableBase | None:
+            pending.dispose()
+            return action(scheduler, state)
+
+        timer = super()._at(when, ring, state)
+        return CompositeDisposable(timer, pending)
+
     def _work(self) -> None:
         self._at_work = True
         try:
@@ -119,7 +138,7 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callab
     """Put operators on an event edge, in front of its queue; gives back what takes them off."""
     newest = [0.0]
     subscription = SerialDisposable()
-    scheduler = _EdgeScheduler(host)
+    scheduler = _EdgeScheduler(host, edge.target.within)
 
     def connect() -> None:
         subject: Subject[Any] = Subject()

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from hfg.engine.fusion.specialise import specialise
-from hfg.engine.rules import activity, agenda, errors, quiet, sending, wiring
+from hfg.engine.rules import activity, agenda, errors, iterating, quiet, sending, wiring
 from hfg.engine.runtime import ports
-from hfg.engine.runtime.iteration import Iteration
 
 __all__ = ["Deciders"]
 
@@ -25,4 +24,4 @@ class Deciders:
     rewire = staticmethod(wiring.rewire)
     choose_step = staticmethod(specialise)
     bind_ports = staticmethod(ports.bind)
-    iteration = staticmethod(Iteration)
+    iterate = staticmethod(iterating.begin)

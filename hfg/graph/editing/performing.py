@@ -39,6 +39,7 @@ from hfg.graph.structure.gating import refuse_gate
 from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import edge_options
+from hfg.graph.structure.places import side_of
 from hfg.graph.structure.pointing import level_and_name, node_at, parameter_at, source_at, target_at
 from hfg.graph.structure.promoting import refuse_standing, stands_for
 from hfg.graph.structure.subgraph import is_box
@@ -237,7 +238,13 @@ class _Hand:
     def _gate(self, command: c.Gate) -> None:
         gate = Gate(node_at(self.root, command.path), node_at(self.root, command.by), command.idle_rate_hz)
         refuse_gate(self.root, gate)
-        self.do(GateChange(self.root, gate, len(self.root.gates.listed), added=True))
+        level, other = (side_of(level_of(node.place.graph)) for node in (gate.target, gate.by))
+        if level is not other:
+            raise GraphError(
+                f'"{command.path}" and "{command.by}" lie on two sides of the border of a subgraph that iterates, over '
+                "which no gate reaches (rule G4); gate nodes on the same side"
+            )
+        self.do(GateChange(level, gate, len(level.gates.listed), added=True))
 
     def _ungate(self, command: c.Ungate) -> None:
         node = node_at(self.root, command.path)

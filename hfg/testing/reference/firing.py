@@ -223,10 +223,13 @@ class Firing(RunningCode):
         station = flight.station
         over = station.leaf.options.iterate_over
         given = dict(zip(station.type.inputs, arguments, strict=True))
-        columns = {name: list(given[name]) for name in over}
-        lengths = {len(column) for column in columns.values()}
-        if len(lengths) > 1:
-            self.fail_firing(flight, ValueError(f"the collections have unequal lengths: {sorted(lengths)}"))
+        try:
+            columns = {name: list(given[name]) for name in over}
+            lengths = {len(column) for column in columns.values()}
+            if len(lengths) > 1:
+                raise ValueError(f"the collections have unequal lengths: {sorted(lengths)}")
+        except Exception as error:
+            self.fail_firing(flight, error)
             return
         count = lengths.pop() if lengths else 0
         flight.results = {name: [] for name in station.type.outputs}
@@ -246,6 +249,10 @@ class Firing(RunningCode):
             self.end_firing(flight, "done")
             return
         element, boundary = flight.elements.pop(0), boundary_of(station.leaf.index)
+        if not self.outputs_are_free(boundary):
+            flight.elements = None
+            self.fail_firing(flight, ValueError("an element lies untaken at the border, so the next cannot go in"))
+            return
         for name, value in element.items():
             lines = self.lines_from(boundary, "output", name)
             self.send(boundary, [(line, NO_MESSAGE if value is None else value, None, flight.stamp) for line in lines])

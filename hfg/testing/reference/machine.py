@@ -158,7 +158,10 @@ class ReferenceMachine(Editing):
         return move.kind == "call" or (move.kind == "go on" and self.stations[index].is_calling)
 
     def working_moves(self, only: Collection[int] | None = None) -> list[Move]:
-        """Firings, calls, and what goes on in those under way; of all nodes, or `only` of some."""
+        """Firings, calls, and what goes on in those under way; of all nodes, or `only` of some.
+
+        Also the queues that grow inside of what iterates, where it is quiet whatever the others do (F8, G4).
+        """
         found = [Move("feed", edge=name) for name, values in self.feeding.items() if values and self.can_feed(name)]
         found += self.timers_due()
         found += [Move("read", edge=line.edge.label) for line in self.lines if line.queue and self.is_read(line)]
@@ -173,6 +176,10 @@ class ReferenceMachine(Editing):
                 number = flight.number if station.is_concurrent and flight.what == "firing" else 0
                 if self.can_go_on(flight):
                     found.append(Move("go on", station.path, number=number))
+                elif flight.elements is not None:
+                    inside = self.all_inside(index)
+                    line = None if self.is_moving_inside(index, inside) else self.queue_to_grow(inside)
+                    found += [] if line is None else [Move("grow", edge=line.edge.label)]
                 limit = station.leaf.options.max_duration_s
                 if limit is not None and self.is_limited(flight) and self.is_over(flight.began + limit):
                     found.append(Move("time out", station.path, number=number))
@@ -204,21 +211,39 @@ class ReferenceMachine(Editing):
         target = line.edge.target
         return self.is_outside(target.owner) and target.kind == "input" and target.name not in self.unread
 
-    def is_quiet_inside(self, index: int) -> bool:
-        """Whether nothing moves inside an iterating subgraph (G4)."""
-        inside = {number for number in range(len(self.stations)) if self.is_inside(number, index)}
-        paths = {self.stations[number].path for number in inside}
-        paths |= {box.path for box in self.structure.boxes if inside & set(box.members)}
+    def can_iterate(self, index: int) -> bool:
+        """Whether the next element may go in: it is quiet inside (G4)."""
+        inside = self.all_inside(index)
+        return not self.is_moving_inside(index, inside) and self.queue_to_grow(inside) is None
+
+    def is_moving_inside(self, index: int, inside: Set[int]) -> bool:
+        """Whether something happens inside an iterating subgraph, or will when time goes on; full queues apart."""
+        boxes = [box for box in self.structure.boxes if inside & set(box.members)]
+        paths = {self.stations[number].path for number in inside} | {box.path for box in boxes}
         for move in self.working_moves(inside):
             line = self.labels.get(move.edge)
             if move.node in paths or (line is not None and line.edge.within in (index, *inside)):
-                return False
-        return not any(
-            self.stations[number].flights
-            or self.may_fire(number, ignore="timers")
-            or self.may_fire(number, ignore="queues")
-            for number in inside
+                return True
+        timed = [*inside, *(-2 - box.index for box in boxes)]
+        return (
+            any(self.time_of_timeout(owner) is not None for owner in timed)
+            or any(self.is_moving(number) for number in inside)
+            or any(
+                line.operators is not None and line.operators.due() is not None
+                for line in self.lines
+                if line.edge.within in (index, *inside)
+            )
         )
+
+    def is_moving(self, index: int) -> bool:
+        """Whether a node works, or waits for a time to come; not if its code waits until a queue has room (F8)."""
+        station = self.stations[index]
+        works = any(not flight.waiting_for for flight in station.flights)
+        return works or station.resting_until is not None or self.may_fire(index, ignore="timers")
+
+    def all_inside(self, index: int) -> set[int]:
+        """Give all nodes inside an iterating subgraph."""
+        return {number for number in range(len(self.stations)) if self.is_inside(number, index)}
 
     def is_inside(self, index: int, around: int) -> bool:
         """Whether a node belongs to what iterates, directly or inside another one that does (G3, G4)."""
@@ -315,10 +340,12 @@ class ReferenceMachine(Editing):
                 times.append(max(due, self.now))
         return min((time for time in times if time is not None), default=None)
 
-    def queue_to_grow(self) -> Line | None:
-        """F8: if only full queues hold nodes back, the smallest of those queues."""
+    def queue_to_grow(self, only: Collection[int] | None = None) -> Line | None:
+        """F8: if only full queues hold nodes back, of all or `only` of some, the smallest of those queues."""
         full: list[Line] = []
         for index, station in enumerate(self.stations):
+            if only is not None and index not in only:
+                continue
             waits = any(flight.waiting_for for flight in station.flights)
             held = (not station.is_busy and self.may_fire(index, ignore="queues")) or (
                 not (station.is_calling if station.is_concurrent else station.flights)
@@ -327,6 +354,8 @@ class ReferenceMachine(Editing):
             if waits or (held and station.resting_until is None):
                 full += self.full_lines(index)
         for box in self.structure.boxes:
+            if only is not None and not set(box.members) & set(only):
+                continue
             if self.next_call(-2 - box.index) is not None:
                 full += self.full_lines(-2 - box.index)
         return min(full, key=lambda line: (line.capacity, line.edge.index), default=None)
@@ -350,7 +379,10 @@ class ReferenceMachine(Editing):
         return owner >= 0 and self.stations[owner].ending
 
     def stalled(self) -> list[str]:
-        """R5: sources that have not ended and are blocked, and edges with tokens that can never be taken."""
+        """R5: sources that have not ended and are blocked, and edges with tokens that can never be taken.
+
+        What is kept inside of what iterates waits for its next firing.
+        """
         found = []
         moot = self.moot_sources()
         for index, station in enumerate(self.stations):
@@ -364,7 +396,9 @@ class ReferenceMachine(Editing):
             ):
                 found.append(station.path)
         return found + [
-            line.edge.label for line in self.lines if line.queue and self.is_enabled(line.edge.target.owner)
+            line.edge.label
+            for line in self.lines
+            if line.queue and line.edge.within is None and self.is_enabled(line.edge.target.owner)
         ]
 
     def moot_sources(self) -> set[int]:

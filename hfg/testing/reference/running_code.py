@@ -133,15 +133,15 @@ class RunningCode(Sending):
             others = [one for one in flight.station.firings_under_way if not one.waits_to_end]
             return not others and flight.station.firings_under_way[0] is flight
         if flight.elements is not None:
-            return self.is_quiet_inside(flight.station.leaf.index)
+            return self.can_iterate(flight.station.leaf.index)
         if flight.task is None:
             return flight.in_thread
         if flight.waiting_for and self.has_no_room(flight.station, flight.waiting_for):
             return False
         return self.loop.can_step(flight)
 
-    def is_quiet_inside(self, index: int) -> bool:
-        """Whether nothing moves inside an iterating subgraph (G4)."""
+    def can_iterate(self, index: int) -> bool:
+        """Whether the next element may go into an iterating subgraph (G4)."""
         raise NotImplementedError
 
     def go_on_iterating(self, flight: Flight) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from hfg.errors import EndOfStream, NodeError
-from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, boundary_of, is_box, whole
+from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, is_box, whole
 from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import TraceEvent
@@ -273,15 +273,13 @@ class State:
             return True
         if is_box(owner):
             return self._box_open(-2 - owner)
-        if owner < 0:
-            return self.is_enabled(boundary_of(0) - owner)
+        if owner < 0:  # the border of what iterates: a firing under way is finished (F10)
+            return True
         station = self.stations[owner]
-        around = station.leaf.within
         return (
             station.enabled
             and station.afterwards != "enable"
             and all(self._box_open(box) for box in station.leaf.boxes)
-            and (around is None or self.is_enabled(around))
         )
 
     def _box_open(self, box: int) -> bool:
