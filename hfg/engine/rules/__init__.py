@@ -9,6 +9,7 @@ wiring      which edges are live         subgraphs   as wholes
 lifecycle   setup, teardown, restart, disable, enable
 ending      of one node                  sources     which rest, or work for nobody
 quiet       what happens when nothing moves          errors  what becomes of failures
+iterating   when what iterates lets the next element in (G4)
 """
 
 __all__: list[str] = []

@@ -92,9 +92,11 @@ def _fail(iteration: Iteration, occupied: Sequence[Any]) -> None:
     """The present element cannot go in."""
     worker = iteration.worker
     labels = ", ".join(f'"{edge.label}"' for edge in occupied[:3])
+    target: Worker = occupied[0].target
+    who = "" if target.is_boundary_output else f'"{target.path}" '
     problem = ValueError(
         f"element {iteration.position} of {iteration.count} cannot go in, for the one before lies untaken on {labels} "
-        f"and nothing moves inside any more: {quiet.waits_for(occupied[0].target)}; let each element be taken"
+        f"and nothing moves inside any more: {who}{quiet.waits_for(target)}; let each element be taken"
     )
     worker.core.iterating.remove(iteration)
     iteration.end()
