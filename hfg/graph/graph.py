@@ -427,6 +427,16 @@ class Graph:
         """
         transactions.edit(self, commands)
 
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an edit to take back; of the last 1,000."""
+        return bool(self._level.whole.history.done)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether an edit was undone last, so that it can be carried out again."""
+        return bool(self._level.whole.history.undone)
+
     def undo(self) -> None:
         """Take the last edit back: everything is exactly as before it.
 

@@ -13,6 +13,7 @@ import hfg
 from hfg import commands as c
 from hfg.errors import GraphError, HfgError, UsageError
 from hfg.graph.flat import flatten
+from hfg.graph.structure.history import MOST_STEPS
 from hfg.testing.edits import drawn, random_edit
 from hfg.testing.making import Allowed, SeededChooser, random_plan
 from hfg.testing.nodes import Counter, Scaled, Tally, add, double, script, sink
@@ -439,3 +440,18 @@ def test_a_node_whose_parameter_is_promoted_is_replaced_by_one_that_can_take_it(
 def test_a_module_that_was_never_imported_is_named() -> None:
     with pytest.raises(GraphError, match='module "nowhere" cannot be reloaded: it is not imported'):
         chain().reload("nowhere")
+
+
+@pytest.mark.rule("R4")
+def test_the_last_thousand_edits_can_be_taken_back_and_no_more_are_kept() -> None:
+    graph = hfg.Graph()
+    graph.edit(c.Add("hfg.testing.nodes:double", "n0"))
+    assert (graph.can_undo, graph.can_redo) == (True, False)
+    for number in range(MOST_STEPS):
+        graph.edit(c.Rename(f"n{number}", f"n{number + 1}"))
+    for _ in range(MOST_STEPS):
+        graph.undo()
+    assert list(graph.nodes) == ["n0"]  # that it was added is final by now
+    assert (graph.can_undo, graph.can_redo) == (False, True)
+    graph.redo()
+    assert list(graph.nodes) == ["n1"]

@@ -6,11 +6,14 @@ Two stacks: what lies on them is the matter of who edits. Knows no graph.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from hfg.errors import UsageError
 
-__all__ = ["History"]
+__all__ = ["MOST_STEPS", "History"]
+
+MOST_STEPS: Final = 1000
+"""How many edits can be taken back; what was done before them is final. Each keeps 0.3 to 2 kB."""
 
 Step = TypeVar("Step")
 
@@ -35,6 +38,7 @@ class History(Generic[Step]):
     def note(self, step: Step) -> None:
         """An edit was carried out."""
         self.done.append(step)
+        del self.done[:-MOST_STEPS]
         self.undone.clear()
         self._by_hand = False
 
