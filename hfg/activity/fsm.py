@@ -15,7 +15,7 @@ from hfg.activity.machine_dicts import read
 from hfg.activity.translation import build, read_out
 from hfg.graph import Graph
 from hfg.nodetype import Node
-from hfg.ports import Source
+from hfg.ports import SlotPort, Source
 from hfg.problem import Problem
 
 __all__ = ["StateMachine"]
@@ -139,7 +139,7 @@ class StateMachine:
 
     # --- graphs ---
 
-    def graph(self, name: str = "machine", *, nodes: Mapping[str, Node] | None = None) -> Graph:
+    def graph(self, name: str = "machine", *, nodes: Mapping[str, Node | SlotPort[Any]] | None = None) -> Graph:
         """Make a graph of it, whose input "letters" takes the words; the arguments are those of `build`."""
         graph = Graph(name)
         self.build(graph, letters=graph.input("letters", str), nodes=nodes)
@@ -151,7 +151,7 @@ class StateMachine:
         *,
         letters: Source[str] | None = None,
         begin: Source[Any] | None = None,
-        nodes: Mapping[str, Node] | None = None,
+        nodes: Mapping[str, Node | SlotPort[Any]] | None = None,
     ) -> dict[str, Node]:
         """Add it to a graph: a node for each state, an active edge for each transition (rule A13).
 
@@ -161,7 +161,8 @@ class StateMachine:
             it, states leave by their own events alone.
           begin: whose signal makes the initial state active; by default the graph's `start`.
           nodes: nodes of your own for some of the states, in the graph already or not. The letters they answer are
-            events of these names; activity comes in by a slot `enter` if they have one, else by `activate`. Derive from
+            events of these names; activity comes in by a slot `enter`, or by the slot that is given in place of the
+            node, `{"open": door.begin}`, or else by `activate`. Derive from
             `hfg.activity.StateNode` to get the usual behaviour.
 
         Returns:

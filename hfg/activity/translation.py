@@ -19,6 +19,7 @@ from hfg.graph.structure.finding import candidates
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
+from hfg.ports import SlotPort
 from hfg.problem import Problem
 
 __all__ = ["build", "read_out"]
@@ -36,11 +37,13 @@ def build(machine: Described, graph: Graph, letters: Any, begin: Any, given: Map
     for one in machine.transitions:
         answers[one.source].append(one.letter)
     reject(f"{level_of(graph).title} cannot take this machine", _unfit(machine, graph, answers, given))
-    states = {state: _state(machine, graph, state, answers[state], given.get(state)) for state in machine.states}
+    nodes = {state: _node_of(one) for state, one in given.items()}
+    states = {state: _state(machine, graph, state, answers[state], nodes.get(state)) for state in machine.states}
+    entries = {state: _way_in(node, given.get(state)) for state, node in states.items()}
     source = graph.start if begin is None else begin
-    graph.connect(source, _way_in(states[machine.initial]), active=True)
+    graph.connect(source, entries[machine.initial], active=True)
     for one in machine.transitions:
-        graph.connect(_way_out(states[one.source], one.letter), _way_in(states[one.target]), active=True)
+        graph.connect(_way_out(states[one.source], one.letter), entries[one.target], active=True)
     if machine.missing == "dead":
         _add_dead(graph, states)
     if letters is not None:
@@ -54,9 +57,16 @@ def _state(machine: Described, graph: Graph, state: str, letters: list[str], giv
     return graph.add(state_type(letters)(final=state in machine.final) if given is None else given, name=state)
 
 
-def _way_in(node: Node) -> Any:
+def _way_in(node: Node, given: Any = None) -> Any:
     """Give the slot by which activity comes into a state; every node has one, if no other then the automatic one."""
+    if isinstance(given, SlotPort):
+        return given
     return node.ports.slots["enter" if "enter" in node._type.slots else "activate"]
+
+
+def _node_of(given: Any) -> Any:
+    """A state is given as its node, or as the slot of the node by which activity comes in."""
+    return given.node if isinstance(given, SlotPort) else given
 
 
 def _way_out(node: Node, letter: str) -> Any:
@@ -95,7 +105,8 @@ def _unfit(
     machine: Described, graph: Graph, answers: Mapping[str, list[str]], given: Mapping[str, Any]
 ) -> Iterator[Problem]:
     """Give every reason why the graph cannot be built."""
-    for state, node in given.items():
+    for state, one in given.items():
+        node = _node_of(one)
         if state not in answers:
             states = both(machine.states)
             yield error(f"nodes[{state!r}]", "the machine has no such state", f"it has {states}", "correct the name")
@@ -112,7 +123,7 @@ def _unfit(
                 "make another",
             )
         else:
-            yield from _unfit_node(node, state, answers[state])
+            yield from _unfit_node(node, state, answers[state], has_entry=node is not one)
     for state in machine.states:
         if state in given:
             continue
@@ -132,9 +143,17 @@ def _unfit(
             )
 
 
-def _unfit_node(node: Node, state: str, letters: list[str]) -> Iterator[Problem]:
+def _unfit_node(node: Node, state: str, letters: list[str], *, has_entry: bool) -> Iterator[Problem]:
     kind = node._type
-    if is_box(node) and "enter" not in kind.slots:
+    others = [name for name in kind.slots if name not in ("enter", "read")]
+    if not has_entry and not is_box(node) and "enter" not in kind.slots and others:
+        yield error(
+            f"nodes[{state!r}]",
+            f"{kind.qualname} has no slot `enter`, but {both(others)}",
+            "by which of its slots activity comes into the state cannot be told",
+            f"give the slot itself, nodes={{{state!r}: node.{others[0]}}}, or node.activate if none is to be called",
+        )
+    if is_box(node) and not has_entry and "enter" not in kind.slots:
         yield error(
             f"nodes[{state!r}]",
             f"the subgraph {kind.qualname} has no slot `enter`",

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from hfg.cli import show
-from hfg.cli.options import TargetArgument
+from hfg.cli.options import ArgOption, TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import CheckFailed, HfgError, MachineError, TargetError
 from hfg.graph import Graph
@@ -23,6 +23,7 @@ __all__ = ["check"]
 
 def check(
     target: TargetArgument,
+    arg: ArgOption = None,
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
@@ -31,7 +32,7 @@ def check(
     graph: Graph | None = None
     with keep_refusals() as problems:
         try:
-            graph = load_graph(target)
+            graph = load_graph(target, arg or [])
         except TargetError as error:
             if not isinstance(error.__cause__, Exception):
                 raise  # there is no such target: nothing was looked at

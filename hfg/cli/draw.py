@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from hfg.cli import show
-from hfg.cli.options import TargetArgument
+from hfg.cli.options import ArgOption, TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import UsageError
 from hfg.graph.drawing import FORMATS
@@ -22,6 +22,7 @@ def draw(
     out: Annotated[
         Path | None, typer.Argument(help="a file that ends in .mmd or .dot; without it, standard output")
     ] = None,
+    arg: ArgOption = None,
     format: Annotated[  # noqa: A002 - the word users know
         Literal["mmd", "dot"], typer.Option("--format", help="What goes to standard output: Mermaid or Graphviz.")
     ] = "mmd",
@@ -29,7 +30,7 @@ def draw(
 ) -> int:
     """Draw a graph without running it."""
     show.set_debug(debug)
-    graph = load_graph(target)
+    graph = load_graph(target, arg or [])
     if out is None:
         sys.stdout.write(FORMATS[f".{format}"](graph))
         return 0

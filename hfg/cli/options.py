@@ -9,7 +9,7 @@ import typer
 
 from hfg.cli import completing
 
-__all__ = ["Clock", "ClockOption", "DebugOption", "ParamOption", "TargetArgument", "UntilOption"]
+__all__ = ["ArgOption", "Clock", "ClockOption", "DebugOption", "ParamOption", "TargetArgument", "UntilOption"]
 
 
 class Clock(StrEnum):
@@ -39,6 +39,13 @@ ParamOption = Annotated[
         metavar="PATH=VALUE",
         help="Set a parameter, as in lookup.tolerance=0.2; may be given several times.",
         autocompletion=completing.parameters,
+    ),
+]
+ArgOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=VALUE",
+        help="An argument of the function that builds the graph, as in count=3; may be given several times.",
     ),
 ]
 DebugOption = Annotated[

@@ -20,7 +20,7 @@ from hfg.cli.encoding import encode
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.live import live_table
-from hfg.cli.options import Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
+from hfg.cli.options import ArgOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
 from hfg.errors import TargetError
@@ -36,6 +36,7 @@ def run(
     clock: ClockOption = Clock.real,
     until: UntilOption = None,
     param: ParamOption = None,
+    arg: ArgOption = None,
     policy: Annotated[str | None, typer.Option(help="Which node is next: fifo, priority, random ...")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the policy random.")] = None,
     trace: Annotated[
@@ -59,7 +60,7 @@ def run(
     """Run a graph to its end; Ctrl-C ends it earlier, twice at once."""
     show.set_debug(debug)
     show.log_to_stderr(verbose, debug)
-    graph = load_graph(target)
+    graph = load_graph(target, arg or [])
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()
     with (

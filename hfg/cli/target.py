@@ -1,6 +1,6 @@
 """Finds what TARGET names: `package.module:graph`, `file.py` or `file.py:graph`; a graph, or a function that makes one.
 
-The file or module is imported as Python itself would import it. Stands on the graph floor; runs nothing.
+The file or module is imported as Python itself would import it. Stands on `arguments` and the graph floor.
 """
 
 from __future__ import annotations
@@ -10,19 +10,24 @@ import importlib.util
 import inspect
 import sys
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from hfg.cli.arguments import builder_arguments
 from hfg.errors import TargetError, in_words
 from hfg.graph import Graph
 
 __all__ = ["load_graph", "load_module"]
 
 
-def load_graph(target: str) -> Graph:
+def load_graph(target: str, given: Sequence[str] = ()) -> Graph:
     """Import the target and give back its graph, built if need be.
+
+    Args:
+      target: as users write it.
+      given: arguments of the function that builds it, "count=3" each.
 
     Raises:
       TargetError: there is no such file, module or name, its code fails, or what it names is no graph; `__cause__` is
@@ -30,11 +35,14 @@ def load_graph(target: str) -> Graph:
     """
     place, name = _split(target)
     module = load_module(place)
-    found = _named(module, name, place) if name else _only(module, place)
+    found = _named(module, name, place, bool(given)) if name else _only(module, place, bool(given))
     if isinstance(found, Graph):
+        if given:
+            raise TargetError(f"{place} holds a graph that is built already, so --arg {given[0]} means nothing to it")
         return found
+    arguments = builder_arguments(place, found, given)
     try:
-        graph = found()
+        graph = found(**arguments)
     except SystemExit as error:
         raise TargetError(f"{place}: {_name(found)}() left the program; let it return the graph instead") from error
     except Exception as error:
@@ -127,21 +135,23 @@ def _split(target: str) -> tuple[str, str]:
     return target, ""
 
 
-def _named(module: ModuleType, name: str, place: str) -> Any:
+def _named(module: ModuleType, name: str, place: str, has_arguments: bool) -> Any:
     found: Any = module
     for part in name.split("."):
         if not hasattr(found, part):
             raise TargetError(f'{place} has no "{name}"; {_there_are(module)}')
         found = getattr(found, part)
-    if isinstance(found, Graph) or _can_build(found):
+    if isinstance(found, Graph) or _can_build(found) or (has_arguments and inspect.isroutine(found)):
         return found
     if callable(found) and not isinstance(found, type):
-        raise TargetError(f"{place}:{name} needs arguments to build a graph: {_signature(found)}; give them defaults")
+        raise TargetError(
+            f"{place}:{name} needs arguments to build a graph: {_signature(found)}; give them, as in --arg NAME=VALUE"
+        )
     raise TargetError(f"{place}:{name} is {_a(found)}, no Graph and no function that builds one; {_there_are(module)}")
 
 
-def _only(module: ModuleType, place: str) -> Any:
-    for candidates in (_graphs(module), _builders(module)):
+def _only(module: ModuleType, place: str, has_arguments: bool) -> Any:
+    for candidates in (() if has_arguments else (_graphs(module),)) + (_builders(module, has_arguments),):
         if len(candidates) == 1:
             return next(iter(candidates.values()))
         if candidates:
@@ -170,13 +180,13 @@ def _graphs(module: ModuleType) -> dict[str, Graph]:
     return found
 
 
-def _builders(module: ModuleType) -> dict[str, Callable[[], Any]]:
-    """The functions that a module defines itself and that promise a graph."""
+def _builders(module: ModuleType, has_arguments: bool = False) -> dict[str, Callable[..., Any]]:
+    """The functions that a module defines itself and that promise a graph; without arguments, if none are given."""
     return {
         name: value
         for name, value in vars(module).items()
         if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_")
-        if _can_build(value) and _promises_graph(value)
+        if (has_arguments or _can_build(value)) and _promises_graph(value)
     }
 
 

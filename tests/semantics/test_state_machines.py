@@ -138,3 +138,46 @@ def test_signals_in_one_burst_are_read_one_after_the_other() -> None:
     for seed in range(20):
         report = hfg.run(graph, clock="virtual", policy="random", seed=seed)
         assert [path for path, node in report.nodes.items() if node.active] == ["z"]
+
+
+# --- states of one's own ---
+
+
+class Door(hfg.Node):
+    """A state with a way in of its own name."""
+
+    push = hfg.Event()
+    begun = hfg.State(0)
+
+    @hfg.slot
+    def begin(self) -> None:
+        self.begun += 1
+
+    @hfg.slot
+    def read(self, letter: str) -> None:
+        if self.active and letter == "push":
+            self.push.trigger()
+
+
+@pytest.mark.rule("A13")
+def test_the_slot_of_a_state_by_which_activity_comes_in_is_given_in_place_of_the_node() -> None:
+    machine = hfg.StateMachine(["closed", "open"], [("push", "closed", "open")], initial="closed")
+    closed, opened = Door(), Door()
+    graph = machine.graph(nodes={"closed": closed.begin, "open": opened.begin})
+
+    async def main() -> list[str]:
+        async with hfg.running(graph) as run, run.feed("letters") as feed:
+            await feed.send("push")
+            await run.wait_quiet()
+            return run.active()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        assert runner.run(main()) == ["open"]
+    assert (closed.begun, opened.begun) == (1, 1)
+
+
+@pytest.mark.rule("A13")
+def test_a_state_whose_way_in_cannot_be_told_is_refused() -> None:
+    machine = hfg.StateMachine(["closed", "open"], [("push", "closed", "open")], initial="closed")
+    with pytest.raises(hfg.errors.MachineError, match=r"Door has no slot `enter`.*nodes=\{'closed': node.begin\}"):
+        machine.graph(nodes={"closed": Door()})

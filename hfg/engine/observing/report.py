@@ -8,6 +8,7 @@ import msgspec
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import ENDED
+from hfg.engine.observing.tables import seconds, table
 
 __all__ = ["EdgeReport", "NodeReport", "Report", "edge_reports", "node_reports"]
 
@@ -77,6 +78,23 @@ class Report(msgspec.Struct, frozen=True):
     outputs: dict[str, list[Any]]
     errors: list[str]
     lost_activity: int
+
+    def __str__(self) -> str:
+        """A table of the nodes, and one of the edges; what nobody has is left out."""
+        lines = [f"{self.outcome} after {seconds(self.duration_s)}, {self.firings} firings"]
+        nodes = [
+            (path, one.firings, one.silent, one.calls, one.failed, one.restarts, one.active, one.ended)
+            for path, one in self.nodes.items()
+        ]
+        lines += ["", *table(("node", "firings", "silent", "calls", "failed", "restarts", "active", "ended"), nodes)]
+        edges = [
+            (label, one.sent, one.dropped, one.drained, one.untaken, one.grown) for label, one in self.edges.items()
+        ]
+        if edges:
+            lines += ["", *table(("edge", "sent", "dropped", "drained", "untaken", "grown"), edges)]
+        if self.lost_activity:
+            lines += ["", f"activity was lost {self.lost_activity} times"]
+        return "\n".join([*lines, *([""] if self.errors else []), *self.errors])
 
 
 def node_reports(core: Core) -> dict[str, NodeReport]:

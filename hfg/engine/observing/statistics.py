@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
+from hfg.engine.observing.tables import seconds, table
+
 __all__ = ["EdgeStatistics", "GroupStatistics", "NodeStatistics", "Statistics", "Times"]
 
 
@@ -146,3 +148,33 @@ class Statistics(msgspec.Struct, frozen=True):
     groups: dict[str, GroupStatistics]
     lost_activity: int
     errors: list[str]
+
+    def __str__(self) -> str:
+        """A table of the nodes, and one of the edges; what nobody has is left out."""
+        nodes = [
+            (
+                path,
+                one.group,
+                one.firings,
+                one.calls,
+                one.failed,
+                one.rate_hz,
+                f"{one.busy_share:.0%}",
+                seconds(one.busy.mean_s),
+                seconds(one.latency.p99_s) if one.latency.count else "",
+                one.queued,
+                one.active,
+                one.doing,
+            )
+            for path, one in self.nodes.items()
+        ]
+        columns = ("node", "group", "firings", "calls", "failed", "Hz", "busy", "mean", "latency (99 %)", "queued")
+        lines = [f"{self.outcome} after {seconds(self.duration_s)}, {self.firings} firings"]
+        lines += ["", *table((*columns, "active", "doing"), nodes)]
+        edges = [
+            (label, one.sent, one.rate_hz, one.dropped, one.drained, one.untaken, one.deepest, one.grown)
+            for label, one in self.edges.items()
+        ]
+        if edges:
+            lines += ["", *table(("edge", "sent", "Hz", "dropped", "drained", "untaken", "deepest", "grown"), edges)]
+        return "\n".join([*lines, *([""] if self.errors else []), *self.errors])
