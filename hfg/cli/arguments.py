@@ -89,7 +89,8 @@ def _made(hint: Any, value: Any) -> Any:
     """What a class makes of a text, as Path does; None if it does not."""
     if not isinstance(hint, type) or not isinstance(value, str) or issubclass(hint, bool | int | float):
         return None
+    make: Any = hint
     try:
-        return hint(value)
+        return make(value)
     except Exception:  # of a user
         return None

@@ -18,7 +18,7 @@ class Mode(enum.Enum):
     FAST = "fast"
 
 
-def make(
+def make(  # type: ignore[no-untyped-def]
     count: int,
     rate: float = 1.0,
     *,
@@ -29,7 +29,7 @@ def make(
     sizes: list[int] = [1],  # noqa: B006
     kind: Literal["a", "b"] = "a",
     maybe: int | None = None,
-    plain=3,  # type: ignore[no-untyped-def]
+    plain=3,
 ) -> hfg.Graph:
     return hfg.Graph(name)
 

@@ -47,7 +47,7 @@ class Arm(hfg.Subgraph):
         graph.connect(self.pose.inner, graph.add(plan()).ports.inputs["pose"])
 
 
-def build() -> hfg.Graph:
+def build(cameras: int = 1) -> hfg.Graph:
     graph = hfg.Graph("robot")
     eye, lookup, arm = graph.add(camera()), graph.add(Lookup()), graph.add(Arm())
     graph.connect(eye.out, lookup.key)
