@@ -36,15 +36,15 @@ async def ask(question: str, *, server: str = "near") -> str:
 @hfg.node
 def compare(near: str = "-", far: str = "-") -> None:
     """Print both answers; one that did not come takes the default, and if none came there is nothing to compare."""
-    print(f"{hfg.now():5.2f} s  {near:32}{far}")
+    print(f"{hfg.elapsed():5.2f} s  {near:32}{far}")
 
 
 class Note(hfg.Node):
     """Writes down what went wrong."""
 
     @hfg.slot
-    def write(self, error: hfg.errors.NodeError) -> None:
-        print(f"{hfg.now():5.2f} s  {error}")
+    def write(self, failure: hfg.Failure) -> None:
+        print(f"{hfg.elapsed():5.2f} s  {failure.error}")
 
 
 def build() -> hfg.Graph:

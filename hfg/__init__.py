@@ -19,11 +19,12 @@ from hfg import starting as starting  # before all that takes its time to import
 # isort: split
 from hfg import errors
 from hfg.activity import StateMachine
-from hfg.clock import now
+from hfg.clock import elapsed, now
 from hfg.engine import PunctualLoop, Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
-from hfg.errors import EndOfStream
+from hfg.errors import EndOfStream, Failure
 from hfg.functions import node
 from hfg.graph import Graph, Subgraph, commands
+from hfg.logs import log
 from hfg.nodetype import Node
 from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
 from hfg.registry import reference_of
@@ -35,6 +36,7 @@ __all__ = [
     "EndOfStream",
     "Event",
     "Events",
+    "Failure",
     "Graph",
     "Input",
     "Inputs",
@@ -53,7 +55,9 @@ __all__ = [
     "Token",
     "VirtualTimeLoop",
     "commands",
+    "elapsed",
     "errors",
+    "log",
     "node",
     "now",
     "reference_of",

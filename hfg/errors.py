@@ -27,7 +27,7 @@ was expected, what was found, and what to do. Stands on nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from hfg.problem import Problem
@@ -39,6 +39,7 @@ __all__ = [
     "DeclarationError",
     "EndOfStream",
     "EngineInternalError",
+    "Failure",
     "FiringTimeout",
     "GraphError",
     "HfgError",
@@ -148,6 +149,18 @@ def in_words(error: BaseException) -> str:
     except Exception as fault:
         text = f"its text cannot be made ({type(fault).__name__})"
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+class Failure(NamedTuple):
+    """What the event `failed` of a node carries: enough to answer for it, or to try again (rule X1).
+
+    Attributes:
+      error: what went wrong; the exception is its `__cause__`.
+      taken: what the firing had taken, value by name of the input; empty if no firing failed but a hook or an operator.
+    """
+
+    error: NodeError
+    taken: dict[str, Any]
 
 
 class FiringTimeout(NodeError):

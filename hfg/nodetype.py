@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import copy
 import difflib
-import logging
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 
 import msgspec
 
 from hfg.declaration import declare
 from hfg.description import NodeType, parameter_values, unknown_parameter
-from hfg.errors import DeclarationError, EngineInternalError, NodeError, UsageError
+from hfg.errors import DeclarationError, EngineInternalError, Failure, UsageError
+from hfg.logs import Log, Logger, node_log
 from hfg.ports.automatic import (
     AUTOMATIC_EVENTS,
     AUTOMATIC_SLOTS,
@@ -26,6 +26,7 @@ from hfg.ports.automatic import (
     SUBGRAPH_SLOTS,
     automatic_event,
     automatic_slot,
+    sent_of,
 )
 from hfg.ports.base import Kind, Port, Source, Target
 from hfg.ports.events import Event, EventPort
@@ -88,7 +89,7 @@ class Node:
     _type: ClassVar[NodeType]
     _active: bool  # A(v) during a run; written by the runner
     _written_before: frozenset[str] | None  # attributes that users set before the first run; None before it
-    _path_log: logging.LoggerAdapter[logging.Logger] | None
+    _path_log: Log | None
     _options: Any  # written by the graph
     _parameters: dict[str, Any]  # the live values; change them by `_set_parameter`
     _place: Place | None  # written by the graph
@@ -96,7 +97,7 @@ class Node:
     activated: Event[None] = automatic_event("activated")
     deactivated: Event[None] = automatic_event("deactivated")
     processed: Event[None] = automatic_event("processed")
-    failed: Event[NodeError] = automatic_event("failed")
+    failed: Event[Failure] = automatic_event("failed")
     timeout: Event[None] = automatic_event("timeout")
     enable = automatic_slot("enable")
     disable = automatic_slot("disable")
@@ -202,10 +203,14 @@ class Node:
         return self._active
 
     @property
-    def log(self) -> logging.LoggerAdapter[logging.Logger]:
-        """A logger whose records carry the node's `path`."""
-        if self._path_log is None:
-            self._path_log = _PathLogger(self)
+    def log(self) -> Logger:
+        """The logger "hfg.node." and the node's path, with dots for slashes; its records carry the `path`, too.
+
+        A handler that raises does not harm the node. In functions `hfg.log()` gives it.
+        """
+        path = _name(self)
+        if self._path_log is None or self._path_log.path != path:  # it was placed since, or moved
+            self._path_log = node_log(path)
         return self._path_log
 
     @property
@@ -271,6 +276,13 @@ class Node:
                 return EventPort(self, name, AUTOMATIC_EVENTS[name])
             case "slot" if name in AUTOMATIC_SLOTS and (not type_.is_subgraph or name in SUBGRAPH_SLOTS):
                 return SlotPort(self, name, object)
+            case "event" if (output := sent_of(name)) and output in type_.outputs and not type_.is_subgraph:
+                return EventPort(self, name, type_.outputs[output].type)
+        if type_.is_subgraph and (sent_of(name) or "") in type_.outputs:
+            raise UsageError(
+                f'subgraph "{_name(self)}" has no {kind} "{name}", for its outputs only pass on; declare an event of '
+                f"its own, and in build() connect to its inner side the .sent of the node whose output it is"
+            )
         if type_.is_subgraph and name in (*AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS):
             raise UsageError(
                 f'subgraph "{_name(self)}" has no {kind} "{name}", for it does not fire itself; connect that of a '
@@ -472,18 +484,6 @@ def _positional(type_: NodeType) -> str:
     if type_.is_function:
         return f"{type_.qualname}(...) makes a node; the function itself is {type_.qualname}.function"
     return f"{type_.qualname}({example}) takes its parameters by keyword only; values for inputs come from connections"
-
-
-class _PathLogger(logging.LoggerAdapter[logging.Logger]):
-    """Adds the node's path to each record; looked up late, for a node may log before it is placed."""
-
-    def __init__(self, node: Node) -> None:
-        super().__init__(logging.getLogger("hfg.node"), {})
-        self._node = node
-
-    def process(self, msg: Any, kwargs: MutableMapping[str, Any]) -> tuple[Any, MutableMapping[str, Any]]:
-        kwargs["extra"] = {**kwargs.get("extra", {}), "path": _name(self._node)}
-        return msg, kwargs
 
 
 _HIDDEN: Final = frozenset(name for name in vars(Node) if name.startswith("_") and not name.endswith("__"))

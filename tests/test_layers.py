@@ -24,6 +24,8 @@ FLOORS = {
     "hfg.token": 0,
     "hfg.types": 0,
     "hfg.clock": 0,
+    "hfg.frames": 0,
+    "hfg.logs": 0,
     "hfg.trace": 0,
     "hfg.starting": 0,
     "hfg.ports": 1,

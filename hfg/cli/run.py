@@ -59,8 +59,9 @@ def run(
 ) -> int:
     """Run a graph to its end; Ctrl-C ends it earlier, twice at once."""
     show.set_debug(debug)
-    show.log_to_stderr(verbose, debug)
+    records = show.Records(verbose, debug, virtual=clock is Clock.virtual)
     graph = load_graph(target, arg or [])
+    records.loaded()
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()
     with (

@@ -10,7 +10,6 @@ import sys
 import traceback
 from collections.abc import Iterable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -18,23 +17,13 @@ from rich.console import Console
 from rich.table import Table
 
 from hfg.cli.encoding import encode
+from hfg.clock import current_elapsed
 from hfg.engine.observing.report import Report
 from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
+from hfg.frames import is_machinery
 
-__all__ = ["failure", "json", "log_to_stderr", "report", "sentence", "set_debug", "table", "user_traceback"]
+__all__ = ["Records", "failure", "json", "report", "sentence", "set_debug", "table", "user_traceback"]
 
-_OURS = str(Path(__file__).resolve().parent.parent)
-_MACHINERY = (
-    "asyncio",
-    "importlib",
-    "runpy.py",
-    "<frozen importlib",
-    "<frozen runpy",
-    "<hfg region",
-    "concurrent/futures",
-    "threading.py",
-    "typer",
-)
 _WIDTH_OF_A_FILE = 200
 _debug = False
 
@@ -45,12 +34,43 @@ def set_debug(debug: bool) -> None:
     _debug = debug
 
 
-def log_to_stderr(verbosity: int, debug: bool) -> None:
-    """Write log records to standard error, whatever that is when they come: warnings, from verbosity 1 more."""
-    level = logging.DEBUG if debug else logging.INFO if verbosity else logging.WARNING
-    handler = logging.StreamHandler(_StandardError())
-    logging.basicConfig(level=logging.WARNING, format="%(levelname)s: %(message)s", handlers=[handler])
-    logging.getLogger("hfg").setLevel(level)
+class Records:
+    """Writes log records to standard error, whatever that is when they come: time, level, path, sentence.
+
+    The user's own logging has the word: where the program has set some up, that shows what hfg tells, too.
+    """
+
+    def __init__(self, verbosity: int, debug: bool, *, virtual: bool = False) -> None:
+        """Show those of hfg from now on: warnings, from verbosity 1 more; in virtual time with the run's seconds."""
+        self._handler = logging.StreamHandler(_StandardError())
+        self._handler.setFormatter(_Line(virtual))
+        self._hfg = logging.getLogger("hfg")
+        self._hfg.setLevel(logging.DEBUG if debug else logging.INFO if verbosity else logging.WARNING)
+        self._hfg.addHandler(self._handler)
+
+    def loaded(self) -> None:
+        """The user's program is there: unless it has handlers of its own, show the records of its loggers, too."""
+        self._hfg.removeHandler(self._handler)
+        root = logging.getLogger()
+        if not root.handlers:
+            root.addHandler(self._handler)
+
+
+class _Line(logging.Formatter):
+    """One record: the time of day, or of the run in virtual time, then where it comes from."""
+
+    def __init__(self, virtual: bool) -> None:
+        super().__init__("%(told)s %(levelname)s %(where)s: %(message)s")
+        self._virtual = virtual
+
+    def format(self, record: logging.LogRecord) -> str:
+        if self._virtual:
+            clock = current_elapsed.get()  # none where the run has not begun
+            record.told = f"{0.0 if clock is None else clock():.3f} s"
+        else:
+            record.told = f"{self.formatTime(record, '%H:%M:%S')}.{int(record.msecs):03d}"
+        record.where = getattr(record, "path", None) or record.name
+        return super().format(record)
 
 
 class _StandardError:
@@ -92,16 +112,10 @@ def user_traceback(error: BaseException | None) -> None:
 
 
 def _filter(shown: traceback.TracebackException) -> None:
-    shown.stack = traceback.StackSummary.from_list(frame for frame in shown.stack if not _is_machinery(frame.filename))
+    shown.stack = traceback.StackSummary.from_list(frame for frame in shown.stack if not is_machinery(frame.filename))
     for other in (shown.__cause__, shown.__context__, *(shown.exceptions or ())):
         if other is not None:
             _filter(other)
-
-
-def _is_machinery(file: str) -> bool:
-    standard = Path(traceback.__file__).parent
-    inside = file.removeprefix(f"{standard}/").replace("\\", "/")
-    return file.startswith(_OURS) or ((inside != file or file.startswith("<")) and inside.startswith(_MACHINERY))
 
 
 def json(value: Any) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 import os
 import socket
 import stat
@@ -24,10 +23,11 @@ import msgspec
 from hfg.cli.encoding import encode
 from hfg.engine import Glance, Run
 from hfg.errors import TargetError
+from hfg.logs import Log
 
 __all__ = ["Answer", "Door", "Line", "Question", "folder", "open_door", "runs"]
 
-_LOGGER = logging.getLogger("hfg.cli")
+_LOGGER = Log("hfg.cli")
 _LONGEST_QUESTION: Final = 1024
 _LONGEST_ANSWER: Final = 64_000_000
 _MOST_GUESTS: Final = 8

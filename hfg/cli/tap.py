@@ -48,8 +48,9 @@ def tap(
 ) -> int:
     """Run a graph and print the tokens of a port or an edge, one a line; what nodes print goes to standard error."""
     show.set_debug(debug)
-    show.log_to_stderr(0, debug)
+    records = show.Records(0, debug, virtual=clock is Clock.virtual)
     graph = load_graph(target)
+    records.loaded()
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()
     printer = _Printer(path, limit, rate, json)

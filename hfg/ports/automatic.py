@@ -1,13 +1,14 @@
 """The ports that every node has without declaring them (rule A9).
 
-Their names, and their declarations on `Node`. Stands on events and slots.
+Their names, and their declarations on `Node`; the event `sent` that stands beside each output has the output's name in
+its own, "out.sent". Stands on events and slots.
 """
 
 from __future__ import annotations
 
 from typing import Any, Final
 
-from hfg.errors import NodeError
+from hfg.errors import Failure
 from hfg.ports.events import Event
 from hfg.ports.slots import Slot
 
@@ -18,13 +19,16 @@ __all__ = [
     "SUBGRAPH_SLOTS",
     "automatic_event",
     "automatic_slot",
+    "is_automatic_event",
+    "sent_name",
+    "sent_of",
 ]
 
 AUTOMATIC_EVENTS: Final[dict[str, Any]] = {
     "activated": None,
     "deactivated": None,
     "processed": None,
-    "failed": NodeError,
+    "failed": Failure,
     "timeout": None,
 }
 """Name and type of the events that the runner triggers."""
@@ -37,6 +41,24 @@ SUBGRAPH_EVENTS: Final = ("activated", "deactivated", "timeout")
 
 SUBGRAPH_SLOTS: Final = ("enable", "disable", "deactivate", "reset")
 """There is no telling which inner node `activate` would mean (rule G2)."""
+
+
+_SENT: Final = ".sent"  # no declared name has a dot
+
+
+def sent_name(output: str) -> str:
+    """Name the event that tells what left by an output."""
+    return output + _SENT
+
+
+def sent_of(event: str) -> str | None:
+    """Give the output beside which an event stands, or None if it is no `sent`."""
+    return event.removesuffix(_SENT) if event.endswith(_SENT) else None
+
+
+def is_automatic_event(name: str) -> bool:
+    """Whether the runner triggers it, not the node's code."""
+    return name in AUTOMATIC_EVENTS or name.endswith(_SENT)
 
 
 def automatic_event(name: str) -> Event[Any]:

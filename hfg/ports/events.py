@@ -6,7 +6,6 @@ queues itself and tells subscribers only when there are any. Stands on `base` an
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Awaitable, Callable
 from typing import Any, ClassVar, Final, Generic, Self, TypeVar, overload
 
@@ -14,6 +13,7 @@ from reactivex import abc
 from reactivex.disposable import Disposable
 from typing_extensions import TypeForm
 
+from hfg.logs import Log
 from hfg.ports.base import Kind, Owner, Port, Source
 from hfg.ports.observable import RunObservable
 from hfg.ports.relays import InnerTarget, inner_target
@@ -23,7 +23,7 @@ __all__ = ["Event", "EventPort"]
 
 T = TypeVar("T")
 
-_LOGGER: Final = logging.getLogger("hfg.events")
+_LOGGER: Final = Log("hfg.events")
 
 
 class EventPort(Port, Source[T], RunObservable[Token[T]]):

@@ -1,4 +1,8 @@
-"""Outputs: synchronous sending, exactly one token on every edge for each firing (rule F3). Stands on `base`."""
+"""Outputs: synchronous sending, exactly one token on every edge for each firing (rule F3).
+
+Beside each stands an event, `sent`, where asynchronous and lossy edges begin (rule A9). Stands on `base`, `events`
+and `automatic`.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,9 @@ from typing import Any, ClassVar, Generic, Self, TypeVar, overload
 
 from typing_extensions import TypeForm
 
+from hfg.ports.automatic import sent_name
 from hfg.ports.base import Kind, Owner, Port, Source
+from hfg.ports.events import EventPort
 from hfg.ports.relays import InnerTarget, inner_target
 from hfg.token import Token
 
@@ -43,6 +49,15 @@ class OutputPort(Port, Source[T]):
           UsageError: the output was already written in this firing, or this is no firing.
         """
         self._emit(value, activity, stamp)
+
+    @property
+    def sent(self) -> EventPort[T]:
+        """The event that tells what a firing has sent here: not when it was silent, and never END (rule A9).
+
+        For consumers at a pace of their own: nobody waits for them, and the edge says what becomes of what they miss.
+        """
+        event: EventPort[T] = self.node._port("event", sent_name(self.name))
+        return event
 
     @property
     def inner(self) -> InnerTarget[T]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Generic, TypeVar
 
 from hfg.errors import UsageError
-from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, SUBGRAPH_EVENTS, SUBGRAPH_SLOTS
+from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, SUBGRAPH_EVENTS, SUBGRAPH_SLOTS, sent_name
 from hfg.ports.base import Kind
 from hfg.ports.events import EventPort
 from hfg.ports.inputs import InputPort
@@ -67,7 +67,7 @@ class PortView(Mapping[str, P_co], Generic[P_co]):
     def _automatic(self) -> tuple[str, ...]:
         box = self._node._type.is_subgraph
         if self._kind == "event":
-            return SUBGRAPH_EVENTS if box else tuple(AUTOMATIC_EVENTS)
+            return SUBGRAPH_EVENTS if box else (*AUTOMATIC_EVENTS, *map(sent_name, self._node._type.outputs))
         if self._kind == "slot":
             return SUBGRAPH_SLOTS if box else AUTOMATIC_SLOTS
         return ()

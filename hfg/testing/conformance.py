@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
+from hfg.errors import Failure
 from hfg.testing.reference import Move, ReferenceMachine
 from hfg.token import END, Token
 from hfg.trace import (
@@ -339,7 +340,7 @@ class Replay:
 
     def _teller(self, event: TraceEvent) -> str | None:
         if isinstance(event, EventTriggered):
-            return event.event.rpartition(".")[0]
+            return _owner(event.event)
         if isinstance(event, TokenSent | TokenDropped):
             line = self.machine.labels.get(event.edge)
             return None if line is None else self.machine.path_of(line.edge.source.owner)
@@ -418,7 +419,15 @@ def value_key(value: Any) -> Any:
     """Values are compared by what they look like, errors by their type: arrays and NaN have no usable equality."""
     if isinstance(value, BaseException):
         return type(value).__name__
+    if isinstance(value, Failure):
+        return (type(value.error).__name__, repr(value.taken))
     return (type(value).__name__, repr(value))
+
+
+def _owner(event: str) -> str:
+    """Give the path of the node whose event it is; "" for the graph's own `start`."""
+    path, dot, _ = event.partition(".")
+    return path if dot else ""
 
 
 def describe(event: TraceEvent) -> str:

@@ -12,7 +12,7 @@ from typing import Any, Final
 from weakref import WeakSet
 
 from hfg.activity.rules import asked_for
-from hfg.clock import current_clock
+from hfg.clock import time_told_by
 from hfg.errors import EndOfStream, UsageError
 from hfg.nodetype import Node
 from hfg.testing.reference.waiting import hand_turned_loop
@@ -184,8 +184,7 @@ class _Firing:
 
     def run(self, function: Callable[[], Any]) -> Any:
         """Run code to its end, waiting included."""
-        clock = current_clock.set(lambda: self.now)
-        try:
+        with time_told_by(lambda: self.now):
             with self.loop.entered():
                 result = function()
                 if not inspect.iscoroutine(result):
@@ -201,8 +200,6 @@ class _Firing:
                 self.now = due
                 self.loop.ring()
             return task.result()
-        finally:
-            current_clock.reset(clock)
 
     def _next(self, kind: str) -> Any:
         iterator = self.node.__dict__.get("_fired_iterator")

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
 
+from hfg.ports.automatic import sent_name
 from hfg.testing import nodes as types
 from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
 
@@ -212,11 +213,21 @@ class _Making:
         return [(node.name, "output", port) for node in nodes for port in self.type_of(node.name).outputs]
 
     def events(self, nodes: Sequence[NodePlan]) -> list[End]:
-        return [
+        """Events with a value; now and then what outputs have sent is among them."""
+        own = [
             (node.name, "event", port)
             for node in nodes
             for port, spec in self.type_of(node.name).events.items()
             if spec.type is not None
+        ]
+        return own + (self._sent(nodes) if self.choose.chance(self._seldom(40)) else [])
+
+    def _sent(self, nodes: Sequence[NodePlan]) -> list[End]:
+        """The events beside outputs; a subgraph has none."""
+        return [
+            (node, "event", sent_name(port))
+            for node, _, port in self.outputs(nodes)
+            if not self.type_of(node).is_subgraph
         ]
 
     def signals(self, nodes: Sequence[NodePlan]) -> list[End]:

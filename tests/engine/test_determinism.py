@@ -14,7 +14,7 @@ from reactivex import operators as ops
 import hfg
 from hfg.trace import TraceEvent
 
-EXPECTED = "e5e53a4a02c189a5"
+EXPECTED = "d639e27c50f787a8"
 
 
 @hfg.node

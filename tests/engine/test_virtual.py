@@ -39,3 +39,53 @@ def test_work_in_a_thread_holds_the_clock_so_that_no_timeout_fires_falsely() -> 
 
     with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
         assert runner.run(main()) == ("done", 0.0)
+
+
+@pytest.mark.rule("R6")
+def test_equal_deadlines_ring_in_the_order_in_which_they_were_set() -> None:
+    async def main() -> list[int]:
+        loop = asyncio.get_running_loop()
+        rang: list[int] = []
+        timers = [loop.call_at(1.0 if number % 3 else 0.5, rang.append, number) for number in range(100)]
+        for timer in timers[::7]:
+            timer.cancel()
+        loop.call_at(0.1 + 0.2, rang.append, -1)  # a sum of floats that means 0.3
+        loop.call_at(0.3, rang.append, -2)
+        await asyncio.sleep(2)
+        return rang
+
+    with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+        left = [number for number in range(100) if number % 7]
+        assert runner.run(main()) == [
+            -1,
+            -2,
+            *(number for number in left if not number % 3),
+            *(number for number in left if number % 3),
+        ]
+
+
+@pytest.mark.rule("R6")
+def test_virtual_time_counts_nanoseconds_so_that_sums_of_floats_make_no_noise() -> None:
+    async def main() -> list[float]:
+        loop = asyncio.get_running_loop()
+        times = []
+        for _ in range(30):
+            await asyncio.sleep(0.1)
+            times.append(loop.time())
+        return times
+
+    with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+        assert runner.run(main()) == [number / 10 for number in range(1, 31)]
+
+
+@pytest.mark.rule("R6")
+def test_after_years_the_clock_still_moves() -> None:
+    async def main() -> float:
+        loop = asyncio.get_running_loop()
+        await asyncio.sleep(1e9)
+        for _ in range(3):
+            await asyncio.sleep(0.1)
+        return loop.time()
+
+    with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+        assert runner.run(main()) == pytest.approx(1e9 + 0.3, abs=1e-5)

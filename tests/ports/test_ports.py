@@ -148,7 +148,7 @@ def test_automatic_ports_are_there_without_being_declared() -> None:
         assert node.ports.events[name] is getattr(node, name)
     for name in ("enable", "disable", "activate", "deactivate", "reset"):
         assert node.ports.slots[name] is getattr(node, name)
-    assert node.failed.type is hfg.errors.NodeError
+    assert node.failed.type is hfg.Failure
 
 
 @pytest.mark.rule("A9")

@@ -62,7 +62,10 @@ def test_skip_answers_silence_counts_and_triggers_failed(fast: bool) -> None:
     assert sink.values == [1, 3, 4]
     assert report.nodes["fail_on"].failed == 1
     assert report.errors == ['node "fail_on" failed in firing 2: ValueError: no 2']
-    assert [type(error) for error in ear.heard] == [hfg.errors.NodeError]
+    [failure] = ear.heard
+    assert isinstance(failure, hfg.Failure)
+    assert (failure.error.path, failure.error.what, failure.taken) == ("fail_on", "firing 2", {"value": 2})
+    assert isinstance(failure.error.__cause__, ValueError)
     assert report.nodes["keep"].silent == 1
 
 

@@ -700,7 +700,7 @@ def test_skip_answers_silence_and_signals_failed() -> None:
     graph.connect(failing.failed, graph.add(Doubter()).hear)
     report = reference_run(graph, seed=3)
     assert report.values("failing.out -> sink.value") == [1, NO_MESSAGE, 4, END]
-    assert [type(value) for value in report.values("failing.failed -> doubter.hear")] == [hfg.errors.NodeError]
+    assert [type(value) for value in report.values("failing.failed -> doubter.hear")] == [hfg.Failure]
 
 
 @pytest.mark.rule("X1")

@@ -33,7 +33,7 @@ from hfg.graph.structure.edge import is_feed
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.places import edge_place, home_of, node_place
 from hfg.ports import InnerSource, InnerTarget
-from hfg.ports.automatic import AUTOMATIC_EVENTS
+from hfg.ports.automatic import is_automatic_event
 from hfg.ports.edges import BufferEdge, EventEdge
 from hfg.trace import ActivityLost
 
@@ -562,8 +562,8 @@ class _Applying:
         """Let the events of a worker know where they lead now; one that leads nowhere and is automatic is none."""
         for name, event in list(worker.events.items()):
             watched = event.port is not None and event.port._observers
-            if not event.edges and name in AUTOMATIC_EVENTS and not watched and worker.node is not None:
-                del worker.events[name]
+            if not event.edges and is_automatic_event(name) and not watched and worker.node is not None:
+                worker.ask_no_more(event)
             elif worker.node is not None:
                 ports.bind_event(worker, name)
         if worker.node is not None and worker.scope is None:

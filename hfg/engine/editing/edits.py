@@ -236,7 +236,7 @@ class Edits:
           NodeError: it failed.
         """
         waiter: asyncio.Future[NodeError | None] = self._engine.loop.create_future()
-        hook(worker, partial(answer, waiter))
+        self._engine.context.run(hook, worker, partial(answer, waiter))
         cancelled: asyncio.CancelledError | None = None
         while not waiter.done():
             try:

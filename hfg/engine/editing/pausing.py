@@ -7,7 +7,6 @@ tokens stay where they are. Stands on `groups` and `steps`.
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, Protocol
@@ -20,12 +19,13 @@ from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.places import behind, edges_at, is_gone, is_near, place_of
 from hfg.errors import UsageError
+from hfg.logs import Log
 from hfg.token import Token
 from hfg.trace import RunPaused, RunResumed, TokenSent, TraceEvent
 
 __all__ = ["Breakpoint", "Pausing", "Step"]
 
-_LOGGER = logging.getLogger("hfg.engine")
+_LOGGER = Log("hfg.engine")
 
 
 class _Trace(Protocol):

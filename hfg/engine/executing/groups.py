@@ -19,7 +19,7 @@ from hfg.engine.model.policies import Policy
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 
-__all__ = ["CheckedTurn", "Dispatching", "Job", "LoopGroup", "SideGroup", "ThreadGroup"]
+__all__ = ["CheckedTurn", "Dispatching", "Job", "LoopGroup", "SideGroup", "ThreadGroup", "current_job"]
 
 
 _DISPATCH_STEPS = 16  # how much one group may do on the loop before others have their turn
@@ -282,6 +282,12 @@ Dispatching: TypeAlias = SideGroup | ThreadGroup
 """Groups that let their nodes move when the pump comes to them."""
 
 
+def current_job() -> Job | None:
+    """Give the job under way in the thread that calls this, if it is one of a group."""
+    lane = _Lane.current()
+    return None if lane is None else lane.job
+
+
 class _Lane:
     """One thread, its jobs, and what it has for the loop."""
 
@@ -289,6 +295,7 @@ class _Lane:
 
     def __init__(self, name: str, deliver: Callable[[deque[Any]], None], context: contextvars.Context) -> None:
         self.jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self.job: Job | None = None  # under way
         self.given_up = False
         self._deliver = deliver
         self._out: deque[Any] = deque()
@@ -316,6 +323,8 @@ class _Lane:
     def _live(self) -> None:
         self._local.lane = self
         while (job := self.jobs.get()) is not None:
+            self.job = job
             job.run()
+            self.job = None
             self.send(job)
             del job

@@ -1,5 +1,8 @@
 """Virtual time: an event loop whose clock jumps to the next timer when nothing is ready (rule R6).
 
+It counts whole nanoseconds, so that sums of floats that mean one moment are one. Timers of one moment ring in the order
+in which they were set.
+
 Nodes that call plain `asyncio.sleep` are covered without knowing it. Work in threads would make the loop look idle,
 so whoever starts some holds the clock until it is back; `run_in_executor` (and so `asyncio.to_thread`) does by itself.
 """
@@ -7,6 +10,9 @@ so whoever starts some holds the clock until it is back; `run_in_executor` (and 
 from __future__ import annotations
 
 import asyncio
+import heapq
+import itertools
+import math
 import selectors
 import time
 from collections import deque
@@ -18,6 +24,8 @@ from hfg.clock import current_clock
 
 __all__ = ["Held", "VirtualTimeLoop"]
 
+_RESOLUTION_S = 1e-9
+_DIGITS = 9  # of a second: time is counted in nanoseconds
 _POLL_EVERY = 64  # jumps without a look at real sockets and signals
 
 
@@ -86,6 +94,18 @@ class _JumpingSelector(selectors.DefaultSelector):
         return ready
 
 
+class _Timer(asyncio.TimerHandle):
+    """Rings behind those of the same moment that were set before it; the heap of asyncio alone keeps no order."""
+
+    def __init__(self, number: int, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._key = (self.when(), number)
+
+    def __lt__(self, other: Any) -> bool:
+        is_earlier: bool = self._key < other._key
+        return is_earlier
+
+
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
     """An asyncio event loop in virtual time; `time()` begins at 0.
 
@@ -103,17 +123,30 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
 
     def __init__(self) -> None:
         self._virtual_now = 0.0
+        self._timer_numbers = itertools.count()
         self._held: deque[Held] = deque()  # the engine's work in threads, in order of its beginning
         self._executor_jobs = 0
         self.watchers: list[Callable[[float], None]] = []
         selector = _JumpingSelector()
         selector.loop = self
         super().__init__(selector)
-        self._clock_resolution = 1e-9
+        self._clock_resolution = _RESOLUTION_S
 
     def time(self) -> float:
         """Virtual seconds since the loop was made."""
         return self._virtual_now
+
+    def call_at(  # type: ignore[override]  # typeshed's type variable tuple says no more
+        self, when: float, callback: Callable[..., object], *args: Any, context: Context | None = None
+    ) -> asyncio.TimerHandle:
+        """As asyncio's, to the nanosecond; of one moment, in the order of the calls."""
+        self._check_closed()  # type: ignore[attr-defined]
+        if self.get_debug():
+            self._check_thread()  # type: ignore[attr-defined]
+        timer = _Timer(next(self._timer_numbers), round(when, _DIGITS), callback, args, self, context)
+        heapq.heappush(self._scheduled, timer)  # type: ignore[attr-defined]
+        timer._scheduled = True  # type: ignore[attr-defined]  # as asyncio's own `call_at`: counts it when cancelled
+        return timer
 
     def create_task(self, coro: Any, *, context: Context | None = None, **options: Any) -> asyncio.Task[Any]:
         """As asyncio's; `hfg.now()` is this loop's time in every task that belongs to no run."""
@@ -132,7 +165,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         """
         if not seconds >= 0:
             raise ValueError(f"time goes forward: spend() takes seconds from 0 on, got {seconds!r}")
-        self._virtual_now += seconds
+        self._virtual_now = round(self._virtual_now + seconds, _DIGITS)
 
     def hold(self) -> Held:
         """Let the clock stand still until this work is back (`deliver` set, on the loop) or dropped.
@@ -174,5 +207,6 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             self._virtual_now = max(self._virtual_now, scheduled[0].when())
         else:
             self._virtual_now += timeout
+        self._clock_resolution = max(_RESOLUTION_S, math.ulp(self._virtual_now))  # after a season a float is no finer
         for watcher in self.watchers:
             watcher(self._virtual_now - before)

@@ -7,19 +7,19 @@ Stands on `core`.
 
 from __future__ import annotations
 
-import logging
 import sys
 import threading
 import time
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import Worker
+from hfg.logs import Log
 
 __all__ = ["Watch", "watchdog"]
 
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself where nodes are slow
 _LOOKS_WHILE_BUSY = 20  # quick looks after the loop was at work; then at leisure, so that an idle robot sleeps
-_LOGGER = logging.getLogger("hfg.engine")
+_LOGGER = Log("hfg.engine")
 
 
 class Watch:

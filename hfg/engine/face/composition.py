@@ -100,10 +100,9 @@ class Composition:
         """See `Run.report`."""
         engine = self.engine
         nodes = node_reports(engine.core)
-        ended_at = engine.now() if engine.ended_at is None else engine.ended_at
         return Report(
             outcome=engine.outcome,
-            duration_s=ended_at - engine.started_at,
+            duration_s=engine.elapsed(),
             firings=sum(node.firings for node in nodes.values()),
             nodes=nodes,
             edges=edge_reports(engine.core),

@@ -424,8 +424,12 @@ class Run:
         return glance_at(self._engine)
 
     def now(self) -> float:
-        """Seconds on the run's clock."""
+        """Seconds on the run's clock, as in stamps; `hfg.now` says where it has its zero."""
         return self._engine.now()
+
+    def elapsed(self) -> float:
+        """Seconds since the run began, up to its end; 0 before it has begun."""
+        return self._engine.elapsed()
 
     def wake(self, node: Node | str) -> None:
         """Ask a node's `ready()` again (F1)."""

@@ -27,8 +27,11 @@ from hfg.graph.checks.endless import endless
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
+from hfg.logs import Log
 
 __all__ = ["run", "run_async", "running"]
+
+_GRAPH = Log("hfg.graph")
 
 Clock = Literal["real", "virtual"]
 
@@ -73,6 +76,9 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
     problems = check_flat(flat)
     if any(problem.severity == "error" for problem in problems):
         raise CheckFailed(problems)
+    for problem in problems:
+        if problem.severity == "warning":
+            _GRAPH.warning('"%s": %s: %s; %s', problem.path, problem.what, problem.why, problem.remedy)
     if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
         _refuse_endless(flat)
     parts = Composition(flat, settings)

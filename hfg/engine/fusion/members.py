@@ -35,7 +35,7 @@ def _values_in_and_out(worker: Worker) -> bool:
     kind = worker.type
     return (
         not worker.slot_edges
-        and "processed" not in worker.events
+        and not (worker.shape.announced or worker.shape.remembers)
         and len(worker.out_names) == len(kind.outputs)
         and not any(worker.wants_token)
         and all(edge.target_kind == "input" and not edge.ended for edge in worker.in_edges)

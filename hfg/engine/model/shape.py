@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from hfg.ports.automatic import sent_name
 from hfg.ports.edges import EventEdge, SyncEdge
 
 if TYPE_CHECKING:
@@ -23,20 +24,31 @@ class Shape:
       single: what the call gives back is the value of its one output.
       outgoing: where that is put, slots first (F9).
       gives: activity may leave by one of those edges (A3).
+      announced: what is told behind it where somebody asks: `sent`, with the position of the output, then `processed`.
+      remembers: `failed` is to tell what it has taken (X1).
     """
 
-    __slots__ = ("direct", "gives", "outgoing", "pipelined", "plain", "sequential", "single")
+    __slots__ = ("announced", "direct", "gives", "outgoing", "pipelined", "plain", "remembers", "sequential", "single")
 
     def __init__(self, vertex: Vertex) -> None:
         synchronous = [edge for edge in vertex.live_inputs if type(edge) is not EventEdge]
         self.sequential = tuple(edge for edge in synchronous if edge.sequential)
         self.pipelined = tuple(edge for edge in synchronous if not edge.sequential)
-        self.plain = _is_plain(vertex)
+        self.announced = _announced(vertex) if vertex.events else ()
+        self.remembers = "failed" in vertex.events
+        self.plain = not self.remembers and _is_plain(vertex)
         self.direct = self.plain and _is_direct(vertex)
         self.single = _is_single(vertex)
         outgoing: tuple[Any, ...] = vertex.out_edges[0] if self.single else ()
         self.outgoing = tuple(sorted(outgoing, key=lambda edge: edge.target_kind != "slot"))
         self.gives = any(edge.active for edge in outgoing)
+
+
+def _announced(vertex: Vertex) -> tuple[tuple[str, int | None], ...]:
+    """A9: nothing, as long as nobody asks."""
+    outputs = () if vertex.type is None else enumerate(vertex.type.outputs)
+    sent = [(sent_name(output), position) for position, output in outputs if sent_name(output) in vertex.events]
+    return (*sent, ("processed", None)) if "processed" in vertex.events else tuple(sent)
 
 
 def _is_plain(vertex: Vertex) -> bool:

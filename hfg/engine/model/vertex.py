@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from hfg.engine.model.shape import Shape
 from hfg.graph.structure.options import NodeOptions
 from hfg.nodetype import Node, NodeType
-from hfg.ports.automatic import AUTOMATIC_EVENTS
+from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
 from hfg.ports.edges import Edge
 from hfg.ports.events import EventPort
 
@@ -83,6 +83,7 @@ class Vertex:
       plain_handlers: slot -> callable(value), where that is the same.
       silent_code: a function: it can neither send nor trigger by itself.
       port_name: of a graph input or output.
+      events: those that somebody asks for, by name.
       iteration: its border, if it is a subgraph that iterates; `within`: that of the innermost one around it (G4).
       scope: it stands for this subgraph's automatic ports.
       around: the subgraphs around it; `scopes`: those of them that are watched.
@@ -197,7 +198,9 @@ class Vertex:
         self.wired_out = ((),) * len(self.out_names)
         self.handlers = self.plain_handlers = NOTHING
         self.events = {
-            name: event for name, event in self.events.items() if name in kind.events or name in AUTOMATIC_EVENTS
+            name: event
+            for name, event in self.events.items()
+            if name in kind.events or name in AUTOMATIC_EVENTS or sent_of(name) in kind.outputs
         }
         self.is_source = kind.is_source
         self.process = node._process_call() if kind.process_kind != "none" else None
@@ -349,6 +352,16 @@ class Vertex:
         wired = list(self.wired_out)
         wired[position] = tuple(sorted((*wired[position], edge), key=_by_index))
         self.wired_out = tuple(wired)
+
+    def ask_for(self, event: RunningEvent) -> None:
+        """Somebody asks for one of its events: it has an edge, or somebody listens."""
+        self.events[event.name] = event
+        self.shape = Shape(self)
+
+    def ask_no_more(self, event: RunningEvent) -> None:
+        """Nobody asks for this event any more."""
+        del self.events[event.name]
+        self.shape = Shape(self)
 
     def lose_incoming(self, edge: Edge) -> None:
         """An edge leads into it no more."""

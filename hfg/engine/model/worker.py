@@ -134,6 +134,7 @@ class Worker(Vertex):
         "queued",
         "rate_timer",
         "region",
+        "remembered",
         "restarts",
         "right",
         "room_waiters",
@@ -192,6 +193,7 @@ class Worker(Vertex):
         self.held = False  # its inputs are released when its outputs are processed (F5 sequential)
         self.written: list[Entry | None] | None = None
         self.events_due: list[tuple[str, Any]] | None = None
+        self.remembered: dict[str, Any] | None = None  # what the firing under way has taken, if `failed` is to tell
         self.end_stamp: float | None = None  # of the firing that ended it, and so of END (T5)
         self.given_up = False  # a source that counts as ended, though it has not said END (R5)
         self.pending_end = False  # END leaves as soon as the outputs are free (F4)
@@ -240,7 +242,8 @@ class Worker(Vertex):
         """Give the running event of this name; one that has neither edge nor subscriber yet is made now."""
         event = self.events.get(name)
         if event is None:
-            event = self.events[name] = RunningEvent(self, name, port)
+            event = RunningEvent(self, name, port)
+            self.ask_for(event)
         return event
 
     def regroup(self, group: Group) -> None:
@@ -603,6 +606,15 @@ class Worker(Vertex):
         if self.events_due is None:
             self.events_due = []
         self.events_due.append((name, value))
+
+    def remember(self, taken: dict[str, Any]) -> None:
+        """The firing has taken these values; should it fail, that is told (X1)."""
+        self.remembered = taken
+
+    def recall(self) -> dict[str, Any]:
+        """What the firing had taken; it is over, and holds that no longer."""
+        taken, self.remembered = self.remembered, None
+        return taken or {}
 
     def take_events(self) -> list[tuple[str, Any]]:
         """The automatic events that have arisen, to be sent now."""

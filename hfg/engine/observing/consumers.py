@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-import logging
 import threading
 import time
 from collections import deque
@@ -21,11 +20,12 @@ import anyio
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import UsageError
+from hfg.logs import Log
 from hfg.trace import TraceEvent
 
 __all__ = ["Consumers", "Listener", "check_consumer"]
 
-_LOGGER = logging.getLogger("hfg.engine")
+_LOGGER = Log("hfg.engine")
 _BUFFER = 10_000  # events, for an async consumer that does not say
 _LAST_S = 1.0  # how long those behind a buffer may go on when the run is over
 _CANCELLED_S = 0.3  # and when they were cancelled for that

@@ -60,7 +60,6 @@ class Glance(msgspec.Struct, frozen=True):
 
 def glance_at(engine: Engine) -> Glance:
     """Look at a run; to be called on its loop."""
-    now = engine.now() if engine.ended_at is None else engine.ended_at
     nodes = []
     engine.core.settle_counts()
     engine.core.settle_barriers()
@@ -83,7 +82,7 @@ def glance_at(engine: Engine) -> Glance:
     return Glance(
         graph=engine.graph.name,
         outcome="paused" if engine.core.held and engine.outcome == "running" else engine.outcome,
-        duration_s=now - engine.started_at if engine.core.started else 0.0,
+        duration_s=engine.elapsed() if engine.core.started else 0.0,
         machine_s=time.monotonic(),
         nodes=nodes,
     )

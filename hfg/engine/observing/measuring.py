@@ -207,7 +207,7 @@ class Measuring:
         return Statistics(
             outcome=engine.outcome,
             time=now,
-            duration_s=now - engine.started_at,
+            duration_s=engine.elapsed(),
             measured_s=passed,
             machine_s=machine,
             firings=sum(node.firings for node in nodes.values()),

@@ -11,7 +11,7 @@ from typing import Any
 from hfg.engine.model.worker import DISABLED, Worker
 from hfg.engine.rules.agenda import freed, idle_again
 from hfg.engine.rules.releasing import release
-from hfg.engine.rules.sending import flush_automatic, put_outputs, send_end
+from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, send_end
 from hfg.errors import EndOfStream
 from hfg.ports.edges import EventEdge
 from hfg.token import Marker, Token
@@ -88,6 +88,7 @@ def _ended(worker: Worker, result: object, error: BaseException | None) -> None:
     wrote = written is not None and any(entry is not None for entry in written)
     if wrote:
         put_outputs(worker, written)
+        announce(worker, written, processed=False)
     flush_automatic(worker)
     if core.trace is not None:
         core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended"))

@@ -13,9 +13,17 @@ from hfg.engine.model.worker import BACKOFF, Worker
 from hfg.engine.rules import calls, firing, lifecycle
 from hfg.engine.rules.modifiers import automatic, report_error
 from hfg.engine.rules.sending import flush_automatic, put_outputs
-from hfg.errors import EndOfStream, FiringTimeout, NodeError, QueueLimit, in_words
+from hfg.errors import EndOfStream, Failure, FiringTimeout, NodeError, QueueLimit, in_words
+from hfg.frames import users_part
+from hfg.logs import node_log
 from hfg.ports.edges import EventEdge
 from hfg.types import accepts, describe
+
+_WHAT_FOLLOWS = {
+    "skip": "the node goes on",
+    "disable": "the node is switched off",
+    "restart": "the node is restarted",
+}
 
 __all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "operator_failed", "time_out"]
 
@@ -81,8 +89,20 @@ def fail_call(worker: Worker, slot: str, error: BaseException) -> None:
     if policy == "stop":
         worker.core.host.finish("failed", problem)
         return
+    _log(worker, problem, f'the call is only counted (on_error="{policy}")')
     worker.core.errors.append(problem)
     calls.finish_call(worker, "failed")
+
+
+def _log(worker: Worker, problem: NodeError, consequence: str) -> None:
+    """Tell of an error that ends nothing as it happens, with the frames of the user's code (X1)."""
+    cause = problem.__cause__
+    node_log(worker.path).error(
+        "%s; %s",
+        problem,
+        consequence,
+        exc_info=None if cause is None else (type(cause), cause, users_part(cause.__traceback__)),
+    )
 
 
 def _policy(worker: Worker, problem: NodeError) -> str:
@@ -104,8 +124,9 @@ def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Call
     if policy == "stop":
         core.host.finish("failed", problem)
         return
+    _log(worker, problem, f'{_WHAT_FOLLOWS[policy]} (on_error="{policy}")')
     core.errors.append(problem)
-    automatic(worker, "failed", problem)
+    automatic(worker, "failed", Failure(problem, worker.recall() if answer else {}))
     if answer and policy != "disable":
         put_outputs(worker, None)
     if restarts:

@@ -15,9 +15,9 @@ from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, SAME_MOMENT_S, UNRE
 from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
 from hfg.engine.rules.ending import end, end_itself, ends_itself
-from hfg.engine.rules.modifiers import automatic, derive_scopes, receive, touch
+from hfg.engine.rules.modifiers import derive_scopes, receive, touch
 from hfg.engine.rules.releasing import make_room, release
-from hfg.engine.rules.sending import flush_automatic, put_outputs, put_value, unwrapped
+from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, put_value, unwrapped
 from hfg.engine.rules.wiring import rewire
 from hfg.errors import EndOfStream, UsageError
 from hfg.ports.edges import AnyEdge
@@ -260,8 +260,19 @@ def _arguments(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]
     return arguments
 
 
+def _values(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> dict[str, Any]:
+    """What was taken, value by name of the input."""
+    return {
+        edge.port_name: token.value
+        for edge, token in zip(edges, tokens, strict=True)
+        if edge.target_kind == "input" and type(token.value) is not Marker
+    }
+
+
 def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
     arguments = tuple(_arguments(worker, edges, tokens))
+    if worker.shape.remembers:
+        worker.remember(_values(edges, tokens))
     if worker.iteration is not None:
         worker.core.upstairs.iterate(worker, arguments)
         return
@@ -316,6 +327,7 @@ def complete_firing(worker: Worker, result: object) -> None:
         return
     if worker.shape.single and worker.written is None and type(result) not in _OF_ITS_OWN_KIND:
         put_value(worker, result)
+        written = [None if result is None else (result, None, None)] if worker.shape.announced else None
     else:
         try:
             if type(result) is CoroutineType:
@@ -325,8 +337,10 @@ def complete_firing(worker: Worker, result: object) -> None:
             worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
             return
         put_outputs(worker, written)
-    if "processed" in worker.events:
-        automatic(worker, "processed")
+    if worker.shape.announced:
+        announce(worker, written)
+    if worker.shape.remembers:
+        worker.recall()
     finish_firing(worker, "done")
 
 

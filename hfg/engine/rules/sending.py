@@ -11,16 +11,26 @@ from typing import Any, TypeAlias
 
 from hfg.activity.rules import asked_for, leaving
 from hfg.engine.model.core import Core
-from hfg.engine.model.worker import AMID_NOTHING, ENDED, RunningEvent, Worker
+from hfg.engine.model.worker import AMID_NOTHING, DISABLED, ENDED, RunningEvent, Worker
 from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full
 from hfg.engine.rules.listening import listens, may_listen
-from hfg.engine.rules.modifiers import count_dropped, derive_scopes, drop, give_back, receive, set_active, touch
+from hfg.engine.rules.modifiers import (
+    automatic,
+    count_dropped,
+    derive_scopes,
+    drop,
+    give_back,
+    receive,
+    set_active,
+    touch,
+)
 from hfg.errors import QueueOverflow
 from hfg.ports.edges import AnyEdge, BufferEdge, EventEdge, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, TokenSent
 
 __all__ = [
+    "announce",
     "bring_activity",
     "enqueue",
     "flush_automatic",
@@ -218,6 +228,23 @@ def _sent(core: Core) -> None:
             tell(target)
 
 
+def announce(worker: Worker, written: Written, *, processed: bool = True) -> None:
+    """A9: what has left by the outputs is told behind them where somebody asks; then that the firing is `processed`.
+
+    The value goes with the stamp of its token. A modifier is for the outputs alone: these are sendings of their own.
+    """
+    own_stamp = worker.core.now() if worker.stamp is None else worker.stamp
+    for name, position in worker.shape.announced:
+        if position is None:
+            if processed:
+                automatic(worker, name)
+            continue
+        entry = None if written is None or worker.blocked & DISABLED else written[position]
+        if entry is not None and type(entry[0]) is not Marker:
+            value, _, stamp = entry
+            automatic(worker, name, Token(value, 0, own_stamp if stamp is None else stamp))
+
+
 def send_end(worker: Worker) -> None:
     """END leaves on all outputs; from here the node, which is amid nothing, is over (F4, F12)."""
     core = worker.core
@@ -404,4 +431,5 @@ def flush_automatic(worker: Worker) -> None:
         for name, value in worker.take_events():
             event = worker.events.get(name)
             if event is not None:
-                trigger(event, value, stamp=worker.core.now(), extend_right=False)  # T5: automatic signals: now
+                stamp = None if type(value) is Token else worker.core.now()  # T5: automatic signals: now, but `sent`
+                trigger(event, value, stamp=stamp, extend_right=False)

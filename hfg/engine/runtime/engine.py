@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
-import logging
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from hfg.clock import current_clock
+from hfg.clock import current_clock, current_elapsed
 from hfg.engine.executing.code import CodeRunner, answer
 from hfg.engine.executing.groups import CheckedTurn, Dispatching, LoopGroup, SideGroup, ThreadGroup
+from hfg.engine.executing.speaking import log_of_speaker
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
@@ -31,12 +31,12 @@ from hfg.engine.runtime.upstairs import Deciders
 from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
+from hfg.logs import current_log
 from hfg.nodetype import Node
 from hfg.ports import EventPort
 
 __all__ = ["Engine"]
 
-_LOGGER = logging.getLogger("hfg.engine")
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
 _SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
 _MOST_CHECKED = 200  # nodes, of which all invariants are asked for after every step
@@ -106,6 +106,8 @@ class Engine:
         self.epoch = self._epoch if standard else None
         self.context = contextvars.copy_context()
         self.context.run(current_clock.set, self.now)
+        self.context.run(current_elapsed.set, self.elapsed)
+        self.context.run(current_log.set, lambda: log_of_speaker(self.core))
         self.core: Core = Core(self, Deciders())
         self.callbacks = Callbacks()
         self.core.debug = settings.debug
@@ -128,8 +130,8 @@ class Engine:
         self.core.code = self.code
         self.groups = self._make_groups()
         self._loop_group = self.groups["loop"]
-        self.started_at = 0.0
-        self.ended_at: float | None = None
+        self._started: float | None = None  # on the loop's clock, whose digits are not taken up by the date
+        self._ended: float | None = None
         self._instant = -1.0
         self._instant_steps = 0
         self.beside_work = 0  # looks of the pump since work in a thread was begun or came in; counted in virtual time
@@ -140,6 +142,21 @@ class Engine:
     def now(self) -> float:
         """Seconds on the run's clock."""
         return self.loop.time() + self._epoch
+
+    def elapsed(self) -> float:
+        """Seconds since the run began, up to its end; 0 before. To the nanosecond, for more digits are noise."""
+        if self._started is None:
+            return 0.0
+        return round((self.loop.time() if self._ended is None else self._ended) - self._started, 9)
+
+    @property
+    def ended_at(self) -> float | None:
+        """When the run was over, on its clock; None before."""
+        return None if self._ended is None else self._ended + self._epoch
+
+    def begin(self) -> None:
+        """The run begins now."""
+        self._started = self.loop.time()
 
     def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> _Timer:
         """See `Host`."""
@@ -487,7 +504,7 @@ class Engine:
         self.core.flags.append("over")
         for region in self.core.regions:
             region.interrupt()
-        self.ended_at = self.now()
+        self._ended = self.loop.time()
         for worker in self.core.workers:
             worker.run_over()
         for call in self.callbacks.finished:

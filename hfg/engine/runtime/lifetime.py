@@ -58,7 +58,7 @@ class Lifetime:
         """Set up all nodes, trigger `start`, then let the sources go (A10)."""
         engine = self._engine
         core = engine.core
-        engine.started_at = engine.now()
+        engine.begin()
         self._watch = watchdog.watch(core, engine.settings.block_warning_s, virtual=engine.virtual)
         if not await self._set_up_all(core):
             return
@@ -129,7 +129,7 @@ class Lifetime:
         waiter: asyncio.Future[HfgError | None] = engine.loop.create_future()
         self._was_set_up[worker] = None
         try:
-            lifecycle.set_up(worker, partial(answer, waiter))
+            engine.context.run(lifecycle.set_up, worker, partial(answer, waiter))
         except KeyboardInterrupt:
             raise
         except BaseException as problem:
@@ -343,7 +343,7 @@ class Lifetime:
             return None
         waiter: asyncio.Future[NodeError | None] = engine.loop.create_future()
         try:
-            lifecycle.tear_down(worker, partial(answer, waiter))
+            engine.context.run(lifecycle.tear_down, worker, partial(answer, waiter))
         except KeyboardInterrupt:  # meant for this hook, which blocks; the others have their turn
             self.hurry()
             return NodeError(worker.path, "teardown()", "it was interrupted")

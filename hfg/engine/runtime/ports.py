@@ -15,7 +15,7 @@ from hfg.engine.model.worker import Worker
 from hfg.engine.rules import firing
 from hfg.engine.rules.sending import trigger
 from hfg.engine.runtime import plan, relays
-from hfg.ports.automatic import AUTOMATIC_EVENTS
+from hfg.ports.automatic import is_automatic_event
 from hfg.ports.events import EventPort
 from hfg.token import Token
 from hfg.types import accepts, describe
@@ -39,7 +39,7 @@ def bind(worker: Worker) -> None:
 def bind_event(worker: Worker, name: str) -> RunningEvent:
     """Make the running event of a declared or automatic event, and let the port trigger it."""
     event = worker.events.get(name)
-    relayed = worker.scope is not None and name not in AUTOMATIC_EVENTS
+    relayed = worker.scope is not None and not is_automatic_event(name)
     if event is None:
         event = worker.make_event(name, None)
         if relayed:
@@ -67,9 +67,9 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     if worker.core.debug:
         port._emit, port._emit_wait = _checked(port, port._emit), _checked(port, port._emit_wait)
     host.adopt_event(port)
-    if name in AUTOMATIC_EVENTS and worker.scope is not None:
+    if is_automatic_event(name) and worker.scope is not None:
         plan.watch_scope(worker.scope)
-    if name in AUTOMATIC_EVENTS and worker.core.started:
+    if is_automatic_event(name) and worker.core.started:
         worker.watch()
         worker.changed()
         bind(worker)  # what it triggers may have consequences now
@@ -100,7 +100,7 @@ def bind_automatic(worker: Worker) -> None:
     made = [
         port
         for port in worker.node.__dict__.values()
-        if isinstance(port, EventPort) and (port.name in AUTOMATIC_EVENTS or worker.scope is not None)
+        if isinstance(port, EventPort) and (is_automatic_event(port.name) or worker.scope is not None)
     ]
     for port in made:
         if port.name in worker.events or port._observers:

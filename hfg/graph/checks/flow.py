@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from hfg.graph.checks.endless import endless
 from hfg.graph.flat.flattening import ROOT, FlatEdge, FlatGraph, scope_end
 from hfg.graph.flat.order import rings, shortest_ring
+from hfg.ports.automatic import sent_of
 from hfg.problem import Problem
 
 __all__ = [
@@ -170,7 +171,7 @@ def _needs_firing(edge: FlatEdge) -> bool:
     """Whether the event is triggered by firings alone; activity, errors and time bring automatic events without one."""
     if edge.source.node < 0 or edge.source.kind != "event":
         return False
-    return edge.source.name in edge.source.port.node._type.events or edge.source.name == "processed"
+    return edge.source.name not in ("activated", "deactivated", "failed", "timeout")
 
 
 def filling_rings(flat: FlatGraph) -> Iterator[Problem]:
@@ -252,7 +253,8 @@ def _never_triggered(flat: FlatGraph, edge: FlatEdge) -> tuple[str, str] | None:
             'with on_error="stop" the run ends before anybody hears of the failure (rule X1)',
             'add it with on_error="skip", "disable" or "restart"',
         )
-    if edge.source.name == "processed" and kind.process_kind == "none" and node.iteration is None:
+    by_firings = edge.source.name == "processed" or sent_of(edge.source.name) is not None
+    if by_firings and kind.process_kind == "none" and node.iteration is None:
         return "a node without process function never fires (rule A9)", "trigger an event in its slots"
     return None
 

@@ -113,7 +113,8 @@ class _Names:
         for edge in crossing:
             inwards = owner_of(edge.target) in inner
             end = edge.target if inwards else edge.source
-            plain = end.name.replace("[", "_").replace("]", "")  # of a vector each is a port of its own here
+            # of a vector each is a port of its own here, and so is the event beside an output
+            plain = end.name.replace("[", "_").replace("]", "").replace(".", "_")
             wanted = plain if _is_free(plain) else f"{plain}_port"
             name, number = wanted, 1
             while name in taken:

@@ -18,7 +18,7 @@ from hfg.graph.structure.pointing import meant, source_at, target_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.nodetype import Node
-from hfg.ports import InnerSource, InnerTarget, Port, PortVector, Source, Target
+from hfg.ports import InnerSource, InnerTarget, OutputPort, Port, PortVector, Source, Target
 from hfg.ports.observable import RunObservable
 from hfg.token import Token
 from hfg.types import accepts, describe, why_not
@@ -230,10 +230,13 @@ def _need_right_options(source: SourceEnd, target: TargetEnd, options: EdgeOptio
                 "leave out active=True, or the operators (rule P9)"
             )
     if said is not None and isinstance(source, Port) and source.kind in _SYNCHRONOUS:
+        event = "send by an event"
+        if isinstance(source, OutputPort) and not is_box(source.node):
+            event = f'let the edge begin at the event beside it, "{source.path}.sent"'
         raise errors.ConnectionError(
             f"{between}: {said} is for edges from events, "
             f'"{source.path}" is {"an output" if source.kind == "output" else "a parameter"}, '
-            "whose edges hold one token and no queue; leave it out, or send by an event (rule P4)"
+            f"whose edges hold one token and no queue; leave it out, or {event} (rule P4)"
         )
 
 

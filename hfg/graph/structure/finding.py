@@ -56,8 +56,10 @@ def split_inner(name: str, path: str) -> tuple[str, bool]:
       GraphError: something else stands behind the port.
     """
     port, dot, side = name.partition(".")
+    if side == "sent":  # the event beside an output is a port of its own
+        return name, False
     if side != ("inner" if dot else ""):
-        raise GraphError(f'there is no "{path}": behind a port only ".inner" may follow')
+        raise GraphError(f'there is no "{path}": behind a port only ".inner" may follow, behind an output ".sent"')
     return port, bool(dot)
 
 

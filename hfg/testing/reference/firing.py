@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Literal
 
-from hfg.errors import EndOfStream, FiringTimeout, NodeError, UsageError
+from hfg.errors import EndOfStream, Failure, FiringTimeout, NodeError, UsageError
 from hfg.testing.reference.running_code import RunningCode
 from hfg.testing.reference.sending import passed_on
 from hfg.testing.reference.state import Flight, Line, Lying, Station, newest
@@ -149,6 +149,7 @@ class Firing(RunningCode):
         station = flight.station
         flight.parameters = dict(station.node._parameters)
         held = {line.edge.target.name: lying.token for line, lying in taken if line.edge.target.kind == "input"}
+        flight.values = {name: token.value for name, token in held.items() if not token.is_marker}
         arguments = []
         for name, spec in station.type.inputs.items():
             token = held.get(name)
@@ -316,10 +317,9 @@ class Firing(RunningCode):
         (outcome, failure), flight.leaving = flight.over, True
         if not flight.void and (outcome != "ended" or flight.writes):
             self.send(index, self.shipments(flight, outcome), flight)
-        if outcome == "done":
-            station.changes.append((self.next_tick(), "processed", None))
+        self.announce(flight, outcome)
         if failure is not None:
-            station.changes.append((self.next_tick(), "failed", failure))
+            station.changes.append((self.next_tick(), "failed", Failure(failure, flight.values), None))
         self.flush_changes(station)
         if flight.void and outcome == "done":
             outcome = "abandoned"
@@ -328,6 +328,18 @@ class Firing(RunningCode):
         station.unready = False
         station.owed += [line for line in flight.taken if line.unprocessed]
         self.be_idle(station)
+
+    def announce(self, flight: Flight, outcome: str) -> None:
+        """A9: behind the outputs what left by each of them, in order, with its stamp; then that it is processed."""
+        changes = flight.station.changes
+        for name in flight.station.type.outputs if outcome in ("done", "ended") and not flight.void else ():
+            if name not in flight.writes:
+                continue
+            value, _, stamp = passed_on(*flight.writes[name])
+            if value is not None and value is not NO_MESSAGE:
+                changes.append((self.next_tick(), f"{name}.sent", value, flight.stamp if stamp is None else stamp))
+        if outcome == "done":
+            changes.append((self.next_tick(), "processed", None, None))
 
     def be_idle(self, station: Station) -> None:
         """A firing or call is over; what was wanted of the node meanwhile is done then (P8, F10, G2)."""

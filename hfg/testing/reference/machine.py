@@ -473,8 +473,8 @@ class ReferenceMachine(Editing):
         return self.observed_since(mark)
 
     def wait_until(self, time: float) -> None:
-        """Let time go on; what is due then becomes possible."""
-        self.now = max(self.now, time)
+        """Let time go on, by whole nanoseconds (R6); what is due then becomes possible."""
+        self.now = max(self.now, round(time, 9))
         self.in_timers = True
         self.loop.ring()
         for line in self.lines:
@@ -664,7 +664,7 @@ class ReferenceMachine(Editing):
             if station.active:
                 station.active = station.node._active = False
                 station.active_since = None
-                station.changes.append((self.next_tick(), "deactivated", None))
+                station.changes.append((self.next_tick(), "deactivated", None, None))
                 self.observe(ActivityChanged(self.now, station.path, False, "reset"))
         self.settle()
         self.trigger(ROOT, "start", activity=1)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from hfg.clock import current_clock
+from hfg.clock import time_told_by
 from hfg.errors import UsageError
 from hfg.testing.reference.sending import Sending
 from hfg.testing.reference.state import Flight, Station
@@ -90,15 +90,13 @@ class RunningCode(Sending):
     @contextmanager
     def amid_code(self, flight: Flight | None = None) -> Iterator[None]:
         """Run user code: in the machine's time and on its loop."""
-        reset = current_clock.set(lambda: self.now)
         self.in_code += [] if flight is None else [flight]
         try:
-            with self.loop.entered():
+            with time_told_by(lambda: self.now), self.loop.entered():
                 yield
         finally:
             if flight is not None:
                 self.in_code.pop()
-            current_clock.reset(reset)
 
     def launch(
         self, flight: Flight, function: Callable[[], Any], then: Callable[[Any, BaseException | None], None]

@@ -180,7 +180,7 @@ class Sending(State):
         station.active = station.node._active = active
         station.active_since = self.now if active else None
         self.observe(ActivityChanged(self.now, station.path, active, cause))
-        station.changes.append((self.next_tick(), "activated" if active else "deactivated", None))
+        station.changes.append((self.next_tick(), "activated" if active else "deactivated", None, None))
         self.note_places(gated=True)  # a gate that opens gives a place at once
         hook = station.node._hook("on_activated" if active else "on_deactivated")
         if hook is not None:
@@ -204,8 +204,8 @@ class Sending(State):
     def flush_changes(self, station: Station) -> None:
         """Send the automatic events that arose, each a sending of its own: +1 only if the node is active right then."""
         while station.changes:
-            _, name, value = station.changes.pop(0)
-            self.trigger(station.leaf.index, name, value)
+            _, name, value, stamp = station.changes.pop(0)
+            self.trigger(station.leaf.index, name, value, stamp=stamp)
 
     # --- discarding
 
@@ -361,8 +361,8 @@ class Sending(State):
         ]
         if waiting:
             first = min(waiting, key=lambda station: station.changes[0][0])
-            _, name, value = first.changes.pop(0)
-            self.trigger(first.leaf.index, name, value)
+            _, name, value, stamp = first.changes.pop(0)
+            self.trigger(first.leaf.index, name, value, stamp=stamp)
             return True
         for box in reversed(self.structure.boxes):  # inner ones first
             active = self.is_active(-2 - box.index)

@@ -92,6 +92,7 @@ class Flight:
     void: bool = False  # the node was disabled meanwhile: outputs go nowhere (F10)
     elements: list[dict[str, Any]] | None = None  # what an iterating subgraph has still to give inside (G4)
     results: dict[str, list[Any]] = field(default_factory=dict)
+    values: dict[str, Any] = field(default_factory=dict)  # what it took, by input (X1)
     slot: str = ""
     line: Line | None = None  # the edge a slot call took its token from
     over: tuple[Any, NodeError | None] | None = None  # its outcome, while it waits until its outputs may leave (F14)
@@ -128,7 +129,8 @@ class Station:
     restarts: int = 0
     iterator: Any = None
     unready: bool = False  # its `ready()` said no since its last firing or call (F1)
-    changes: list[tuple[int, str, Any]] = field(default_factory=list)  # automatic events that arose: when, which, value
+    # automatic events that arose: when, which, value, and the stamp unless it is the present
+    changes: list[tuple[int, str, Any, float | None]] = field(default_factory=list)
     active_since: float | None = None  # None: not active, or its time-out is over
     drained_modifiers: list[int] = field(default_factory=list)  # wait until the own END is sent (F12)
     stamp: float = 0.0  # of the firing in which it ended
