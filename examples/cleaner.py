@@ -7,7 +7,7 @@
 
 Shown: all behaviours see the room, and only the active one drives; how long a state may last is an option of its
 node. The machine has the same states, and letters for what happens: one node judges, others drive as the state wants.
-Both clean the same room in the same way, and so does examples/plain/cleaner.py without hfg. Run it with
+Both clean the same room in the same way, and so does tests/examples/plain_cleaner.py without hfg. Run it with
 `python examples/cleaner.py`, or the machine with `hfg run examples/cleaner.py --arg by_letters=true --clock virtual`.
 """
 

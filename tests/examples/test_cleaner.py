@@ -8,8 +8,9 @@ import pytest
 
 import hfg
 from examples import cleaner
-from examples.plain import cleaner as plain
 from hfg.testing import recorder
+from tests.examples import plain_cleaner as plain
+from tests.examples.lengths import lines_of_code
 
 Timeline = list[tuple[float, str]]
 
@@ -45,3 +46,13 @@ def test_who_does_not_find_home_aborts(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_machine_has_no_state_that_is_never_reached() -> None:
     assert cleaner.MACHINE.check() == []
     assert cleaner.MACHINE.accepts(["dirty", "swept", "finished"])
+
+
+def test_neither_is_longer_than_by_hand() -> None:
+    by_hand = lines_of_code(plain, "CleanerError", "after_roam", "after_spot", "after_go_home", "after_charge", "State")
+    by_hand += lines_of_code(plain, "STATES", "Cleaner")
+    by_letters = lines_of_code(cleaner, "MACHINE", "BEHAVIOURS", "GoingHome", "Judge", "_by_letters", "Room")
+    behaviours = lines_of_code(cleaner, "Behaviour", "Roam", "BackOff", "Spot", "GoHome", "Charge")
+    by_activity = behaviours + lines_of_code(cleaner, "_by_activity", "Room")
+    assert by_letters <= by_hand
+    assert by_activity <= by_hand, (by_activity, by_letters, by_hand)

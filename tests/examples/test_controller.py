@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import asyncio
-import inspect
 from collections.abc import Callable, Coroutine
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -15,22 +12,12 @@ import hfg
 from examples import controller
 from hfg.trace import FiringStarted
 from tests.examples import plain_controller
+from tests.examples.lengths import lines_of_code
 
 
 def in_virtual_time(main: Callable[[], Coroutine[Any, Any, None]]) -> None:
     with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
         runner.run(main())
-
-
-def lines_of_code(module: ModuleType) -> int:
-    """Lines as a formatter would set them, without docstrings, comments and what is blank."""
-    tree = ast.parse(inspect.getsource(module))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(
-            node
-        ):
-            node.body = node.body[1:] or [ast.Pass()]
-    return sum(1 for line in ast.unparse(tree).splitlines() if line.strip())
 
 
 def test_it_draws_the_same_curve_as_by_hand(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,7 @@
 
 The same abilities as there: states that may last only so long, a run that can be paused, stepped and stopped from
 outside, a tick that does not drift, as fast as the machine can if the time is not real, an error that names the state
-and its tick, and a timeline of the states. Run it with `python -m examples.plain.cleaner`.
+and its tick, and a timeline of the states. Run it with `python -m tests.examples.plain_cleaner`.
 """
 
 from __future__ import annotations
