@@ -100,7 +100,7 @@ class Timeline:
         self._closed = False
         self._origin: float | None = None
         self._now = 0.0
-        self._open: dict[str, _Box] = {}  # by node
+        self._open: dict[str, dict[int, _Box]] = {}  # by node, then by number of the firing; 0 is a slot call
         self._rows: dict[str, list[str | None]] = {}  # per group: who is on each of its rows
         self._row_ids: dict[tuple[str, int], int] = {}
         self._group_order = list(dict.fromkeys(_group(node) for node in self._nodes.values()))
@@ -123,11 +123,13 @@ class Timeline:
         self._now = max(self._now + _APART_US, (event.time - self._origin) * 1e6)
         match event:
             case FiringStarted(node=node, number=number, kind=kind):
-                self._begin(node, node, "silent" if kind == "silent" else "firing", {"firing": number})
+                self._begin(node, number, node, "silent" if kind == "silent" else "firing", {"firing": number})
             case CallStarted(node=node, number=number, slot=slot, edge=edge):
-                self._begin(node, f"{node}.{slot}", "call", {"call": number, "edge": edge})
-            case FiringEnded(node=node, outcome=outcome) | CallEnded(node=node, outcome=outcome):
-                self._end(node, outcome)
+                self._begin(node, 0, f"{node}.{slot}", "call", {"call": number, "edge": edge})
+            case FiringEnded(node=node, number=number, outcome=outcome):
+                self._end(node, number, outcome)
+            case CallEnded(node=node, outcome=outcome):
+                self._end(node, 0, outcome)
             case EventTriggered(event=label):
                 self._events.add(label)
             case TokenSent(edge=edge, token=token):
@@ -154,8 +156,9 @@ class Timeline:
         """End what is under way and the file. The end of the run does it; does nothing the second time."""
         if self._closed:
             return
-        for node in list(self._open):
-            self._end(node, f"under way at the end: {outcome}")
+        for node, boxes in self._open.items():
+            for number in list(boxes):
+                self._end(node, number, f"under way at the end: {outcome}")
         for node in list(self._active):
             self._activity(node, False)
         self._closed = True
@@ -178,7 +181,7 @@ class Timeline:
 
     # --- boxes ------------------------------------------------------------------------------------------------------
 
-    def _begin(self, node: str, name: str, category: str, args: dict[str, Any]) -> None:
+    def _begin(self, node: str, number: int, name: str, category: str, args: dict[str, Any]) -> None:
         group = self._group_of(node)
         rows = self._rows.setdefault(group, [])
         row = self._last_row.get(node, 0)
@@ -188,10 +191,15 @@ class Timeline:
             rows.append(None)
         rows[row] = node
         self._last_row[node] = row
-        self._open[node] = _Box(name, category, self._now, group, row, args)
+        self._open.setdefault(node, {})[number] = _Box(name, category, self._now, group, row, args)
 
-    def _end(self, node: str, outcome: str) -> None:
-        box = self._open.pop(node, None)
+    def _newest(self, node: str) -> _Box | None:
+        """What the node has begun last of all that is under way (F14)."""
+        boxes = self._open.get(node)
+        return boxes[next(reversed(boxes))] if boxes else None
+
+    def _end(self, node: str, number: int, outcome: str) -> None:
+        box = self._open.get(node, {}).pop(number, None)
         if box is None:
             return  # it had begun before somebody looked
         self._rows[box.group][box.row] = None
@@ -223,7 +231,7 @@ class Timeline:
 
     def _sent(self, edge: str, sequence: int) -> None:
         node, event = _source(edge)
-        box = self._open.get(node)
+        box = self._newest(node)
         if event in self._events and box is not None:
             self._arrows += 1
             self._flying[edge, sequence] = self._arrows
@@ -232,7 +240,7 @@ class Timeline:
     def _taken(self, edge: str, sequence: int) -> None:
         number = self._flying.pop((edge, sequence), None)
         node = edge.partition(" -> ")[2].rpartition(".")[0]
-        box = self._open.get(node)
+        box = self._newest(node)
         if number is not None and box is not None:
             box.arrows.append({**self._arrow("f", _source(edge)[1], number, box), "bp": "e"})
 
@@ -259,7 +267,7 @@ class Timeline:
         )
 
     def _mark(self, node: str, name: str, args: dict[str, Any]) -> None:
-        box = self._open.get(node)
+        box = self._newest(node)
         row = self._row(self._group_of(node), 0 if box is None else box.row)
         self._write(ph="i", s="t", name=name, cat="mark", pid=_GROUPS, tid=row, ts=self._now, args=args)
 

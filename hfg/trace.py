@@ -32,6 +32,7 @@ __all__ = [
     "FiringEnded",
     "FiringKind",
     "FiringOutcome",
+    "FiringRetried",
     "FiringStarted",
     "NodeEnabled",
     "NodeEnded",
@@ -107,6 +108,16 @@ class FiringEnded(TraceEvent, frozen=True):
     node: str
     number: int
     outcome: FiringOutcome
+
+
+class FiringRetried(TraceEvent, frozen=True):
+    """Attempt `attempt` (from 1) at a firing has failed with `error`; the next one begins after `pause_s` (X1)."""
+
+    node: str
+    number: int
+    attempt: int
+    error: str
+    pause_s: float
 
 
 class CallStarted(TraceEvent, frozen=True):

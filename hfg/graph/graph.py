@@ -148,6 +148,12 @@ class Graph:
         restart_limit: int = 5,
         restart_backoff_s: float = 0.1,
         max_duration_s: float | None = None,
+        retries: int = 0,
+        retry_backoff_s: float = 0.1,
+        retry_backoff_max_s: float = 30.0,
+        retry_jitter: float = 0.0,
+        concurrency: int = 1,
+        ordered: bool = True,
         release: Release = "auto",
         active_for_s: float | None = None,
         deadline_s: float | None = None,
@@ -165,7 +171,14 @@ class Graph:
           on_error: what follows when its code fails (rule X1).
           restart_limit: for "restart": how often.
           restart_backoff_s: for "restart": the first pause.
-          max_duration_s: the time limit of a firing (rule X2).
+          max_duration_s: the time limit of a firing, and of each attempt at it (rule X2).
+          retries: how often a firing that fails is tried again with the same values, before `on_error` counts.
+          retry_backoff_s: the pause before the first retry; each further one is twice as long.
+          retry_backoff_max_s: no pause is longer.
+          retry_jitter: by which part of it a pause may be shorter, drawn by the run's seed: from 0, never, to 1.
+          concurrency: how many firings of it may be under way at once (rule F14): of an async function, or in a group
+            with as many threads.
+          ordered: with concurrency: outputs leave in the order in which the firings began; else as they are over.
           release: when what it takes counts as processed (rule F5).
           active_for_s: how long it may stay active before its `timeout` (rule A12).
           deadline_s: how old a token may become, in a group with policy "deadline" (rule R2).
@@ -184,6 +197,12 @@ class Graph:
             "restart_limit": restart_limit,
             "restart_backoff_s": restart_backoff_s,
             "max_duration_s": max_duration_s,
+            "retries": retries,
+            "retry_backoff_s": retry_backoff_s,
+            "retry_backoff_max_s": retry_backoff_max_s,
+            "retry_jitter": retry_jitter,
+            "concurrency": concurrency,
+            "ordered": ordered,
             "release": release,
             "active_for_s": active_for_s,
             "deadline_s": deadline_s,
@@ -299,7 +318,7 @@ class Graph:
 
         Args:
           name: what `add(..., group=name)` refers to; "loop" is the event loop, of which only the policy can be chosen.
-          threads: 1 for a thread of its own (the default), 0 for the event loop.
+          threads: 1 for a thread of its own (the default), more for as many, 0 for the event loop.
           policy: who is first when several can run (rule R2).
           seed: for policy "random"; by default the run's.
 

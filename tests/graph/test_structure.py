@@ -148,6 +148,15 @@ def test_nodes_without_options_share_one_object(graph: Graph) -> None:
         {"restart_backoff_s": -0.1},
         {"max_duration_s": 0},
         {"release": "later"},
+        {"concurrency": 0},
+        {"concurrency": 2.0},
+        {"concurrency": True},
+        {"ordered": "yes"},
+        {"retries": -1},
+        {"retries": "3"},
+        {"retry_backoff_s": -1},
+        {"retry_backoff_max_s": float("nan")},
+        {"retry_jitter": 1.5},
         {"active_for_s": -5},
         {"deadline_s": True},
         {"enabled": 1},
@@ -179,9 +188,9 @@ def test_loop_is_always_there_and_groups_belong_to_the_whole(graph: Graph) -> No
 
 
 @pytest.mark.rule("R1")
-@pytest.mark.parametrize("threads", [2, -1, True, "one"])
-def test_group_has_one_thread_or_none(graph: Graph, threads: Any) -> None:
-    with pytest.raises(GraphError, match=r"threads must be 0 .* or 1"):
+@pytest.mark.parametrize("threads", [0.5, -1, True, "one"])
+def test_group_has_a_whole_number_of_threads(graph: Graph, threads: Any) -> None:
+    with pytest.raises(GraphError, match="threads must be 0 .* or the number of its threads"):
         graph.group("vision", threads=threads)
     assert list(graph.groups) == ["loop"]
 

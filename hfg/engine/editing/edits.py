@@ -25,7 +25,7 @@ from hfg.engine.editing.turns import Turns
 from hfg.engine.executing.code import answer
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
-from hfg.engine.rules import lifecycle, subgraphs
+from hfg.engine.rules import concurrency, lifecycle, subgraphs
 from hfg.engine.runtime import plan
 from hfg.engine.runtime import ports as engine_ports
 from hfg.engine.runtime.callbacks import Edited
@@ -294,6 +294,9 @@ class Edits:
         if worker.carrier is not None:
             worker.carrier.drop()
             worker.be_carried(None)
+        if worker.flights is not None:
+            concurrency.abandon(worker)
+            worker.flights.drop_carriers()
         worker.take_node(node)
         node._active = worker.active
         self._lifetime.carry(worker)
@@ -397,6 +400,9 @@ class Edits:
             self._lifetime.forget(worker)
             if worker.carrier is not None:
                 worker.carrier.drop()
+            if worker.flights is not None:
+                concurrency.abandon(worker)
+                worker.flights.drop_carriers()
 
 
 def _is_to_begin(worker: Worker, on: Collection[Worker], scopes: Set[Scope | None]) -> bool:

@@ -238,13 +238,13 @@ class Pausing:
     def _queued(self) -> Iterator[Worker]:
         """Those that could move now, group by group."""
         for group in self._engine.groups.values():
-            if not getattr(group, "running", 0):
+            if not group.full:
                 yield from list(group.policy)
 
     def _why_not(self, worker: Worker) -> str:
         if worker.busy:
             return f'"{worker.path}" is in the middle of a {worker.busy}'
-        if getattr(worker.group, "running", 0):
+        if worker.group.full:
             return f'group "{worker.group.name}" of "{worker.path}" is still at work'
         if worker.queued and _next_kind(worker):
             return ""
@@ -382,7 +382,10 @@ def _path(place: Any, labels: Sequence[str]) -> str:
 
 def _any_works(workers: list[Worker]) -> bool:
     """Whether a step of one of them will be over by itself; who waits for room in a queue (F8) may not be."""
-    return any(worker.busy and not worker.waiting_room and worker.iteration is None for worker in workers)
+    return any(
+        (worker.busy or worker.is_flying()) and not worker.waiting_room and worker.iteration is None
+        for worker in workers
+    )
 
 
 def _next_kind(worker: Worker) -> str:

@@ -285,7 +285,17 @@ class _Comparing:
             or self._are_doubled(changed)
             or found.gates
             or self._waits_in_thread()
+            or self._is_concurrency_touched(changed)
         )
+
+    def _is_concurrency_touched(self, changed: Sequence[FlatEdge]) -> bool:
+        """Whether a node that has several firings under way comes, or gets what it cannot have with that (F14)."""
+        found = self.found
+        options = [*found.come.values(), *(options for _, options in found.options)]
+        options += [_options_of(node) for _, _, node in found.swapped]
+        ends = [end.port for way in changed if way.active for end in (way.source, way.target)]
+        options += [getattr(getattr(port, "node", None), "_options", None) or NodeOptions() for port in ends]
+        return any(one.concurrency > 1 for one in options)
 
     def _closes_a_ring(self) -> bool:
         """Whether new edges make a ring of synchronous ones without a delay (P7)."""

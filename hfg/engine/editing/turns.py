@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 
 from hfg.engine.executing.code import whose_code
+from hfg.engine.model.flights import current_flight
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 
@@ -91,7 +92,8 @@ class Turns:
 def _speaker() -> Worker | None:
     """Whose code asks; a task that it has started is nobody's, for nothing waits for that."""
     worker = whose_code()
-    carrier = None if worker is None else worker.carrier
+    flight = current_flight.get()
+    carrier = None if worker is None else worker.carrier if flight is None else flight.carrier
     return worker if carrier is not None and carrier.task is asyncio.current_task() else None
 
 

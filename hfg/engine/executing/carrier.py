@@ -96,6 +96,10 @@ class Carrier:
         """Whether a coroutine is under way."""
         return self._coroutine is not None
 
+    def enter(self, call: Callable[..., object], *arguments: Any) -> None:
+        """Call something in the context of the code that it carries."""
+        self._context.run(call, *arguments)
+
     def start(self, coroutine: Any, done: Done, waits: Callable[[], None] | None = None) -> Any:
         """Run the first step now.
 

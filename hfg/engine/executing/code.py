@@ -20,8 +20,9 @@ from hfg.engine.executing.carrier import Carrier
 from hfg.engine.executing.groups import Job
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import PENDING, Core
+from hfg.engine.model.flights import Flight, current_flight
 from hfg.engine.model.worker import RunningEvent, Worker
-from hfg.engine.rules import errors
+from hfg.engine.rules import concurrency, errors
 from hfg.engine.rules.sending import trigger
 
 __all__ = ["CodeRunner", "answer", "whose_code"]
@@ -137,6 +138,117 @@ class CodeRunner:
         if options is not None and options.max_duration_s is not None and worker.busy == "firing":
             worker.limit(self.core.after(options.max_duration_s, lambda: errors.time_out(worker)))
 
+    # --- several firings of a node at once (F14) --------------------------------------------------------------------
+
+    def execute_beside(self, flight: Flight, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done) -> None:
+        """See `core.Code`."""
+        worker = flight.worker
+        if worker.group.threaded and not inspect.iscoroutinefunction(call):
+            self._beside_in_thread(flight, call, arguments, done)
+            return
+        self.core.current = worker
+        outside = current_flight.set(flight)
+        try:
+            result = call(*arguments)
+        except Exception as error:
+            current_flight.reset(outside)
+            self.core.current = None
+            done(None, error)
+            return
+        current_flight.reset(outside)
+        self.core.current = None
+        if type(result) is CoroutineType or hasattr(result, "__await__"):
+            self.drive_beside(flight, result, done)
+        else:
+            done(result, None)
+
+    def drive_beside(self, flight: Flight, coroutine: Any, done: Done) -> None:
+        """See `core.Code`."""
+        worker = flight.worker
+        flights: Any = worker.flights
+        carrier = flights.lend() or self.carrier(worker)
+        carrier.enter(current_flight.set, flight)  # what its code sends is its own
+        self.core.current = worker
+        try:
+            result = carrier.start(coroutine, self._late_beside(flight, carrier, done))
+        except Exception as error:
+            self.core.current = None
+            flights.give_back(carrier)
+            done(None, error)
+            return
+        self.core.current = None
+        if result is not PENDING:
+            flights.give_back(carrier)
+            done(result, None)
+            return
+        flight.work(carrier=carrier)
+        limit = flight.limit_s
+        if limit is not None:
+            flight.limit(worker.core.after(limit, partial(concurrency.time_out, flight)))
+
+    def _late_beside(self, flight: Flight, carrier: Carrier, done: Done) -> Done:
+        """What to call when the code of the firing, which waited, is over."""
+
+        def over(result: Any, error: BaseException | None) -> None:
+            if flight.carrier is carrier:
+                flight.rest()
+                flight.worker.flights.give_back(carrier)  # type: ignore[union-attr]  # it is one of its flights
+            elif carrier in self.given_up:
+                self.given_up.discard(carrier)
+                carrier.drop()  # its task has nothing to do any more
+            self._came_back_beside(flight, result, error, done)
+            self._engine.go_on()
+
+        return over
+
+    def _came_back_beside(self, flight: Flight, result: Any, error: BaseException | None, done: Done) -> None:
+        """Its code is over; behind the end of the run nobody listens to what it brings."""
+        if self.core.over:
+            self.came_back.set()
+            return
+        try:
+            done(result, error)
+        except Exception as fault:
+            self._engine.internal_fault(fault)
+
+    def _beside_in_thread(
+        self, flight: Flight, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
+    ) -> None:
+        worker = flight.worker
+        group: Any = worker.group
+
+        def in_thread(*arguments: Any) -> Any:
+            current_flight.set(flight)
+            return call(*arguments)
+
+        def back(job: Job) -> None:
+            group.returned(job)
+            if flight.job is job:
+                flight.rest()
+            self._came_back_beside(flight, job.result, job.error, done)
+
+        job = Job(worker, back, in_thread, arguments, done)
+        flight.work(job=job)
+        limit = flight.limit_s
+        time_out = partial(concurrency.time_out, flight)
+        if isinstance(self.loop, VirtualTimeLoop):
+            self._hold(job, limit, time_out)
+        elif limit is not None:
+            flight.limit(worker.core.after(limit, time_out))
+        group.submit(job)
+
+    def interrupt_beside(self, flight: Flight) -> None:
+        """See `core.Code`."""
+        carrier, job = flight.rest()
+        if job is not None:
+            job.disown()
+            self._hold_no_more(job)
+            group: Any = flight.worker.group
+            group.abandon(f'"{flight.worker.path}", firing {flight.number}', job)
+        elif carrier is not None:
+            self.given_up.add(carrier)
+            carrier.cancel()
+
     def late(self, worker: Worker, done: Done) -> Done:
         """See `core.Code`."""
         closing = self.core.over  # a hook of the teardown; what began before the end is not listened to after it
@@ -196,26 +308,31 @@ class CodeRunner:
         worker_job = Job(worker, back, call, arguments, done)
         worker.take_job(worker_job)
         if isinstance(self.loop, VirtualTimeLoop):
-            if not self.holds:
-                self._engine.beside_work = 0
-            self.holds += 1
-            hold = self.loop.hold()
-            worker_job.hold(hold)
             limit = worker.options.max_duration_s if worker.busy == "firing" else None
-            if limit is not None:
-                hold.limit(limit, partial(self.context.run, self._given_up, worker))
+            self._hold(worker_job, limit, partial(errors.time_out, worker))
         else:
             self._limit(worker)
         group.submit(worker_job)
         return worker_job
+
+    def _hold(self, job: Job, limit_s: float | None, time_out: Callable[[], None]) -> None:
+        """R6: virtual time stands still until the job is back; it has so many real seconds (X2)."""
+        if not self.holds:
+            self._engine.beside_work = 0
+        self.holds += 1
+        held = self.loop.hold()  # type: ignore[attr-defined]  # a loop in virtual time
+        job.hold(held)
+        if limit_s is not None:
+            held.limit(limit_s, partial(self.context.run, self._given_up, time_out))
 
     def hold_no_longer_than(self, seconds: float) -> None:
         """X3: after so many real seconds virtual time goes on without the work that is in threads now."""
         loop = self.loop
         if isinstance(loop, VirtualTimeLoop):
             for worker in self.core.workers:
-                if worker.job is not None and worker.job.held is not None:
-                    worker.job.held.limit(seconds, partial(self._hold_no_more, worker.job))
+                for job in (worker.job, *[flight.job for flight in worker.flights or ()]):
+                    if job is not None and job.held is not None:
+                        job.held.limit(seconds, partial(self._hold_no_more, job))
 
     def _hold_no_more(self, job: Job) -> None:
         if job.held is not None:
@@ -228,8 +345,8 @@ class CodeRunner:
         self.holds -= 1
         self._engine.beside_work = 0
 
-    def _given_up(self, worker: Worker) -> None:
-        self._engine.guard(partial(errors.time_out, worker))
+    def _given_up(self, time_out: Callable[[], None]) -> None:
+        self._engine.guard(time_out)
         self._engine.go_on()
 
     def execute_aside(self, worker: Worker, call: Callable[..., Any], done: Done) -> None:

@@ -129,7 +129,7 @@ class SideGroup(LoopGroup):
 class Job:
     """A call for a thread, and what came of it."""
 
-    __slots__ = ("arguments", "began", "call", "done", "error", "held", "owner", "result", "worker")
+    __slots__ = ("arguments", "began", "call", "done", "error", "held", "lane", "owner", "result", "worker")
 
     def __init__(
         self,
@@ -146,6 +146,7 @@ class Job:
         self.done = done
         self.began = 0.0  # where time is shared
         self.held: Any = None  # what keeps virtual time from passing until it is back
+        self.lane: Any = None  # the thread that does it
         self.result: Any = None
         self.error: BaseException | None = None
 
@@ -174,13 +175,13 @@ def _nobody(_job: Job) -> None:
 
 
 class ThreadGroup(Group):
-    """A thread of its own. The loop decides what it does next; results and signals come back in order.
+    """Threads of its own. The loop decides what they do next; results and signals of each come back in order.
 
     Many with one wake-up.
 
     Attributes:
-      running: jobs given to the thread and not yet back.
-      ready: set when it stands in the pump's list of groups that may dispatch.
+      running: jobs given to threads and not yet back.
+      threads: how many it may have; they are made when they are needed.
     """
 
     threaded = True
@@ -193,55 +194,72 @@ class ThreadGroup(Group):
         ready_groups: deque[Dispatching],
         deliver: Callable[[deque[Any]], None],
         context: contextvars.Context,
+        threads: int = 1,
     ) -> None:
         super().__init__(name, policy, clock)
         self._into = self.push, self.push_next
         self.push, self.push_next = self._push, self._push_next
         self.running = 0
+        self.threads = threads
+        self.several = threads > 1
         self._ready_groups = ready_groups
         self._deliver = deliver
         self._context = context
-        self._lane: _Lane | None = None
+        self._lanes: list[_Lane] = []
+        self._idle: list[_Lane] = []
         self.abandoned: list[tuple[str, threading.Thread]] = []
+
+    @property
+    def full(self) -> bool:
+        """See `Group`."""
+        return self.running >= self.threads
 
     def _push_next(self, worker: Worker) -> None:
         self._into[1](worker)
-        if not self.running:
+        if self.running < self.threads:
             self._ready_groups.append(self)
 
     def _push(self, worker: Worker) -> None:
         self._into[0](worker)
-        if not self.running:
+        if self.running < self.threads:
             self._ready_groups.append(self)
 
     def dispatch(self) -> None:
-        """Let nodes start until the thread is busy; on the loop."""
+        """Let nodes start until the threads are busy; on the loop."""
         policy = self.policy
         for _ in range(_DISPATCH_STEPS):
             if self.held:
                 break
-            if self.running or not len(policy):
+            if self.running >= self.threads or not len(policy):
                 return
             worker = self.take()
             worker.step(worker)
-        if not self.running and len(policy):
+        if self.running < self.threads and len(policy):
             self._ready_groups.append(self)  # silent firings need no thread: others have their turn
 
     def submit(self, job: Job) -> None:
-        """Give the thread a job; on the loop."""
-        if self._lane is None:
-            self._lane = _Lane(self.name, self._deliver, self._context.copy())
+        """Give a thread a job; on the loop."""
+        lane = self._idle.pop() if self._idle else self._new_lane()
+        job.lane = lane
         self.running += 1
         if self.fair is not None:
             job.begin(self.clock())
-        self._lane.jobs.put(job)
+        lane.jobs.put(job)
+
+    def _new_lane(self) -> _Lane:
+        """One thread more; the first has the name of the group."""
+        name = self.name if not self._lanes else f"{self.name} {len(self._lanes) + 1}"
+        lane = _Lane(name, self._deliver, self._context.copy())
+        self._lanes.append(lane)
+        return lane
 
     def returned(self, job: Job) -> None:
         """A job came back; on the loop."""
         self.running -= 1
+        self._idle.append(job.lane)
         if self.fair is not None:
             self.charge(job.worker, self.clock() - job.began)
-        if not self.running and len(self.policy):
+        if len(self.policy):
             self._ready_groups.append(self)
 
     def signal(self, call: Callable[[], None]) -> None:
@@ -254,28 +272,28 @@ class ThreadGroup(Group):
         lane.send(call)
 
     def thread_id(self) -> int:
-        """Of the thread that is at work; 0 if there is none yet."""
-        return 0 if self._lane is None else self._lane.thread.ident or 0
+        """Of the thread that is at work, where it has only one; 0 if there is none yet."""
+        return self._lanes[0].thread.ident or 0 if self._lanes else 0
 
     def abandon(self, what: str, job: Job) -> None:
         """X2: the job under way does not come back; the group goes on in a new thread."""
         if self.fair is not None:
             self.charge(job.worker, self.clock() - job.began)
-        lane, self._lane = self._lane, None
-        if lane is not None:
+        lane = job.lane
+        if lane in self._lanes:
+            self._lanes.remove(lane)
             lane.give_up()
             self.abandoned.append((what, lane.thread))
-        self.running = 0
+            self.running -= 1
         if len(self.policy):
             self._ready_groups.append(self)
 
-    def stop(self) -> threading.Thread | None:
-        """Let the thread end after what it is doing."""
-        lane, self._lane = self._lane, None
-        if lane is None:
-            return None
-        lane.jobs.put(None)
-        return lane.thread
+    def stop(self) -> list[threading.Thread]:
+        """Let the threads end after what they are doing."""
+        lanes, self._lanes, self._idle = self._lanes, [], []
+        for lane in lanes:
+            lane.jobs.put(None)
+        return [lane.thread for lane in lanes]
 
 
 Dispatching: TypeAlias = SideGroup | ThreadGroup

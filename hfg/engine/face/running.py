@@ -71,8 +71,8 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
             'clock="virtual" needs a loop in virtual time: hfg.run(graph, clock="virtual"), or '
             "asyncio.Runner(loop_factory=hfg.VirtualTimeLoop).run(main()) around the whole program"
         )
-    _need_use_of_seed(graph, settings)
     flat = flatten(graph)
+    _need_use_of_seed(flat, settings)
     problems = check_flat(flat)
     if any(problem.severity == "error" for problem in problems):
         raise CheckFailed(problems)
@@ -87,13 +87,15 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
     return run, parts
 
 
-def _need_use_of_seed(graph: Graph, settings: Settings) -> None:
-    """A seed that no policy asks for would be without effect."""
-    policies = [settings.policy] if settings.policy else [group.policy for group in graph.groups.values()]
-    if settings.seed is not None and "random" not in policies:
+def _need_use_of_seed(flat: FlatGraph, settings: Settings) -> None:
+    """A seed by which nothing is drawn, no policy and no pause before a retry, would be without effect."""
+    policies = [settings.policy] if settings.policy else [group.policy for group in flat.groups.values()]
+    if settings.seed is None or "random" in policies:
+        return
+    if not any(node.options.retry_jitter for one in flat.walk() for node in one.nodes):
         raise UsageError(
-            f'seed={settings.seed} has no effect, for no group of graph "{graph.name}" has the policy "random": write '
-            f'policy="random", seed={settings.seed}, or leave it out'
+            f'seed={settings.seed} has no effect, for no group of graph "{flat.graph.name}" has the policy "random": '
+            f'write policy="random", seed={settings.seed}, or leave it out'
         )
 
 

@@ -23,8 +23,11 @@ def _is_plain(worker: Worker) -> bool:
         and worker.scope is None
         and _nobody_looks(worker)
         and isinstance(worker.group.policy, Fifo)
+        and not worker.group.several  # of which one wave would keep the other threads waiting
         and not (worker.group.threaded and (worker.is_async or worker.listeners))  # which is for the loop to look at
         and not (worker.options.max_duration_s or worker.gates_over or worker.ready_hook is not None)
+        and worker.flights is None
+        and worker.attempts is None
         and worker.iteration is None
         and _values_in_and_out(worker)
     )

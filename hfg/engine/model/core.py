@@ -13,6 +13,7 @@ from collections.abc import Callable, Coroutine, Sequence
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+from hfg.engine.model.flights import Flight
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import RunningEvent, Worker
@@ -155,6 +156,26 @@ class Code(Protocol):
     ) -> Callable[[Any, BaseException | None], None]:
         """What to call when code that waited is over."""
 
+    def execute_beside(
+        self,
+        flight: Flight,
+        call: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        done: Callable[[Any, BaseException | None], None],
+    ) -> None:
+        """Run the code of one of several firings of a node (F14); `done` follows, at once or later on the loop."""
+
+    def drive_beside(
+        self,
+        flight: Flight,
+        coroutine: Coroutine[Any, Any, Any],
+        done: Callable[[Any, BaseException | None], None],
+    ) -> None:
+        """Take a coroutine of the firing's code to its end."""
+
+    def interrupt_beside(self, flight: Flight) -> None:
+        """Cancel or abandon the code of the firing (X2)."""
+
     def interrupt(self, worker: Worker) -> None:
         """Cancel or abandon the code of the worker that is under way (X2)."""
 
@@ -176,6 +197,12 @@ class Upstairs(Protocol):
 
     def operator_failed(self, edge: EventEdge, error: BaseException) -> None:
         """An operator on an edge raised."""
+
+    def begin_beside(self, worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+        """F14: a firing that has taken its tokens goes on beside others."""
+
+    def land(self, worker: Worker) -> None:
+        """F14: the outputs are free: firings that are over may leave."""
 
     def send_end(self, worker: Worker) -> None:
         """END is to follow, and the outputs are free (F4)."""
@@ -226,6 +253,7 @@ class Core:
         self.trace: Callable[[TraceEvent], None] | None = None
         self.debug = False
         self.fast = True
+        self.seed = 0  # of the run: what is drawn by chance is the same each time
         self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
         self.started = False
         self.over = False

@@ -1,4 +1,6 @@
-"""A group of nodes, of which one runs at a time, and the queue of those that can move (rules R1, R2).
+"""A group of nodes, of which one runs at a time, or as many as it has threads, and the queue of those that can move.
+
+Rules R1 and R2.
 
 What the deciding modules see of it; how the loop or a thread takes from the queue is in `executing.groups`.
 """
@@ -17,7 +19,7 @@ __all__ = ["Group"]
 
 
 class Group:
-    """Nodes that never run at the same time.
+    """Nodes that never run at the same time, unless they have several threads.
 
     Attributes:
       push: takes in a worker that can move.
@@ -25,6 +27,7 @@ class Group:
     """
 
     threaded = False
+    several = False  # it has more than one thread
 
     def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
         self.name = name
@@ -40,6 +43,11 @@ class Group:
     def hold(self, held: bool) -> None:
         """R3: whether nobody of it moves, for the run is paused."""
         self.held = held
+
+    @property
+    def full(self) -> bool:
+        """Whether its threads are all at work, so that nobody of it can move."""
+        return False
 
     def charge(self, worker: Worker, busy_s: float) -> None:
         """A worker has kept the group busy for so long."""

@@ -54,6 +54,8 @@ def _announced(vertex: Vertex) -> tuple[tuple[str, int | None], ...]:
 def _is_plain(vertex: Vertex) -> bool:
     if vertex.type is None or vertex.process is None or vertex.gates_over or vertex.paced:
         return False
+    if vertex.options is not None and (vertex.options.concurrency > 1 or vertex.options.retries):
+        return False
     return all(type(edge) is SyncEdge and edge.target_kind == "input" for edge in vertex.live_inputs) and not any(
         edge.ended for edge in vertex.in_edges
     )

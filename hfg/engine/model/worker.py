@@ -1,6 +1,7 @@
 """One running node: its two barriers, its agenda, and why it may not move (rules F1, F9).
 
-Plain state, decided over by `firing`, `sending` and `quiet`. A worker has at most one firing or call under way.
+Plain state, decided over by `firing`, `sending` and `quiet`. A worker has at most one firing or call under way; where
+its node allows several firings, those that go on are in its `flights` (F14).
 Stands on floors 0-4.
 """
 
@@ -10,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
+from hfg.engine.model.flights import Attempts, Flights
 from hfg.engine.model.vertex import RunningEvent, Vertex
 from hfg.errors import EngineInternalError
 from hfg.graph.structure.options import NodeOptions
@@ -27,6 +29,7 @@ __all__ = [
     "AMID_NOTHING",
     "BACKOFF",
     "CALLS_BLOCKED",
+    "CROWDED",
     "DISABLED",
     "ENDED",
     "FULL",
@@ -57,6 +60,7 @@ STARTING: Final = 256  # sources, until `start` has been triggered (A10)
 FUTILE: Final = 512  # a source that works for ended nodes alone, as all do that are left (R5)
 TORN_DOWN: Final = 1024  # the run is ending (R5, X3)
 REMOVED: Final = 2048  # an edit took it out of the graph (R4)
+CROWDED: Final = 4096  # as many firings are under way as may be, or somebody waits until none is (F14)
 
 CALLS_BLOCKED: Final = FULL | BACKOFF | TORN_DOWN
 
@@ -95,6 +99,7 @@ class Worker(Vertex):
         "active",
         "active_timer",
         "ahead",
+        "attempts",
         "backoff_timer",
         "blocked",
         "busy",
@@ -109,6 +114,7 @@ class Worker(Vertex):
         "events_due",
         "failed",
         "firings",
+        "flights",
         "follows",
         "full_edges",
         "gate_next",
@@ -136,6 +142,7 @@ class Worker(Vertex):
         "region",
         "remembered",
         "restarts",
+        "retries",
         "right",
         "room_waiters",
         "silent",
@@ -163,6 +170,12 @@ class Worker(Vertex):
         self._is_looked_at_by_nobody()
         self._has_not_fired()
         self._has_no_timers()
+        self.flights: Flights | None = None  # of a node that allows several firings under way (F14)
+        self.attempts: Attempts | None = None  # at its firing, where one that fails is tried again (X1)
+        if options is not None and options.concurrency > 1:
+            self.flights = Flights(options.concurrency, options.ordered)
+        elif options is not None and options.retries:
+            self.attempts = Attempts()
 
     def _has_no_place(self) -> None:
         self.placed = False
@@ -206,7 +219,7 @@ class Worker(Vertex):
         self.job: Any = None  # what its thread is doing for it
         self.ticket = 0  # which firing or call a late result belongs to (X2)
         self.firings = self.silent = self.end_firings = self.call_number = 0
-        self.failed = self.calls_failed = self.restarts = 0
+        self.failed = self.calls_failed = self.retries = self.restarts = 0
 
     def _has_no_timers(self) -> None:
         self.grid_start: float | None = None  # when its first firing with a rate began, and so its grid (F11)
@@ -271,6 +284,11 @@ class Worker(Vertex):
             if timer is not None:
                 timer.cancel()
         self.rate_timer = self.limit_timer = self.backoff_timer = self.active_timer = None
+        if self.attempts is not None:
+            self.attempts.cancel()
+        for flight in self.flights or ():
+            flight.in_time()
+            flight.attempts.cancel()
 
     # --- its place in the agenda and in the run queue (F1, F9, R2) ---------------------------------------------------
 
@@ -471,6 +489,10 @@ class Worker(Vertex):
         else:
             self.failed += 1
 
+    def count_retry(self) -> None:
+        """A firing that has failed is tried again (X1)."""
+        self.retries += 1
+
     def begin_restart(self) -> None:
         """X1: it is torn down, and set up after a pause."""
         self.restarts += 1
@@ -670,6 +692,9 @@ class Worker(Vertex):
         """It starts afresh: it has not ended, nor have the inputs that it must have, nor have its events."""
         self.pending_end = self.given_up = False
         self.deferred = None
+        if self.flights is not None:
+            self.flights.begin_afresh()
+            self.crowd()
         for edge in self.in_edges:
             edge.begin_afresh()
         for edge in self.event_edges():
@@ -697,13 +722,53 @@ class Worker(Vertex):
             self.on_idle = []
             self.changed()
         self.on_idle.append(callback)
+        self.crowd()
+
+    # --- several firings under way (F14) ----------------------------------------------------------------------------
+
+    def crowd(self) -> None:
+        """Let no other firing begin if enough are under way, or somebody waits until none is; else let it."""
+        if self.flights is None:
+            return
+        if not (self.flights.full or self.on_idle):
+            self.allow(CROWDED)
+        elif not self.blocked & CROWDED:
+            self.block(CROWDED)
+
+    def is_flying(self) -> bool:
+        """Whether code of a firing that goes on beside others is not over."""
+        return self.flights is not None and self.flights.unfinished
+
+    def send_as(self, stamp: float | None) -> float | None:
+        """What it sends has this stamp from now on (T5); gives back the one before, of a call that is under way."""
+        before, self.stamp = self.stamp, stamp
+        return before
+
+    def firings_under_way(self) -> int:
+        """How many of its firings are under way, those included that are over and wait for their turn (F14)."""
+        return int(self.busy in ("firing", "ending")) if self.flights is None else len(self.flights)
+
+    def most_under_way(self) -> int:
+        """How many there ever were at once."""
+        return min(1, self.firings) if self.flights is None else self.flights.most
+
+    def codes_at_work(self) -> int:
+        """How much of its code waits or runs in a thread: one firing or call, or several firings."""
+        return self.in_flight + (0 if self.flights is None else self.flights.working)
+
+    def codes_waiting_for_room(self) -> int:
+        """How much of that waits until a queue has room (F8)."""
+        if not self.waiting_room:
+            return 0
+        return int(self.in_flight) if self.flights is None else min(self.waiting_room, self.codes_at_work())
 
     def let_others(self) -> None:
         """What waits until it is not busy has its turn, as long as that does not make it busy."""
-        while self.on_idle and not self.busy:
+        while self.on_idle and not self.busy and not self.is_flying():
             self.on_idle.pop(0)()
         if not self.on_idle and self.on_idle is not None:
             self.on_idle = None
+            self.crowd()
             self.changed()
 
     def rewire(self, live_inputs: tuple[Any, ...]) -> None:
@@ -732,6 +797,7 @@ class Worker(Vertex):
         return (
             self.queued
             or (self.busy != "" and not self.waiting_room)
+            or (self.flights is not None and self.flights.unfinished and not self.waiting_room)
             or self.rate_timer is not None
             or self.backoff_timer is not None
             or (self.active_timer is not None and self.timeout_leads_somewhere())
@@ -750,6 +816,8 @@ class Worker(Vertex):
         for holds, relation in self._relations():
             if not holds:
                 raise EngineInternalError(f'node "{self.path}": {relation}')
+        if self.flights is not None:
+            self.flights.check_invariants(self.path)
         if not self.blocked & (ENDED | TORN_DOWN):  # who has ended waits for nothing any more (F12)
             missing = sum(1 for edge in self.live_inputs if not edge.untaken)
             self.inputs.check_invariants(missing, f'inputs of "{self.path}"')

@@ -28,6 +28,8 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
       failed: failed firings and calls so far.
       active: A(v).
       doing: "working", or what it waits for (`NodeStatistics.waiting`).
+      under_way: how many of its firings are under way now.
+      retries: how often a firing was tried again so far.
     """
 
     path: str
@@ -38,6 +40,8 @@ class NodeGlance(msgspec.Struct, frozen=True, array_like=True, gc=False):
     failed: int
     active: bool
     doing: str
+    under_way: int = 0
+    retries: int = 0
 
 
 class Glance(msgspec.Struct, frozen=True):
@@ -77,6 +81,8 @@ def glance_at(engine: Engine) -> Glance:
                 worker.failed + worker.calls_failed,
                 worker.active,
                 doing(worker),
+                worker.firings_under_way(),
+                worker.retries,
             )
         )
     return Glance(

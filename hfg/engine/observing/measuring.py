@@ -41,7 +41,7 @@ _RATE_OVER_S = 1.0
 
 def doing(worker: Worker) -> str:
     """Say what a node does or waits for now, in the words of `NodeStatistics.waiting`."""
-    if worker.busy:
+    if worker.busy or worker.is_flying():
         return "working"
     blocked = worker.blocked
     if worker.queued and not blocked & TORN_DOWN:
@@ -229,7 +229,10 @@ class Measuring:
             silent=worker.silent,
             calls=worker.call_number,
             failed=worker.failed + worker.calls_failed,
+            retries=worker.retries,
             restarts=worker.restarts,
+            under_way=worker.firings_under_way(),
+            most_under_way=worker.most_under_way(),
             active=worker.active,
             ended=bool(worker.blocked & ENDED),
             rate_hz=_per_second(pieces - meter.before, over),

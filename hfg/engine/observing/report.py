@@ -22,7 +22,9 @@ class NodeReport(msgspec.Struct, frozen=True):
       silent: firings without the function (F4).
       calls: slot calls.
       failed: failed firings and calls.
+      retries: how often a firing was tried again (X1).
       restarts: how often X1 restarted it.
+      most_under_way: how many of its firings were under way at once, at most (F14).
       active: A(v).
       ended: whether it has sent END.
     """
@@ -32,7 +34,9 @@ class NodeReport(msgspec.Struct, frozen=True):
     silent: int
     calls: int
     failed: int
+    retries: int
     restarts: int
+    most_under_way: int
     active: bool
     ended: bool
 
@@ -107,7 +111,9 @@ def node_reports(core: Core) -> dict[str, NodeReport]:
             silent=worker.silent,
             calls=worker.call_number,
             failed=worker.failed + worker.calls_failed,
+            retries=worker.retries,
             restarts=worker.restarts,
+            most_under_way=worker.most_under_way(),
             active=worker.active,
             ended=bool(worker.blocked & ENDED),
         )

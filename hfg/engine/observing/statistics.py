@@ -40,7 +40,10 @@ class NodeStatistics(msgspec.Struct, frozen=True):
       silent: firings without the function (F4).
       calls: slot calls.
       failed: failed firings and calls.
+      retries: how often a firing was tried again (X1).
       restarts: how often X1 restarted it.
+      under_way: how many of its firings are under way now; with concurrency those too that wait for their turn.
+      most_under_way: how many there ever were at once (F14).
       active: A(v).
       ended: whether it has sent END.
       rate_hz: firings and calls a second of the run's clock, over the last one to two seconds.
@@ -61,7 +64,10 @@ class NodeStatistics(msgspec.Struct, frozen=True):
     silent: int
     calls: int
     failed: int
+    retries: int
     restarts: int
+    under_way: int
+    most_under_way: int
     active: bool
     ended: bool
     rate_hz: float

@@ -17,7 +17,7 @@ from hfg.ports.edges import EventEdge
 from hfg.token import Marker, Token
 from hfg.trace import FiringEnded, TokenDrained, TokenDropped
 
-__all__ = ["drain_left", "end", "end_itself", "ends_itself"]
+__all__ = ["drain_left", "drop_taken", "end", "end_itself", "ends_itself", "gave_back"]
 
 
 def ends_itself(worker: Worker, error: BaseException | None) -> bool:
@@ -36,11 +36,7 @@ def end_itself(worker: Worker) -> None:
 def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
     """F4(1): `end()` is called, what it writes leaves as one full firing, END follows (F12 begins here)."""
     core = worker.core
-    for edge, token in zip(edges, tokens, strict=True):
-        if type(token.value) is not Marker:
-            edge.count_dropped()
-            if core.trace is not None:
-                core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
+    drop_taken(worker, edges, tokens)
     worker.count_end_firing()
     worker.end()
     worker.in_time()
@@ -51,6 +47,21 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
         return
     worker.be_busy("ending")
     core.code.execute(worker, hook, (), lambda result, error: _ended(worker, result, error))
+
+
+def drop_taken(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+    """F4(1): values that the ending firing has taken are for nobody."""
+    core = worker.core
+    for edge, token in zip(edges, tokens, strict=True):
+        if type(token.value) is not Marker:
+            edge.count_dropped()
+            if core.trace is not None:
+                core.trace(TokenDropped(core.now(), edge.label, token, "ended"))
+
+
+def gave_back(result: Any) -> TypeError:
+    """F4: `end()` writes its last words, and gives nothing back."""
+    return TypeError(f"end() gave back {result!r:.80}, but it writes with send(): self.out.send(...)")
 
 
 def drain_left(edges: Sequence[Any]) -> None:
@@ -79,14 +90,13 @@ def drain_left(edges: Sequence[Any]) -> None:
 def _ended(worker: Worker, result: object, error: BaseException | None) -> None:
     core = worker.core
     worker.be_busy("firing")
-    if error is None and result is not None:
-        error = TypeError(f"end() gave back {result!r:.80}, but it writes with send(): self.out.send(...)")
-    if error is not None:
-        worker.take_written()
-        worker.core.upstairs.fail(worker, "end()", error, answer=False)
     written = worker.take_written()
-    wrote = written is not None and any(entry is not None for entry in written)
-    if wrote:
+    if error is None and result is not None:
+        error = gave_back(result)
+    if error is not None:
+        written = None
+        worker.core.upstairs.fail(worker, "end()", error, answer=False)
+    if written is not None and any(entry is not None for entry in written):
         put_outputs(worker, written)
         announce(worker, written, processed=False)
     flush_automatic(worker)

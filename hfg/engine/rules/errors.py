@@ -12,11 +12,13 @@ from hfg.engine.model.iteration import amid_element
 from hfg.engine.model.worker import BACKOFF, Worker
 from hfg.engine.rules import calls, firing, lifecycle
 from hfg.engine.rules.modifiers import automatic, report_error
+from hfg.engine.rules.retries import retry
 from hfg.engine.rules.sending import flush_automatic, put_outputs
 from hfg.errors import EndOfStream, Failure, FiringTimeout, NodeError, QueueLimit, in_words
 from hfg.frames import users_part
 from hfg.logs import node_log
 from hfg.ports.edges import EventEdge
+from hfg.trace import FiringOutcome
 from hfg.types import accepts, describe
 
 _WHAT_FOLLOWS = {
@@ -25,7 +27,18 @@ _WHAT_FOLLOWS = {
     "restart": "the node is restarted",
 }
 
-__all__ = ["apply_policy", "as_node_error", "fail", "fail_call", "operator_failed", "time_out"]
+__all__ = [
+    "apply_policy",
+    "as_node_error",
+    "begin_over",
+    "fail",
+    "fail_call",
+    "follow",
+    "judge",
+    "operator_failed",
+    "outcome_of",
+    "time_out",
+]
 
 
 def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
@@ -76,6 +89,8 @@ def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> No
     if isinstance(error, QueueLimit):
         worker.core.host.finish("failed", error)
         return
+    if answer and retry(worker, error):
+        return
     worker.count_failure()
     apply_policy(worker, as_node_error(worker, what, error), answer=answer)
 
@@ -112,35 +127,59 @@ def _policy(worker: Worker, problem: NodeError) -> str:
     return worker.options.on_error  # type: ignore[no-any-return]
 
 
-def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Callable[[], None] | None = None) -> None:
-    """X1: the node's policy decides."""
+def judge(worker: Worker, problem: NodeError) -> str:
+    """X1: what the node's policy says is told to those who listen; "stop" has ended the run."""
     core = worker.core
     policy = _policy(worker, problem)
-    restarts = policy == "restart" and not worker.blocked & BACKOFF  # else that is under way
-    if restarts and worker.restarts >= worker.options.restart_limit:
+    if policy == "restart" and not worker.blocked & BACKOFF and worker.restarts >= worker.options.restart_limit:
         policy = "stop"
     report_error(worker, problem.what, in_words(problem.__cause__ or problem), policy)
-    worker.take_written()
     if policy == "stop":
         core.host.finish("failed", problem)
-        return
-    _log(worker, problem, f'{_WHAT_FOLLOWS[policy]} (on_error="{policy}")')
-    core.errors.append(problem)
-    automatic(worker, "failed", Failure(problem, worker.recall() if answer else {}))
-    if answer and policy != "disable":
-        put_outputs(worker, None)
+    else:
+        _log(worker, problem, f'{_WHAT_FOLLOWS[policy]} (on_error="{policy}")')
+        core.errors.append(problem)
+    return policy
+
+
+def outcome_of(problem: NodeError) -> FiringOutcome:
+    """How the trace calls the end of a firing that has failed: one that took too long was given up (X2)."""
+    return "abandoned" if isinstance(problem, FiringTimeout) else "failed"
+
+
+def begin_over(worker: Worker, policy: str) -> bool:
+    """X1: whether the node is to be restarted, and that is not under way already; from here on nothing of it begins."""
+    restarts = policy == "restart" and not worker.blocked & BACKOFF
     if restarts:
         worker.begin_restart()
-    if answer:
-        firing.finish_firing(worker, "failed")
-    elif then is not None:
-        then()
-    elif not worker.busy:
-        flush_automatic(worker)
+    return restarts
+
+
+def follow(worker: Worker, policy: str, *, restarts: bool) -> None:
+    """X1: what becomes of the node when its failed firing is over."""
     if policy == "disable":
         lifecycle.disable(worker)
     elif restarts:
         lifecycle.restart(worker, worker.options.restart_backoff_s * 2 ** (worker.restarts - 1))
+
+
+def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Callable[[], None] | None = None) -> None:
+    """X1: the node's policy decides."""
+    policy = judge(worker, problem)
+    worker.take_written()
+    if policy == "stop":
+        return
+    automatic(worker, "failed", Failure(problem, worker.recall() if answer else {}))
+    if answer and policy != "disable":
+        put_outputs(worker, None)
+    restarts = begin_over(worker, policy)
+    if answer:
+        firing.finish_firing(worker, outcome_of(problem))
+    elif then is not None:
+        then()
+    elif not worker.busy:
+        flush_automatic(worker)
+    follow(worker, policy, restarts=restarts)
 
 
 def time_out(worker: Worker) -> None:
@@ -150,6 +189,8 @@ def time_out(worker: Worker) -> None:
     what = f"firing {worker.firings}{amid_element(worker)}"
     worker.core.code.interrupt(worker)
     problem = FiringTimeout(worker.path, what, f"it took longer than max_duration_s = {limit:g} s and was given up")
+    if retry(worker, problem):
+        return
     worker.count_failure()
     apply_policy(worker, problem, answer=True)
 

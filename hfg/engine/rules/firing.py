@@ -25,7 +25,20 @@ from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringKind, FiringOutcome, FiringStarted, TokenTaken
 from hfg.types import accepts, describe
 
-__all__ = ["complete_firing", "finish_firing", "fire", "merge", "step", "take", "when_done", "write"]
+__all__ = [
+    "arguments_of",
+    "complete_firing",
+    "entry_of",
+    "finish_firing",
+    "fire",
+    "merge",
+    "note_start",
+    "step",
+    "take",
+    "values_of",
+    "when_done",
+    "write",
+]
 
 
 _OF_ITS_OWN_KIND = frozenset({Token, CoroutineType})
@@ -102,7 +115,9 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
     if modifiers:
         _receive(worker, modifiers)
     _set_parameters(worker, edges, tokens)
-    if kind == "end":
+    if worker.flights is not None:
+        core.upstairs.begin_beside(worker, kind, edges, tokens)
+    elif kind == "end":
         end(worker, edges, tokens)
     elif kind == "silent":
         worker.fire_silently()
@@ -110,9 +125,19 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         put_outputs(worker, None)
         finish_firing(worker, "silent")
     else:
-        _note_start(worker, now)
+        note_start(worker)
         _place_next(worker)
         _run_process(worker, edges, tokens)
+
+
+def note_start(worker: Worker) -> None:
+    """F11, A11: a firing whose function runs begins now."""
+    rate_hz = worker.options.max_rate_hz
+    if rate_hz:
+        worker.note_start(rate_hz)
+    worker.note_gated_start(worker.core.now())
+    if worker.paced:
+        worker.unplace()  # what an input that has ended gave a place to is held by the rate from now on
 
 
 def _fire_plainly(worker: Worker) -> None:
@@ -251,7 +276,7 @@ def _set_parameters(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token
             set_parameter(worker, edge.port_name, token.value)
 
 
-def _arguments(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:
+def arguments_of(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:
     """One argument per declared input: the value, the token if asked for, the default if absent (P6)."""
     arguments = list(worker.unset)
     for edge, token in zip(edges, tokens, strict=True):
@@ -260,7 +285,7 @@ def _arguments(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]
     return arguments
 
 
-def _values(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> dict[str, Any]:
+def values_of(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> dict[str, Any]:
     """What was taken, value by name of the input."""
     return {
         edge.port_name: token.value
@@ -270,9 +295,11 @@ def _values(edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> dict[str, Any
 
 
 def _run_process(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
-    arguments = tuple(_arguments(worker, edges, tokens))
+    arguments = tuple(arguments_of(worker, edges, tokens))
+    if worker.attempts is not None:
+        worker.attempts.begin(arguments)
     if worker.shape.remembers:
-        worker.remember(_values(edges, tokens))
+        worker.remember(values_of(edges, tokens))
     if worker.iteration is not None:
         worker.core.upstairs.iterate(worker, arguments)
         return
@@ -332,7 +359,7 @@ def complete_firing(worker: Worker, result: object) -> None:
         try:
             if type(result) is CoroutineType:
                 raise refuse_coroutine(worker, result)
-            written = merge(worker, result)
+            written = merge(worker, result, worker.written)
         except Exception as error:
             worker.core.upstairs.fail(worker, f"firing {worker.firings}", error, answer=True)
             return
@@ -344,9 +371,17 @@ def complete_firing(worker: Worker, result: object) -> None:
     finish_firing(worker, "done")
 
 
-def merge(worker: Worker, result: object) -> list[Any] | None:
-    """Join what was returned with what was sent; both for one output is writing twice (F3)."""
-    written = worker.written
+def merge(
+    worker: Worker, result: object, written: list[Any] | None, parameters: dict[str, Any] | None = None
+) -> list[Any] | None:
+    """Join what was returned with what was sent; both for one output is writing twice (F3).
+
+    Args:
+      worker: whose firing is over.
+      result: what its function has given back.
+      written: what it has sent, by output.
+      parameters: what the node's were in this firing; by default as they are now.
+    """
     node_type = worker.type
     if result is not None:
         values = worker.node._split(result)
@@ -371,16 +406,16 @@ def merge(worker: Worker, result: object) -> list[Any] | None:
                     f"{describe(type(entry[0]))}: {entry[0]!r:.80}"
                 )
     if node_type is not None and node_type.parameters:
-        written = _add_parameters(worker, written)
+        written = _add_parameters(worker, written, worker.node._parameters if parameters is None else parameters)
     return written
 
 
-def _add_parameters(worker: Worker, written: list[Any] | None) -> list[Any]:
+def _add_parameters(worker: Worker, written: list[Any] | None, parameters: dict[str, Any]) -> list[Any]:
     """P8: a connected parameter sends its value with each firing that is not silent."""
     if written is None:
         written = [None] * len(worker.out_edges)
     for position in range(len(worker.type.outputs), len(worker.out_names)):
-        written[position] = (worker.node._parameters[worker.out_names[position]], None, None)
+        written[position] = (parameters[worker.out_names[position]], None, None)
     return written
 
 
@@ -390,19 +425,33 @@ def write(worker: Worker, position: int, value: object, activity: int | None, st
     Raises:
       UsageError: outside a firing (also in a slot handler, F9), or twice in one firing.
     """
-    path = f"{worker.path}.{worker.out_names[position]}"
     if worker.busy not in ("firing", "ending") and (worker.region is None or not worker.region.speaks(worker)):
         where = "in a slot handler" if worker.busy == "call" else "outside a firing"
         raise UsageError(
-            f'output "{path}" was written {where}: outputs belong to process() and end(); trigger an event instead'
+            f'output "{worker.path}.{worker.out_names[position]}" was written {where}: outputs belong to process() and '
+            "end(); trigger an event instead"
         )
+    entry = entry_of(worker, position, worker.written, value, activity, stamp)
+    if entry is not None:
+        worker.write(position, entry)
+
+
+def entry_of(
+    worker: Worker, position: int, written: list[Any] | None, value: Any, activity: int | None, stamp: float | None
+) -> tuple[Any, int | None, float | None] | None:
+    """What a node's code writes to an output of which nothing was written before; None is silence (T2).
+
+    Raises:
+      UsageError: something was.
+    """
     if value is None:
-        return
-    if worker.written is not None and worker.written[position] is not None:
+        return None
+    if written is not None and written[position] is not None:
         raise UsageError(
-            f'output "{path}" was written twice in one firing: it takes one token, merge the values or use an event'
+            f'output "{worker.path}.{worker.out_names[position]}" was written twice in one firing: it takes one token, '
+            "merge the values or use an event"
         )
-    worker.write(position, unwrapped(value, activity, stamp))
+    return unwrapped(value, activity, stamp)
 
 
 def finish_firing(worker: Worker, outcome: FiringOutcome) -> None:

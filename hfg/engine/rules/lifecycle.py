@@ -53,7 +53,7 @@ def when_idle(worker: Worker, action: Callable[[Worker, Callable[[], None]], Non
         worker.core.upstairs.idle_again(worker)
         then()
 
-    if not worker.busy and not worker.is_on_fast_path():
+    if not worker.busy and not worker.is_on_fast_path() and not worker.is_flying():
         begin()
         return
     worker.when_idle(begin)
@@ -97,6 +97,9 @@ def tear_down(worker: Worker, then: Then) -> None:
     """Close the node's generator and run its `teardown()`, unless nothing was set up since the last time."""
     if worker.node is None or not worker.is_up:
         then(None)
+        return
+    if worker.flights is not None and worker.is_flying() and not worker.core.over:
+        worker.flights.when_rested(lambda: tear_down(worker, then))  # its firings go on beside a call of `reset` (F14)
         return
     worker.be_up(False)
     generator = worker.generator
@@ -154,6 +157,9 @@ def _settle_disabled(workers: Sequence[Worker]) -> None:
     with telling_behind(workers[0].core):
         for worker in workers:
             _empty(worker, untaken)
+        for worker in workers:
+            if worker.flights is not None:
+                worker.core.upstairs.land(worker)  # what is over goes to nobody, so it need not wait for its turn (F14)
         for worker in workers:  # what consumers have taken is on edges that are dead, and holds no END (F5)
             if worker.pending_end and worker.busy in AMID_NOTHING:
                 send_end(worker)

@@ -183,13 +183,13 @@ def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
 
     Even while it waits or works in a thread.
     """
-    busy = [worker for worker in core.workers if worker.in_flight]
+    busy = [worker for worker in core.workers if worker.codes_at_work()]
     return bool(busy) and all(worker.blocked & FUTILE and (threads_too or not worker.group.threaded) for worker in busy)
 
 
 def only_waiting_for_room(core: Core) -> bool:
     """F8: all code under way waits until a full queue has room, so it does not keep the graph from being quiet."""
-    return sum(worker.in_flight for worker in core.workers if worker.waiting_room) >= core.in_flight
+    return sum(worker.codes_waiting_for_room() for worker in core.workers) >= core.in_flight
 
 
 def stall(core: Core) -> Stalled | None:

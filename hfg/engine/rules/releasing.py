@@ -55,7 +55,9 @@ def outputs_free(worker: Worker) -> Sequence[Any]:
     released = worker.outputs_free()
     if worker.outputs.waiters is not None:
         worker.outputs.notify()
-    if worker.pending_end and worker.busy in ("", "edit"):
+    if worker.flights is not None:
+        worker.core.upstairs.land(worker)
+    elif worker.pending_end and worker.busy in ("", "edit"):
         send_end(worker)
     else:
         consider(worker)

@@ -112,6 +112,7 @@ class Engine:
         self.callbacks = Callbacks()
         self.core.debug = settings.debug
         self.core.fast = settings.fast
+        self.core.seed = settings.seed or 0
         self.core.fuse_after = settings.fuse_after
         self.graph: Graph = flat.graph
         self.holds = 0
@@ -191,7 +192,9 @@ class Engine:
             seed = settings.seed if spec.seed is None else spec.seed
             policy = make_policy(settings.policy or spec.policy, seed)
             if spec.threads:
-                groups[name] = ThreadGroup(name, policy, clock, self._ready_groups, self.code.deliver, self.context)
+                groups[name] = ThreadGroup(
+                    name, policy, clock, self._ready_groups, self.code.deliver, self.context, spec.threads
+                )
             elif name == "loop":
                 groups[name] = LoopGroup(name, policy, clock)
             else:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
@@ -18,6 +18,7 @@ from hfg.engine.executing.code import answer
 from hfg.engine.executing.groups import ThreadGroup
 from hfg.engine.executing.watchdog import Watch, watchdog
 from hfg.engine.model.core import Core
+from hfg.engine.model.flights import Flight
 from hfg.engine.model.worker import STARTING, Worker
 from hfg.engine.rules import lifecycle, wiring
 from hfg.engine.rules.activity import gate_changed
@@ -256,9 +257,11 @@ class Lifetime:
 
     def _carriers(self) -> list[Any]:
         engine = self._engine
-        return [worker.carrier for worker in engine.core.workers if worker.carrier is not None] + list(
-            engine.code.given_up
-        )
+        carriers = [worker.carrier for worker in engine.core.workers if worker.carrier is not None]
+        for worker in engine.core.workers:
+            if worker.flights is not None:
+                carriers += worker.flights.carriers()
+        return carriers + list(engine.code.given_up)
 
     async def _end_carriers(self) -> None:
         """What still resists is cancelled once more and has one limit for all of it together; then it is dropped."""
@@ -320,20 +323,36 @@ class Lifetime:
             worker.give_up_firing()
             if worker.carrier is not None:
                 worker.carrier.cancel()
+        flights = [flight for worker in self._engine.core.workers for flight in worker.flights or ()]
+        for flight in flights:
+            flight.in_time()
+            if flight.carrier is not None:
+                flight.carrier.cancel()
         for task in code.aside:
             task.cancel()
         begun = time.monotonic()
-        if busy:
-            await self._until_back(lambda: any(worker.in_flight for worker in busy))
+        if busy or flights:
+            await self._until_back(lambda: any(worker.in_flight for worker in busy) or _any_works(flights))
         seconds = time.monotonic() - begun
         left = [worker for worker in busy if worker.in_flight]
+        late = [flight for flight in flights if flight.working]
+        for flight in late:
+            code.interrupt_beside(flight)
+        problems = {
+            flight.worker: NodeError(
+                flight.worker.path, f"firing {flight.number}", _did_not_end(flight.worker, seconds)
+            )
+            for flight in reversed(late)
+        }
         stuck = []
         for worker in left:  # others of its thread group have their teardown in a new thread
             region = worker.region
             amid = region.abandon() if region is not None and region.running else worker
             code.interrupt(worker, amid=amid)
             stuck.append(amid)
-        return {worker: NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds)) for worker in stuck}
+        for worker in stuck:
+            problems[worker] = NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds))
+        return problems
 
     async def _tear_down_one(self, worker: Worker) -> NodeError | None:
         engine = self._engine
@@ -370,10 +389,14 @@ class Lifetime:
     async def _end_threads(self) -> None:
         """Let idle threads end; those that did not come back were left to themselves, as daemons."""
         for group in self._engine.groups.values():
-            thread = group.stop() if isinstance(group, ThreadGroup) else None
-            while thread is not None and thread.is_alive():
-                await asyncio.sleep(0)
-                thread.join(0.001)
+            for thread in group.stop() if isinstance(group, ThreadGroup) else ():
+                while thread.is_alive():
+                    await asyncio.sleep(0)
+                    thread.join(0.001)
+
+
+def _any_works(flights: Sequence[Flight]) -> bool:
+    return any(flight.working for flight in flights)
 
 
 def _doing(worker: Worker) -> str:

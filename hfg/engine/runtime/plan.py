@@ -291,7 +291,7 @@ def derive_release(edge: Any) -> None:
 def _is_sequential(edge: Any) -> bool:
     """F5: the consumer's mode; `auto` is sequential within a group. A delay ends the wave whatever the mode (P7)."""
     target: Worker = edge.target
-    release = target.options.release if target.options is not None else "pipelined"
+    release = target.options.release if target.options is not None and target.flights is None else "pipelined"  # F14
     if type(edge) is BufferEdge and edge.initial:
         return False
     if release == "auto":

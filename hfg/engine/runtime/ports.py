@@ -12,7 +12,7 @@ from typing import Any
 from hfg.engine.fusion import slots
 from hfg.engine.model.vertex import RunningEvent
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import firing
+from hfg.engine.rules import concurrency, firing
 from hfg.engine.rules.sending import trigger
 from hfg.engine.runtime import plan, relays
 from hfg.ports.automatic import is_automatic_event
@@ -31,7 +31,8 @@ def bind(worker: Worker) -> None:
         return
     ports = node.ports
     for position, name in enumerate(node_type.outputs):
-        ports.outputs[name]._emit = partial(firing.write, worker, position)
+        write = firing.write if worker.flights is None else concurrency.write
+        ports.outputs[name]._emit = partial(write, worker, position)
     for name in node_type.events:
         bind_event(worker, name)
 
@@ -56,7 +57,7 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     port.__dict__.pop("trigger", None)  # the fast path, if it had one where it ran before (R4)
     if worker.group.threaded:
         port._emit = partial(_from_thread, worker, event)
-    elif worker.core.debug:
+    elif worker.core.debug or worker.flights is not None or worker.attempts is not None:
         emit = slots.emitter(event, plainly=True)
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     else:
@@ -64,6 +65,9 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         port.trigger = emit  # in place of the method, which would only call it
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     port._emit_wait = partial(worker.core.code.trigger_wait, event)
+    if worker.flights is not None or worker.attempts is not None:
+        port._emit = concurrency.triggering(worker, port._emit)
+        port._emit_wait = concurrency.triggering(worker, port._emit_wait)
     if worker.core.debug:
         port._emit, port._emit_wait = _checked(port, port._emit), _checked(port, port._emit_wait)
     host.adopt_event(port)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hfg.engine.fusion.specialise import specialise
-from hfg.engine.rules import activity, agenda, errors, iterating, quiet, sending, wiring
+from hfg.engine.rules import activity, agenda, concurrency, errors, iterating, quiet, sending, wiring
 from hfg.engine.runtime import ports
 
 __all__ = ["Deciders"]
@@ -16,6 +16,8 @@ class Deciders:
     fail = staticmethod(errors.fail)
     fail_call = staticmethod(errors.fail_call)
     operator_failed = staticmethod(errors.operator_failed)
+    begin_beside = staticmethod(concurrency.begin)
+    land = staticmethod(concurrency.land)
     send_end = staticmethod(sending.send_end)
     node_ended = staticmethod(quiet.node_ended)
     activity_changed = staticmethod(activity.changed)

@@ -22,6 +22,7 @@ from hfg.graph.checks.flow import (
 )
 from hfg.graph.checks.nodes import (
     async_in_threads,
+    concurrent_firings,
     empty_subgraphs,
     limits_without_effect,
     names,
@@ -45,6 +46,7 @@ _OF_EACH_LEVEL: Final[list[Check]] = [
     limits_without_effect,
     unknown_attributes,
     empty_subgraphs,
+    concurrent_firings,
     joined_edges,
     unseen_parameters,
     synchronous_rings,

@@ -19,6 +19,7 @@ from hfg.problem import Problem
 
 __all__ = [
     "async_in_threads",
+    "concurrent_firings",
     "empty_subgraphs",
     "limits_without_effect",
     "names",
@@ -168,6 +169,38 @@ def _names_in(code: CodeType) -> Iterator[str]:
             yield constant
         elif isinstance(constant, CodeType):
             yield from _names_in(constant)
+
+
+def concurrent_firings(flat: FlatGraph) -> Iterator[Problem]:
+    """Nodes with several firings under way at once that cannot have them (rule F14)."""
+    concurrent = [node for node in flat.nodes if node.options.concurrency > 1]
+    for node in concurrent:
+        count, group = node.options.concurrency, flat.groups.get(node.options.group or "loop")
+        if group is None:
+            continue  # which is told by another check
+        what = remedy = ""
+        if group.threads and count > group.threads:
+            what = f'concurrency={count}, but its group "{group.name}" has threads={group.threads}'
+            remedy = f'declare graph.group("{group.name}", threads={count}), or say concurrency={group.threads}'
+        elif not group.threads and node.node._type.process_kind == "function":
+            what = f"concurrency={count}, but its function is a plain one on the event loop"
+            remedy = f'make it async, or put it into graph.group("work", threads={count}) by group="work"'
+        if what:
+            why = "a function that never waits, or has no thread of its own, runs alone (rules R1, F14)"
+            yield Problem(node.path, "error", what, why, remedy, "concurrency")
+    indices = {node.index for node in concurrent}
+    for edge in flat.edges if indices else ():
+        ends = indices.intersection((edge.source.node, edge.target.node))
+        if edge.active and ends:
+            yield Problem(
+                path=edge.label,
+                severity="error",
+                what=f'it is active, but "{flat.nodes[min(ends)].path}" has concurrency='
+                f"{flat.nodes[min(ends)].options.concurrency}",
+                why="activity belongs to one firing or call of a node at a time (rules A5, F14)",
+                remedy="leave active= out, or leave out concurrency",
+                check="concurrency",
+            )
 
 
 _SCHEDULING = {"priority": ("priority", 0), "deadline": ("deadline_s", None)}  # policy: the option it looks at

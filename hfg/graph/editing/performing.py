@@ -34,6 +34,7 @@ from hfg.graph.structure.assigning import move
 from hfg.graph.structure.connecting import declare_edge, refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of, type_of
 from hfg.graph.structure.finding import same_port
+from hfg.graph.structure.fitting import need_fitting
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.gating import refuse_gate
 from hfg.graph.structure.level import Level, level_of, nodes_within
@@ -172,6 +173,7 @@ class _Hand:
         for edge in edges:
             _counterpart(edge.source, old, new)
             _counterpart(edge.target, old, new)
+        need_fitting(new, command.path, old._options)
         self.do(NodeSwap(old, new))
         for edge in edges:
             other = Edge(_counterpart(edge.source, old, new), _counterpart(edge.target, old, new), edge.options)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from hfg.errors import GraphError
+from hfg.graph.structure.fitting import need_fitting
 from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.membership import close_box, leave, open_box, settle
 from hfg.graph.structure.naming import need_name, path_of, suggest
@@ -42,6 +43,8 @@ def add(level: Level, node: Node, name: str | None, said: dict[str, object]) -> 
     options = NodeOptions()
     with Refusable(path):
         options = node_options(f'node "{path}"', said)
+        if options.iterate_over or not is_box(node):  # one that is dissolved is told more below
+            need_fitting(node, path, options)
     level.members.append(name, node)
     settle(node, level, name, options)
     if is_box(node):

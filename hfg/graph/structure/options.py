@@ -51,7 +51,13 @@ class NodeOptions(msgspec.Struct, frozen=True, kw_only=True):
       priority: higher first, in a group with policy "priority" (rule R2).
       max_rate_hz: at most so many firings a second (rule F11).
       on_error: what follows when its code fails (rule X1); the next two are for "restart".
-      max_duration_s: the time limit of a firing (rule X2).
+      max_duration_s: the time limit of a firing, and of each attempt at it (rule X2).
+      retries: how often a firing that fails is tried again before `on_error` says what follows (rule X1).
+      retry_backoff_s: the pause before the first of them; each further one is twice as long.
+      retry_backoff_max_s: no pause is longer.
+      retry_jitter: by which part of it a pause may be shorter, by chance: from 0, never, to 1.
+      concurrency: how many firings may be under way at once (rule F14).
+      ordered: with concurrency: outputs leave in the order in which the firings began, not as they are over.
       release: when the tokens it takes count as processed (rule F5).
       active_for_s: `timeout` is triggered after so long an activity (rule A12).
       deadline_s: how old the oldest token it takes may become, in a group with policy "deadline" (rule R2).
@@ -66,6 +72,12 @@ class NodeOptions(msgspec.Struct, frozen=True, kw_only=True):
     restart_limit: int = 5
     restart_backoff_s: float = 0.1
     max_duration_s: float | None = None
+    retries: int = 0
+    retry_backoff_s: float = 0.1
+    retry_backoff_max_s: float = 30.0
+    retry_jitter: float = 0.0
+    concurrency: int = 1
+    ordered: bool = True
     release: Release = "auto"
     active_for_s: float | None = None
     deadline_s: float | None = None
@@ -110,7 +122,7 @@ class GroupSpec(msgspec.Struct, frozen=True):
     """Where nodes run, and who of them comes first (rules R1, R2).
 
     Attributes:
-      threads: 0 is the event loop, 1 a thread of the group's own.
+      threads: 0 is the event loop, 1 a thread of the group's own; with n of them n of its nodes run at once.
       policy: who runs next when several can.
       seed: for "random"; None is the run's.
     """
@@ -121,6 +133,11 @@ class GroupSpec(msgspec.Struct, frozen=True):
     seed: int | None = None
 
 
+_PAUSES: Final = {
+    "restart_backoff_s": "0 restarts at once",
+    "retry_backoff_s": "0 tries again at once",
+    "retry_backoff_max_s": "0 makes no pause at all",
+}
 PLAIN: Final = EdgeOptions()
 ACTIVE: Final = EdgeOptions(active=True)
 
@@ -135,15 +152,19 @@ def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
     _need_choice(where, "release", given["release"], RELEASE, GraphError)
     for name in ("max_rate_hz", "max_duration_s", "active_for_s", "deadline_s"):
         _need_positive(where, name, given[name])
-    for name in ("priority", "restart_limit"):
-        _need_whole(where, name, given[name], None if name == "priority" else 0, GraphError)
-    if not _is_number(given["restart_backoff_s"]) or given["restart_backoff_s"] < 0:
+    for name, least in (("priority", None), ("restart_limit", 0), ("retries", 0), ("concurrency", 1)):
+        _need_whole(where, name, given[name], least, GraphError)
+    for name, what in _PAUSES.items():
+        if not _is_number(given[name]) or given[name] < 0:
+            raise GraphError(f"{where}: {name} must be seconds from 0 on, got {given[name]!r}; {what}")
+    jitter = given["retry_jitter"]
+    if not _is_number(jitter) or not 0 <= jitter <= 1:
         raise GraphError(
-            f"{where}: restart_backoff_s must be seconds from 0 on, got {given['restart_backoff_s']!r}; "
-            "0 restarts at once"
+            f"{where}: retry_jitter must be a number from 0 to 1, got {jitter!r}; 0.5 makes pauses up to a half shorter"
         )
-    if type(given["enabled"]) is not bool:
-        raise GraphError(f"{where}: enabled must be True or False, got {given['enabled']!r}")
+    for name in ("enabled", "ordered"):
+        if type(given[name]) is not bool:
+            raise GraphError(f"{where}: {name} must be True or False, got {given[name]!r}")
     group = given["group"]
     if group is not None and (type(group) is not str or not group):
         raise GraphError(
@@ -237,10 +258,10 @@ def group_spec(name: str, threads: int, policy: str, seed: int | None) -> GroupS
     if type(name) is not str or not name:
         raise GraphError(f"a group needs a name, got {name!r}")
     at = f'group "{name}"'
-    if type(threads) is not int or threads not in (0, 1):
+    if type(threads) is not int or threads < 0:
         raise GraphError(
-            f"{at}: threads must be 0 (on the loop) or 1 (a thread of its own), got {threads!r}; "
-            "nodes of one group never run at the same time, declare several groups to use several threads"
+            f"{at}: threads must be 0 (on the loop), 1 (a thread of its own) or the number of its threads, "
+            f"got {threads!r}; with n threads up to n of its nodes run at the same time"
         )
     if name == "loop" and threads:
         raise GraphError(

@@ -319,9 +319,6 @@ class _Dissolving:
 class _Options:
     """A node's options, with the group that it inherited."""
 
-    concurrency = 1  # until there are options for them
-    ordered = True
-
     def __init__(self, options: Any, group: str) -> None:
         self._options = options
         self.group = group

@@ -1,0 +1,85 @@
+"""Firings that fail are tried again with the same values before the node's policy decides (rule X1).
+
+A signal that an attempt has sent cannot be taken back, so such a firing is not repeated; what an attempt has written to
+outputs has not left, and is thrown away. Each attempt has the time limit of a firing. Stands on `firing`.
+"""
+
+from __future__ import annotations
+
+import logging
+import random
+from collections.abc import Callable
+from typing import Any
+
+from hfg.engine.model.flights import Attempts
+from hfg.engine.model.worker import Worker
+from hfg.engine.rules import firing
+from hfg.errors import in_words
+from hfg.trace import FiringRetried
+
+__all__ = ["retry", "try_again"]
+
+_LOGGER = logging.getLogger("hfg.engine")
+
+
+def retry(worker: Worker, error: BaseException) -> bool:
+    """The firing of a worker, which has one at a time, has failed: whether it is tried again."""
+    attempts = worker.attempts
+    if attempts is None:
+        return False
+
+    def again() -> None:
+        attempts.again()
+        process: Any = worker.process
+        worker.core.code.execute(worker, process, attempts.arguments, firing.when_done(worker))
+
+    if not try_again(worker, attempts, worker.firings, error, again):
+        return False
+    worker.take_written()
+    worker.in_time()
+    return True
+
+
+def try_again(worker: Worker, attempts: Attempts, number: int, error: BaseException, again: Callable[[], None]) -> bool:
+    """If a firing that has failed may be tried once more, let that be after a pause.
+
+    Args:
+      worker: whose firing.
+      attempts: made at it so far.
+      number: of the firing.
+      error: by which the last attempt has failed; one that is no `Exception` ends a task or the program on purpose.
+      again: makes the next attempt.
+    """
+    options, core = worker.options, worker.core
+    if not isinstance(error, Exception) or not attempts.may_go_on(options.retries) or core.over:
+        return False
+    pause_s = _pause(worker, number, attempts.made)
+    worker.count_retry()
+    words = in_words(error)
+    _LOGGER.warning(
+        'node "%s": firing %d, attempt %d of %d, failed: %s; again in %g s',
+        worker.path,
+        number,
+        attempts.made,
+        options.retries + 1,
+        words,
+        pause_s,
+        extra={"path": worker.path},
+    )
+    if core.trace is not None:
+        core.trace(FiringRetried(core.now(), worker.path, number, attempts.made, words, pause_s))
+    attempts.rest(core.after(pause_s, again))
+    return True
+
+
+def _pause(worker: Worker, number: int, made: int) -> float:
+    """Seconds until the next attempt: the more there were the longer, and drawn by the run's seed if by chance at all.
+
+    Each draw is by itself, so that it does not depend on the order in which firings fail.
+    """
+    options = worker.options
+    longest = min(options.retry_backoff_max_s, options.retry_backoff_s * 2.0 ** min(made - 1, 60))
+    if not options.retry_jitter:
+        return float(longest)
+    drawn = random.Random(f"{worker.core.seed} {worker.path} {number} {made}").random()
+    return float(longest * (1.0 - options.retry_jitter * drawn))

@@ -1,0 +1,206 @@
+"""Firings that fail are tried again with the same values before the node's policy decides (rule X1)."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+import hfg
+from hfg.trace import ErrorRaised, FiringEnded, FiringRetried, FiringStarted, TraceEvent
+from tests.semantics.nodes import Keep, drive, numbers, of_kind, run
+
+
+class Device(hfg.Node):
+    """Fails as often as it is told for each value."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    told = hfg.Event(int)
+    fails = hfg.Parameter(2)
+    pause_s = hfg.Parameter(1.0)
+
+    def setup(self) -> None:
+        self.tries: dict[int, int] = {}
+
+    async def process(self, value: int) -> None:
+        self.tries[value] = self.tries.get(value, 0) + 1
+        self.out.send(10 * value + self.tries[value])
+        await asyncio.sleep(self.pause_s)
+        if self.tries[value] <= self.fails:
+            raise ConnectionResetError(f"try {self.tries[value]}")
+
+
+def trying(node: hfg.Node, count: int = 2, **options: Any) -> tuple[hfg.Graph, Keep]:
+    graph, sink = hfg.Graph(), Keep()
+    source = graph.add(numbers(count=count))
+    graph.add(node, name="node", **options)
+    graph.connect(source.out, node.ports.inputs["value"])
+    graph.connect(node.ports.outputs["out"], graph.add(sink).value)
+    return graph, sink
+
+
+CONCURRENCY = pytest.mark.parametrize("concurrency", [1, 2])
+
+
+@pytest.mark.rule("X1")
+@CONCURRENCY
+def test_a_firing_is_tried_again_with_the_same_values_and_what_it_wrote_is_thrown_away(
+    concurrency: int, fast: bool
+) -> None:
+    graph, sink = trying(Device(), retries=2, retry_backoff_s=0.5, concurrency=concurrency)
+    trace: list[TraceEvent] = []
+    report = run(graph, fast, trace=trace)
+    assert sink.values == [13, 23]
+    assert (report.nodes["node"].retries, report.nodes["node"].failed, report.errors) == (4, 0, [])
+    retried = [event for event in of_kind(trace, FiringRetried) if event.number == 1]
+    assert [(event.time, event.attempt, event.error, event.pause_s) for event in retried] == [
+        (1, 1, "ConnectionResetError: try 1", 0.5),
+        (2.5, 2, "ConnectionResetError: try 2", 1.0),
+    ]
+    number = {FiringStarted: 0, FiringEnded: 0}
+    for event in trace:
+        if isinstance(event, FiringStarted | FiringEnded) and event.node == "node" and event.number < 3:
+            number[type(event)] += 1
+    assert number == {FiringStarted: 2, FiringEnded: 2}  # however often it was tried
+
+
+@pytest.mark.rule("X1")
+@CONCURRENCY
+def test_behind_the_last_retry_the_policy_decides(concurrency: int, fast: bool) -> None:
+    graph, sink = trying(Device(fails=9), retries=2, on_error="skip", concurrency=concurrency)
+    report = run(graph, fast)
+    assert sink.values == []
+    assert report.errors == [f'node "node" failed in firing {number}: ConnectionResetError: try 3' for number in (1, 2)]
+    assert (report.nodes["node"].failed, report.nodes["node"].retries) == (2, 4)
+    graph, _ = trying(Device(fails=9), retries=2, concurrency=concurrency)
+    with pytest.raises(hfg.errors.NodeError, match='node "node" failed in firing 1: ConnectionResetError: try 3'):
+        run(graph, fast)
+
+
+@pytest.mark.rule("X1", "X2")
+@CONCURRENCY
+def test_each_attempt_has_the_whole_time_limit(concurrency: int, fast: bool) -> None:
+    class Slow(hfg.Node):
+        value = hfg.Input(int)
+        out = hfg.Output(int)
+
+        def setup(self) -> None:
+            self.tries = 0
+
+        async def process(self, value: int) -> int:
+            self.tries += 1
+            await asyncio.sleep(4 if self.tries > 1 else 100)
+            return value
+
+    graph, sink = trying(Slow(), 1, retries=1, retry_backoff_s=1, max_duration_s=5, concurrency=concurrency)
+    report = run(graph, fast)
+    assert sink.values == [1]
+    assert report.duration_s == 5 + 1 + 4
+
+
+@pytest.mark.rule("X1", "F3")
+@CONCURRENCY
+def test_a_firing_that_has_sent_a_signal_is_not_repeated(concurrency: int, fast: bool) -> None:
+    class Tells(Device):
+        async def process(self, value: int) -> None:
+            self.told.trigger(value)
+            await super().process(value)
+
+    graph, _ = trying(Tells(), retries=5, on_error="skip", concurrency=concurrency)
+    report = run(graph, fast)
+    assert (report.nodes["node"].failed, report.nodes["node"].retries) == (2, 0)
+
+
+@pytest.mark.rule("X1")
+@CONCURRENCY
+@pytest.mark.parametrize("group", ["loop", "work"])
+def test_plain_functions_are_tried_again_too(concurrency: int, group: str, fast: bool) -> None:
+    tries: list[int] = []
+
+    @hfg.node
+    def flaky(value: int) -> int:
+        tries.append(value)
+        if tries.count(value) < 3:
+            raise OSError("not now")
+        return value
+
+    if group == "loop" and concurrency > 1:
+        pytest.skip("plain functions on the loop have one firing at a time (F14)")
+    graph, sink = trying(flaky(), 4, retries=2, group=group, concurrency=concurrency)
+    graph.group("work", threads=2)
+    run(graph, fast)
+    assert sink.values == [1, 2, 3, 4]
+    assert sorted(tries) == sorted([1, 2, 3, 4] * 3)
+
+
+@pytest.mark.rule("X1", "R6")
+@CONCURRENCY
+def test_pauses_double_up_to_a_maximum_and_are_shortened_by_chance_the_same_for_the_same_seed(
+    concurrency: int, fast: bool
+) -> None:
+    def pauses(seed: int | None, jitter: float) -> list[float]:
+        options: dict[str, Any] = {"retry_backoff_s": 1, "retry_backoff_max_s": 5, "retry_jitter": jitter}
+        graph, _ = trying(Device(fails=5), 1, retries=5, concurrency=concurrency, **options)
+        trace: list[TraceEvent] = []
+        run(graph, fast, trace=trace, seed=seed)
+        return [event.pause_s for event in of_kind(trace, FiringRetried)]
+
+    longest = pauses(None, 0.0)
+    assert longest == [1, 2, 4, 5, 5]
+    drawn = pauses(1, 0.5)
+    assert drawn == pauses(1, 0.5) != pauses(2, 0.5)
+    assert all(whole / 2 <= pause <= whole for pause, whole in zip(drawn, longest, strict=True))
+    assert drawn[3] != drawn[4]
+
+
+@pytest.mark.rule("X1", "R5")
+@CONCURRENCY
+def test_a_run_that_ends_waits_for_no_pause(concurrency: int, fast: bool) -> None:
+    graph, _ = trying(Device(), retries=2, retry_backoff_s=1000, concurrency=concurrency)
+    report = run(graph, fast, until_s=50)
+    assert (report.outcome, report.duration_s) == ("until", 50)
+
+
+@pytest.mark.rule("X1")
+@CONCURRENCY
+def test_retries_are_logged_with_the_path(concurrency: int, caplog: pytest.LogCaptureFixture) -> None:
+    graph, _ = trying(Device(fails=1), 1, retries=3, retry_backoff_s=2, concurrency=concurrency)
+    with caplog.at_level(logging.WARNING, logger="hfg"):
+        run(graph)
+    assert [(record.getMessage(), record.path) for record in caplog.records] == [  # type: ignore[attr-defined]
+        ('node "node": firing 1, attempt 1 of 4, failed: ConnectionResetError: try 1; again in 2 s', "node")
+    ]
+
+
+@pytest.mark.rule("X1", "R4")
+def test_an_edit_waits_until_the_firing_is_over(fast: bool) -> None:
+    async def main() -> float:
+        graph, _ = trying(Device(), 1, retries=2, retry_backoff_s=3)
+        async with hfg.running(graph, fast=fast) as run:
+            await asyncio.sleep(2)
+            began = hfg.now()
+            await run.edit(hfg.commands.Remove("keep"))
+            waited = hfg.now() - began
+            await run.wait_finished()
+        return waited
+
+    assert drive(main) == 3 * 1 + 3 + 6 - 2
+
+
+@pytest.mark.rule("X1")
+def test_whoever_ends_a_task_on_purpose_is_not_tried_again(fast: bool) -> None:
+    @hfg.node
+    async def leaves(value: int) -> int:
+        raise SystemExit(3)
+
+    graph, _ = trying(leaves(), retries=3, on_error="skip")
+    trace: list[TraceEvent] = []
+    with pytest.raises(hfg.errors.NodeError, match="left the program"):
+        run(graph, fast, trace=trace)
+    assert not of_kind(trace, FiringRetried)
+    assert len(of_kind(trace, ErrorRaised)) <= 1
+    assert all(earlier.time <= later.time for earlier, later in pairwise(trace))
