@@ -12,9 +12,20 @@ from typing import Any, Protocol, TypeVar
 
 from hfg.ports.automatic import sent_name
 from hfg.testing import nodes as types
+from hfg.testing.operators import Through
 from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
 
-__all__ = ["FEEDS", "Allowed", "Chooser", "SeededChooser", "description", "make_plan", "random_plan"]
+__all__ = [
+    "FEEDS",
+    "SYNCHRONOUS",
+    "WIDE",
+    "Allowed",
+    "Chooser",
+    "SeededChooser",
+    "description",
+    "make_plan",
+    "random_plan",
+]
 
 T = TypeVar("T")
 End = tuple[str, str, str]
@@ -71,6 +82,11 @@ class Allowed:
     parameters: bool = True
     disabling: bool = True
     readiness: bool = True
+    concurrency: bool = False  # several firings of async nodes under way at once
+    through: bool = False  # operators on edges, with schedulers and without
+    iteration: bool = False  # inside of iteration
+    endings: bool = False  # last words, sources without end that work for who will have ended
+    clinging: bool = False  # teardowns that hang
     threads: bool = False
     feeds: bool = False
     sources: bool = True
@@ -90,6 +106,9 @@ SYNCHRONOUS = Allowed(
     readiness=False,
 )
 """What rule F7 speaks of."""
+
+WIDE = Allowed(through=True, iteration=True, endings=True, clinging=True)
+"""All in which something was wrong once."""
 
 _INNER = [
     "double",
@@ -116,8 +135,28 @@ FEEDS = ("red", "blue")
 _WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay", "calm", "restless", "calling"}
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear"}
-_TURNED = {"Scaled": "factor", "Pulse": "most", "Script": "count"}
+_TURNED = {"Scaled": "factor", "Pulse": "most", "Script": "count", "Hums": "tone"}
 """Parameters that edges set; a source with such an edge waits for it."""
+
+_WIRED = ("listed", "EachOfEach", "Hums", "LastWord")
+"""Whose outputs lead where they were made for, and nowhere else."""
+
+_LEFT_ALONE = ("EachOfEach", "Clings")
+"""Who has no slots to be called, or would hang when it is reset."""
+
+_OPERATORS: list[tuple[str, list[float]]] = [
+    ("start_with", [5]),
+    ("skip", [1]),
+    ("take", [2]),
+    ("retry", [2]),
+    ("in_rows", [2, 3]),
+    ("at_last", [8]),
+    ("debounce", [0.004, 0.02]),
+    ("delay", [0.003, 0.01]),
+    ("throttle_first", [0.005]),
+    ("beside_a_timer", [0.002, 0.02]),
+]
+_SEVERAL = ("slow_double", "Waiting", "restless", "calm")
 
 _DELICATE_SLOTS = ["activate", "deactivate", "reset", "disable", "enable"]
 
@@ -141,6 +180,9 @@ class _Making:
         inner += ["Relay", "Relay", "Doubter"] if allowed.events else []
         inner += ["Scaled"] if allowed.parameters else []
         inner += ["OnlyTwice"] if allowed.readiness else []
+        inner += ["LastWord", "LastWord", "Hums"] if allowed.endings and not allowed.plain else []
+        inner += ["EachOfEach"] if allowed.iteration and not allowed.plain else []
+        inner += ["Clings"] if allowed.clinging and not allowed.plain else []
         if not allowed.events:
             inner = [name for name in inner if name != "AsyncRelay"]
         count = choose.number(2, allowed.max_nodes)
@@ -150,7 +192,13 @@ class _Making:
                 kind = choose.one_of(sources)
             else:
                 kind = choose.one_of(plain if allowed.plain and not choose.chance(15) else inner)
+            if kind == "EachOfEach":
+                self.nodes.append(NodePlan(f"n{number}before", "listed"))
             self.nodes.append(NodePlan(f"n{number}", kind, self._parameters(kind), self._options(kind)))
+            if kind == "EachOfEach":
+                self.nodes.append(NodePlan(f"n{number}behind", "summed"))
+            if kind in ("Hums", "LastWord"):
+                self.nodes.append(NodePlan(f"n{number}behind", "add"))
 
     def _plain_kinds(self) -> list[str]:
         allowed = self.allowed
@@ -191,6 +239,12 @@ class _Making:
             options["release"] = choose.one_of(["sequential", "pipelined"])
         if allowed.rates and choose.chance(self._seldom(15)):
             options["max_rate_hz"] = choose.one_of([100.0, 30.0, 70.0])
+        if kind == "EachOfEach":
+            return {name: value for name, value in options.items() if name == "release"}
+        if kind == "Hums" and choose.chance(50):
+            options["max_rate_hz"] = 100.0
+        if kind == "Clings":
+            return options
         if kind in ("Failing", "picky", "gives_up") or (allowed.failures and choose.chance(5)):
             options["on_error"] = choose.one_of(
                 ["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"]
@@ -210,7 +264,13 @@ class _Making:
         return description(plan.type)
 
     def outputs(self, nodes: Sequence[NodePlan]) -> list[End]:
-        return [(node.name, "output", port) for node in nodes for port in self.type_of(node.name).outputs]
+        """Outputs that anybody may be connected to."""
+        return [
+            (node.name, "output", port)
+            for node in nodes
+            if node.type not in _WIRED
+            for port in self.type_of(node.name).outputs
+        ]
 
     def events(self, nodes: Sequence[NodePlan]) -> list[End]:
         """Events with a value; now and then what outputs have sent is among them."""
@@ -239,15 +299,22 @@ class _Making:
             for port, spec in self.type_of(node.name).events.items()
             if spec.type is None
         ]
+        told = [node for node in nodes if node.type not in _LEFT_ALONE]
         start = [("", "event", "start")] if self.allowed.start else []
-        return own + [(node.name, "event", self.choose.one_of(automatic)) for node in nodes] + start
+        return own + [(node.name, "event", self.choose.one_of(automatic)) for node in told] + start
 
     # --- edges
 
     def make_edges(self) -> None:
         choose, allowed = self.choose, self.allowed
         for index, node in enumerate(self.nodes):
+            near = self.outputs(self.nodes[:index]) if node.type == "Hums" and allowed.parameters else []
+            if near and choose.chance(85):
+                self._edge(choose.one_of(near), (node.name, "parameter", "tone"))
             for port, spec in self.type_of(node.name).inputs.items():
+                if index and self.nodes[index - 1].type in _WIRED and port != "a":
+                    self._wire(self.nodes[index - 1], (node.name, "input", port))
+                    continue
                 if choose.chance(92 if not spec.optional else 60):
                     self._connect_input(index, (node.name, "input", port))
         if allowed.events:
@@ -278,6 +345,16 @@ class _Making:
         if candidates:
             self._edge(choose.one_of(candidates), target)
 
+    def _wire(self, before: NodePlan, target: End) -> None:
+        """Connect a node to the one that it was made for."""
+        source = (before.name, "output", next(iter(self.type_of(before.name).outputs)))
+        if before.type == "LastWord" and self.allowed.activity:  # what it says at last is to lie before its END
+            initial = [0] if self.choose.chance(50) else None
+            self._edge(source, target, active=True, initial=initial)
+            self._edge(("", "event", "start"), (before.name, "slot", "activate"))
+        else:
+            self._edge(source, target, active=False if before.type == "listed" else None)
+
     def _has_other_input(self, target: End) -> bool:
         """Whether something else than a ring feeds the node, so that the ring ends."""
         return any(
@@ -303,7 +380,7 @@ class _Making:
                 self._edge(choose.one_of(candidates), (node.name, "slot", port))
         if allowed.activity and allowed.start and slots and choose.chance(60):
             begins = [(node.name, "slot", port) for node, port in slots if port in _ANY_SLOTS]
-            begins += [(node.name, "slot", "activate") for node in self.nodes]
+            begins += [(node.name, "slot", "activate") for node in self.nodes if node.type not in _LEFT_ALONE]
             self._edge(("", "event", "start"), choose.one_of(begins), active=True)
 
     def _delicate_edge(self) -> None:
@@ -315,6 +392,8 @@ class _Making:
             return
         name = choose.one_of(names)
         index = choose.number(0, len(self.nodes) - 1)
+        if self.nodes[index].type in _LEFT_ALONE:
+            return
         nearby = self.nodes[:index] if name in ("reset", "enable") else self.nodes
         candidates = self.events(nearby) + self.signals(nearby)
         if candidates:
@@ -350,6 +429,9 @@ class _Making:
                 options["overflow"] = choose.one_of(["drop_oldest", "drop_newest", "latest"])
                 if options["overflow"] == "latest":
                     options.pop("capacity", None)
+            if allowed.through and not active and choose.chance(15):
+                name, amounts = choose.one_of(_OPERATORS)
+                options["through"] = [Through(name, choose.one_of(amounts))]
         if initial:
             options["initial"] = initial
         if source[1] != "event" and target[1] in ("input", "parameter") and choose.chance(15):
@@ -359,10 +441,20 @@ class _Making:
 
     # --- the rest
 
+    def make_concurrent(self) -> None:
+        """Let some async nodes have several firings under way; those with active edges may not (F14)."""
+        choose = self.choose
+        carrying = {end[0] for edge in self.edges if edge.options.get("active") for end in (edge.source, edge.target)}
+        for index, node in enumerate(self.nodes):
+            if node.type in _SEVERAL and node.name not in carrying and choose.chance(70):
+                options = {name: value for name, value in node.options.items() if name != "release"}
+                options |= {"concurrency": choose.number(2, 3)} | ({"ordered": False} if choose.chance(40) else {})
+                self.nodes[index] = replace(node, options=options)
+
     def make_boxes(self) -> list[BoxPlan]:
         choose = self.choose
         boxes: list[BoxPlan] = []
-        free = [node.name for node in self.nodes if not self._has_parameter_edge(node.name)]
+        free = [node.name for node in self.nodes if node.type != "Clings" and not self._has_parameter_edge(node.name)]
         while len(boxes) < 3 and len(free) > 1 and choose.chance(40):
             members = [name for name in free if choose.chance(45)]
             if not members:
@@ -425,7 +517,8 @@ class _Making:
         choose = self.choose
         slots = [(node.name, "slot", port) for node in self.nodes for port in self.type_of(node.name).slots]
         slots = [slot for slot in slots if slot[2] in _ANY_SLOTS]
-        slots += [(node.name, "slot", port) for node in self.nodes for port in ("activate", "deactivate")]
+        told = [node for node in self.nodes if node.type not in _LEFT_ALONE]
+        slots += [(node.name, "slot", port) for node in told for port in ("activate", "deactivate")]
         event = choose.one_of(["activated", "deactivated", "timeout"])
         self._edge((name, "event", event), choose.one_of(slots))
 
@@ -442,6 +535,8 @@ def make_plan(choose: Chooser, allowed: Allowed | None = None) -> GraphPlan:
     making = _Making(choose, allowed)
     making.make_nodes()
     making.make_edges()
+    if making.allowed.concurrency:
+        making.make_concurrent()
     boxes = making.make_boxes() if allowed.boxes else []
     gates = making.make_gates() if allowed.gates else []
     if allowed.box_ports:

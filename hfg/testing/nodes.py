@@ -15,10 +15,15 @@ import hfg
 __all__ = [
     "AsyncRelay",
     "Attentive",
+    "Clings",
     "Counter",
     "Doubter",
+    "EachOfEach",
+    "EachOfThose",
     "Failing",
     "Greeter",
+    "Hums",
+    "LastWord",
     "Latch",
     "Merge",
     "OnlyTwice",
@@ -41,6 +46,7 @@ __all__ = [
     "either",
     "gives_up",
     "handing",
+    "listed",
     "mood",
     "parted",
     "picky",
@@ -49,6 +55,7 @@ __all__ = [
     "sink",
     "slow_double",
     "some",
+    "summed",
     "with_default",
 ]
 
@@ -528,3 +535,82 @@ class Doubter(hfg.Node):
         self.heard += 1
         if self.heard <= 2:
             self.again.trigger(self.heard)
+
+
+class LastWord(hfg.Node):
+    """Keeps its activity until its end, and says its last word against it."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    left = hfg.Event(int)
+
+    def process(self, value: int) -> None:
+        """Hold the activity back."""
+        self.out.send(value, activity=0)
+
+    def end(self) -> None:
+        """Say it on both ways, with -1 if active."""
+        self.out.send(99, activity=-1 if self.active else None)
+        self.left.trigger(99)
+
+
+class Hums(hfg.Node):
+    """A source without end."""
+
+    out = hfg.Output(int)
+    tone = hfg.Parameter(1)
+
+    def process(self) -> int:
+        """Give the tone."""
+        return self.tone
+
+
+class Clings(hfg.Node):
+    """Never comes back from its teardown."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        """Pass the value on."""
+        return value
+
+    async def teardown(self) -> None:
+        """Wait until it is cancelled."""
+        await asyncio.Event().wait()
+
+
+@hfg.node
+def listed(value: int) -> list[list[int]]:
+    """Make lists of a value, empty ones too."""
+    return [[value] * (number % 3) for number in range(value % 4)]
+
+
+@hfg.node
+def summed(lists: list[list[int]]) -> int:
+    """Give the sum of all that is in the lists."""
+    return sum(map(sum, lists))
+
+
+class EachOfThose(hfg.Subgraph):
+    """For each of a list: twice what is even, later; silence of the others."""
+
+    each = hfg.Input(int)
+    given = hfg.Output(int)
+    iterate_over = ("each",)
+
+    def build(self, graph: hfg.Graph) -> None:
+        """Draw it."""
+        self.each.inner >> graph.add(some()) >> graph.add(slow_double(pause_s=0.001)) >> self.given.inner
+
+
+class EachOfEach(hfg.Subgraph):
+    """For each list of a list what `EachOfThose` does."""
+
+    lists = hfg.Input(list[int])
+    given = hfg.Output(list[int])
+    iterate_over = ("lists",)
+
+    def build(self, graph: hfg.Graph) -> None:
+        """Draw it."""
+        self.lists.inner >> graph.add(EachOfThose()) >> self.given.inner

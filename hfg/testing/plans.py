@@ -272,7 +272,10 @@ class _Writing:
         self.drawing = _Drawing(plan)
 
     def text(self) -> str:
-        lines = ["import hfg", "from typing import Any", "from hfg.testing.nodes import *", ""]
+        lines = ["import hfg", "from typing import Any", "from hfg.testing.nodes import *"]
+        if any("through" in edge.options for edge in self.plan.edges):
+            lines.append("from hfg.testing.operators import Through")
+        lines.append("")
         for box in self.plan.boxes:
             lines += self._class(box)
         lines.append("graph = hfg.Graph()")

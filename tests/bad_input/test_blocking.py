@@ -6,6 +6,7 @@ import asyncio
 import logging
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -48,6 +49,41 @@ def test_no_warning_when_none_is_wanted_or_the_node_is_quick_or_in_a_thread(capl
     graph.group("work", threads=1)
     hfg.run(graph, block_warning_s=0.04)
     assert [record for record in caplog.records if record.name.startswith("hfg")] == []
+
+
+class Dawdles(hfg.Node):
+    """Takes a few milliseconds: far too short for a warning."""
+
+    value = hfg.Input(int)
+    count = hfg.State(0)
+
+    def process(self, value: int) -> None:
+        time.sleep(0.005)
+        self.count += 1
+
+
+@hfg.node
+def without_end() -> Iterator[int]:
+    while True:
+        yield 1
+
+
+def test_nodes_of_some_milliseconds_let_the_loop_turn(fast: bool) -> None:
+    """None of them blocks the loop; dozens in a row would, and timers and Ctrl-C would be as late."""
+    graph, node, turns = hfg.Graph(), Dawdles(), []
+    graph.add(without_end()) >> graph.add(node).value
+
+    async def main() -> None:
+        async with hfg.running(graph, fast=fast) as run:
+            for _ in range(8):
+                before = node.count
+                await asyncio.sleep(0)
+                turns.append(node.count - before)
+            run.stop()
+
+    asyncio.run(main())
+    assert sum(turns) > 0
+    assert max(turns) < 32
 
 
 # --- nodes that never come back ---

@@ -385,7 +385,9 @@ def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None
         return
     if type(value) is Marker:
         target.mark_special()
-    if not holds_one:
+    if not edge.live:  # its operators held it back until its sender was disabled (P9, F10)
+        core.upstairs.rewire(target)
+    elif not holds_one:
         arrived(edge)
 
 

@@ -12,13 +12,16 @@ from hfg.engine.rules.agenda import consider, note_full
 from hfg.engine.rules.listening import find_listeners
 from hfg.ports.edges import AnyEdge, Edge, EventEdge
 
-__all__ = ["is_live", "refresh", "refresh_via", "rewire"]
+__all__ = ["is_live", "reaches", "refresh", "refresh_via", "rewire"]
 
 
 def is_live(edge: Edge) -> bool:
     """Both ends enabled, or the target is an `enable` slot; and no relay on the way disabled."""
-    if edge.source.blocked & DISABLED:
-        return False
+    return not edge.source.blocked & DISABLED and reaches(edge)
+
+
+def reaches(edge: Edge) -> bool:
+    """The same without the source: what that sent before it was disabled is still delivered (F10)."""
     if edge.target.blocked & DISABLED and not (edge.target_kind == "slot" and edge.port_name == "enable"):
         return False
     around = (*edge.source.around, *edge.target.around)  # whether those are enabled is known by their nodes

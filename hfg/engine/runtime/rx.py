@@ -28,6 +28,7 @@ from hfg.engine.model.iteration import Iteration
 from hfg.engine.rules.errors import operator_failed
 from hfg.engine.rules.modifiers import drop
 from hfg.engine.rules.sending import enqueue
+from hfg.engine.rules.wiring import reaches
 from hfg.ports.edges import EventEdge
 from hfg.token import Token
 
@@ -136,7 +137,7 @@ class _EdgeScheduler(RunScheduler):
 
 def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callable[[], None]:
     """Put operators on an event edge, in front of its queue; gives back what takes them off."""
-    newest = [0.0]
+    newest: float | None = None
     subscription = SerialDisposable()
     scheduler = _EdgeScheduler(host, edge.target.within)
 
@@ -144,10 +145,11 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callab
         subject: Subject[Any] = Subject()
 
         def into(token: Token[Any]) -> None:
+            nonlocal newest
             if edge.complete is None:  # the event has completed, as an input has that was given END (F13)
                 drop(edge, token, "ended")
                 return
-            newest[0] = max(newest[0], token.stamp)
+            newest = token.stamp if newest is None else max(newest, token.stamp)
             subject.on_next(token)
 
         edge.pipe(into, subject.on_completed)
@@ -156,10 +158,12 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callab
         )
 
     def out(item: Any) -> None:
+        if not reaches(edge):  # nothing is sent to who is disabled (F10)
+            return
         if type(item) is Token:
             enqueue(edge, item.value, 0, item.stamp)
-        else:
-            enqueue(edge, item, 0, newest[0])
+        else:  # before anything went in it is a signal of a timer (T5)
+            enqueue(edge, item, 0, host.now() if newest is None else newest)
         kick(edge)
 
     def failed(error: Exception) -> None:

@@ -346,7 +346,10 @@ class Firing(RunningCode):
         while station.to_set:
             self.set_parameter(station, *station.to_set.pop(0))
         self.settle()
-        if station.afterwards and not station.flights:
+        if station.afterwards == "rest" and not station.flights:
+            station.afterwards = ""
+            self.rest(station)
+        elif station.afterwards and not station.flights:
             station.afterwards = ""
             self.restart(station)
             self.settle()
@@ -410,8 +413,16 @@ class Firing(RunningCode):
             return
         if options.on_error == "restart":
             station.restarts += 1
-            station.resting_until = self.now + options.restart_backoff_s * 2 ** (station.restarts - 1)
+            if station.is_concurrent:
+                station.afterwards = "rest"
+            else:
+                self.rest(station)
         self.end_firing(flight, outcome, failure)
+
+    def rest(self, station: Station) -> None:
+        """X1: the back-off of a restart begins, of several firings behind the last that is under way (F14)."""
+        pause = station.leaf.options.restart_backoff_s * 2 ** (station.restarts - 1)
+        station.resting_until = self.now + pause
 
     def time_out(self, flight: Flight) -> None:
         """X2: the firing took too long."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Set
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from hfg.errors import QueueLimit, Stalled, UsageError
 from hfg.testing.reference.edits import Editing
@@ -28,7 +28,10 @@ from hfg.trace import (
     TraceEvent,
 )
 
-__all__ = ["Move", "ReferenceMachine"]
+__all__ = ["TEARDOWN_LIMIT_S", "Move", "ReferenceMachine"]
+
+TEARDOWN_LIMIT_S: Final = 5.0
+"""What a node's teardown may take (X3), unless a run is told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,7 @@ class ReferenceMachine(Editing):
         self.make_operators()
         for station in self.stations:
             self.set_up(station)
+        self.note_places()  # of those before whom operators have laid something already (P9)
         self.observe(RunStarted(self.now))
         self.started = True
         self.trigger(ROOT, "start", activity=1)
@@ -575,8 +579,17 @@ class ReferenceMachine(Editing):
         for line in self.lines if outcome in ("stopped", "until") else ():
             for lying in line.queue:
                 self.observe(TokenDropped(self.now, line.edge.label, lying.token, "stopped"))
-        self.observe(RunEnded(self.now, outcome))
         self.close()
+        torn_down = [self.tear_down_at_last(station) for station in reversed(self.stations)]
+        if not all(torn_down) and outcome in ("done", "stopped", "until"):
+            self.outcome = "failed"
+        self.observe(RunEnded(self.now, self.outcome))
+
+    def tear_down_at_last(self, station: Station) -> bool:
+        """X3: in the reverse order of setup, each within its time limit; whether it went well."""
+        hook = station.node._hook("teardown") if station.set_up and station.leaf.inside is None else None
+        station.set_up = False
+        return hook is None or self.run_within(hook, TEARDOWN_LIMIT_S)
 
     def close(self) -> None:
         """Throw away what is under way; needed only if the run is not taken to its end."""

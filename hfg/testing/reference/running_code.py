@@ -200,3 +200,32 @@ class RunningCode(Sending):
                     f'a hook of "{station.path}" waits for time to go by, which the reference does not do'
                 )
         task.result()
+
+    def run_within(self, hook: Any, limit_s: float) -> bool:
+        """Run a hook while time goes by; whether it comes back by itself within its limit, and without an error."""
+        owner, until = object(), self.now + limit_s
+        with self.amid_code():
+            try:
+                result = hook()
+            except Exception:
+                return False
+            if not inspect.iscoroutine(result):
+                return True
+            task = self.loop.start(owner, result)
+        while not task.done():
+            if self.loop.step(owner):
+                continue
+            due = self.loop.next_time_of(owner)
+            if due is None or due > until:
+                self.now = until
+                break
+            self.now = max(self.now, due)
+            self.loop.ring()
+        came_back = task.done() and not task.cancelled() and task.exception() is None
+        task.cancel()
+        while self.loop.step(owner):
+            pass
+        if not task.done():
+            task.get_coro().close()
+        self.loop.forget(owner)
+        return came_back

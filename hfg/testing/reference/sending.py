@@ -97,6 +97,8 @@ class Sending(State):
         if line.operators is not None:
             if not line.completed:
                 line.operators.push(_with(token, activity=0))
+            else:
+                self.observe(TokenDropped(self.now, line.edge.label, _with(token, activity=0), "ended"))
             return
         self.enqueue(line, token, sender)
 
@@ -331,6 +333,9 @@ class Sending(State):
                     pass
                 station.ended = True
                 self.observe(NodeEnded(self.now, station.path))
+                if not station.flights:
+                    self.flush_changes(station)  # what its END has changed is told before its events complete
+                self.note_places()  # of those who wait for END, before operators give out what they hold (F9)
                 self.complete_operators(station)
                 waiting, station.drained_modifiers = station.drained_modifiers, []
                 for modifier in waiting:
@@ -419,7 +424,8 @@ class Sending(State):
                 line.operators.connect()
 
     def _out_of_operators(self, line: Line, token: Token[Any]) -> None:
-        self.enqueue(line, token, line.edge.source.owner)
+        if self.reaches(line):
+            self.enqueue(line, token, line.edge.source.owner)
 
 
 def passed_on(value: Any, activity: int | None, stamp: float | None) -> tuple[Any, int | None, float | None]:

@@ -256,10 +256,15 @@ class State:
 
     def is_live(self, line: Line) -> bool:
         """A live edge: both ends are enabled, or the target port is an `enable` slot."""
-        source, target = line.edge.source, line.edge.target
-        if not self.is_enabled(source.owner):
-            return False
-        if any(not self._box_open(box) for box in line.edge.via):
+        return self.is_enabled(line.edge.source.owner) and self.reaches(line)
+
+    def reaches(self, line: Line) -> bool:
+        """The same without its source: what that sent before it was disabled is still delivered (F10)."""
+        source, target = line.edge.source.owner, line.edge.target
+        around = self.stations[source].leaf.boxes if source >= 0 else ()
+        if is_box(source):
+            around = (*self.structure.boxes[-2 - source].boxes, -2 - source)
+        if any(not self._box_open(box) for box in line.edge.via if box not in around):
             return target.kind == "slot" and target.name == "enable"
         if self.is_outside(target.owner) or (target.kind == "slot" and target.name == "enable"):
             return True
@@ -358,7 +363,10 @@ class State:
             return False
         if station.type.is_source and not self.started:
             return False
-        if not self.has_all_inputs(index) or not self.outputs_are_free(index):
+        if not self.has_all_inputs(index):
+            return False
+        # Of several firings those that are over wait for free outputs, and count: that is their bound (F14).
+        if not station.is_concurrent and not self.outputs_are_free(index):
             return False
         if "queues" not in ignore and self.full_lines(index):
             return False

@@ -114,6 +114,11 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         waiting = [timer for owner, timer in self._timers if not timer.cancelled() and id(owner) not in without]
         return min((timer.when() for timer in waiting), default=None)
 
+    def next_time_of(self, owner: object) -> float | None:
+        """The moment of the next timer of `owner`, or None."""
+        waiting = [timer for one, timer in self._timers if one is owner and not timer.cancelled()]
+        return min((timer.when() for timer in waiting), default=None)
+
     def ring(self) -> None:
         """Make the timers whose moment has come into steps of their owners, in order of time."""
         due = [entry for entry in self._timers if entry[1].when() <= self._now() + MOMENT_S]
