@@ -363,10 +363,7 @@ class State:
             return False
         if station.type.is_source and not self.started:
             return False
-        if not self.has_all_inputs(index):
-            return False
-        # Of several firings those that are over wait for free outputs, and count: that is their bound (F14).
-        if not station.is_concurrent and not self.outputs_are_free(index):
+        if not self.has_all_inputs(index) or not self.outputs_are_free(index):
             return False
         if "queues" not in ignore and self.full_lines(index):
             return False
