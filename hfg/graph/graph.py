@@ -20,6 +20,7 @@ from hfg.graph.checks.checking import check
 from hfg.graph.drawing.formats import draw
 from hfg.graph.editing import transactions
 from hfg.graph.editing.commands import Command
+from hfg.graph.editing.telling import as_commands
 from hfg.graph.structure.adding import add
 from hfg.graph.structure.assigning import declare_group, move
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
@@ -370,7 +371,7 @@ class Graph:
         """
         need_new_port(self._level, "input", name, type)
         port: GraphInput[T] = GraphInput(self, name, type)
-        self._level.ports.add_input(port)
+        self._level.ports.add(port)
         return port
 
     def output(self, name: str, type: TypeForm[T]) -> GraphOutput[T]:  # noqa: A002
@@ -381,7 +382,7 @@ class Graph:
         """
         need_new_port(self._level, "output", name, type)
         port: GraphOutput[T] = GraphOutput(self, name, type)
-        self._level.ports.add_output(port)
+        self._level.ports.add(port)
         return port
 
     def promote(self, outer: ParameterPort[T], inner: ParameterPort[T]) -> None:
@@ -455,6 +456,34 @@ class Graph:
     def can_redo(self) -> bool:
         """Whether an edit was undone last, so that it can be carried out again."""
         return bool(self._level.whole.history.undone)
+
+    @property
+    def history(self) -> tuple[tuple[Command, ...], ...]:
+        """The edits that can be taken back, as they were given, the last one last; of the last 1,000."""
+        return tuple(transaction.commands for transaction in self._level.whole.history.done)
+
+    def as_commands(self) -> list[Command]:
+        """Give the commands that make this graph: in one edit of an empty graph they give an equal one.
+
+        Nodes are made by the references of their types, so types that cannot be found by name are refused, and so are
+        values and code on edges that are no data.
+
+        Raises:
+          GraphError: something cannot be said by commands; the message names it and what to do.
+
+        Example:
+          >>> from hfg import Graph, commands
+          >>> from hfg.testing.nodes import double
+          >>> graph = Graph()
+          >>> node = graph.add(double(), name="twice", max_rate_hz=5)
+          >>> commands.encode(graph.as_commands())
+          '[{"do":"Add","type":"hfg.testing.nodes:double","path":"twice","options":{"max_rate_hz":5}}]'
+          >>> other = Graph()
+          >>> other.edit(*graph.as_commands())
+          >>> list(other.nodes)
+          ['twice']
+        """
+        return as_commands(self._level)
 
     def undo(self) -> None:
         """Take the last edit back: everything is exactly as before it.

@@ -46,6 +46,8 @@ def drawn(graph: Graph, *, identity: bool = True) -> dict[str, Any]:
         "into": sorted(f"{target.path} <- {edge.label}" for target, edge in level.connections.into.items()),
         "pairs": sorted((_path(source), _path(target)) for source, target in level.connections.pairs),
         "gates": [(gate.target.place.path, gate.by.place.path, gate.idle_rate_hz) for gate in graph.gates],
+        "groups": dict(graph.groups) if level.owner is None else {},
+        "ports": [(port.path, port.kind, port.type) for port in (*graph.inputs.values(), *graph.outputs.values())],
         "promoted": {name: [port.path for port in ports] for name, ports in level.promotions.by_name.items()},
         "gated": sorted(node.place.path for node in level.whole.gated if node._place is not None)
         if level.owner is None

@@ -488,3 +488,41 @@ def test_a_gate_that_is_set_while_it_runs_holds_from_the_next_firing_on() -> Non
     trace = drive(build(), body, compare=build())
     kinds = "".join(e.kind[0] for e in trace if isinstance(e, FiringStarted) and e.node == "middle")
     assert kinds == "ppp" + "sss" + "ppp" + "psp" + "e"  # 100 firings a second, of which 50 may be
+
+
+# --- what stays as it is from beginning to end ---
+
+
+@pytest.mark.rule("R4")
+def test_groups_and_ports_of_a_run_stay_as_they_are_also_by_undo_and_it_goes_on() -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph("line")
+        graph.add(script(values=(1, 2, 3)), max_rate_hz=1) >> graph.add(sink())
+        graph.edit(c.AddGroup("late", threads=0))
+        return graph
+
+    graph = build()
+    before = drawn(graph)
+    refused: dict[c.Command, str] = {
+        c.AddGroup("more"): 'the groups of a graph that runs stay as they are, and "more" would be another; declare',
+        c.ChangeGroup("late", policy="priority"): '"late" would be another',
+        c.RemoveGroup("late"): '"late" would be another',
+        c.AddInput("in", "int"): 'the ports of a graph that runs stay as they are, and "in" is one; edit it when',
+    }
+
+    async def body(run: hfg.Run) -> None:
+        for command, sentence in refused.items():
+            with pytest.raises(GraphError, match=sentence):
+                await run.edit(c.Disable("script"), command)
+            assert drawn(graph) == before
+        with pytest.raises(GraphError, match='"late" would be another'):
+            await run.undo()
+        assert drawn(graph) == before
+        await run.edit(c.Move("script", "late"))
+        await run.wait_finished()
+
+    trace = drive(graph, body, compare=build())
+    assert trace.values("script.out -> sink.value")[:-1] == [1, 2, 3]
+    graph.undo()
+    graph.undo()
+    assert "late" not in graph.groups

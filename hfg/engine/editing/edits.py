@@ -35,7 +35,15 @@ from hfg.errors import GraphError, HfgError, NodeError, NotRunning
 from hfg.graph import Graph
 from hfg.graph.checks import check_flat
 from hfg.graph.editing import Transaction, history_of, may_break, prepare, refuse_new_errors
-from hfg.graph.editing.changes import Change, NodeSwap, OptionsChange, ParameterChange, undo_all
+from hfg.graph.editing.changes import (
+    Change,
+    GroupsChange,
+    NodeSwap,
+    OptionsChange,
+    ParameterChange,
+    PortChange,
+    undo_all,
+)
 from hfg.graph.editing.commands import Command, encode
 from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat import FlatNode, flatten
@@ -167,6 +175,8 @@ class Edits:
 
     def _find_out(self, edit: _Following, *, check: bool) -> None:
         """What the changes mean to the run; what no run can follow is refused."""
+        for change in edit.changes:
+            _refuse_for_good(change)
         if self._index is None:
             self._index = PlanIndex(self._engine.core)
         edit.how = diff(self._graph, self._index, edit.changes)
@@ -403,6 +413,27 @@ class Edits:
             if worker.flights is not None:
                 concurrency.abandon(worker)
                 worker.flights.drop_carriers()
+
+
+def _refuse_for_good(change: Change) -> None:
+    """Refuse what a run has from its beginning to its end: the threads of its groups, the ports of the whole.
+
+    Raises:
+      GraphError: it is such a change.
+    """
+    if isinstance(change, PortChange):
+        raise GraphError(
+            f'the ports of a graph that runs stay as they are, and "{change.port.name}" is one; '
+            "edit it when the run is over, with graph.edit(...)"
+        )
+    if isinstance(change, GroupsChange):
+        before, after = change.before[0], change.after[0]
+        name = next((name for name in {**before, **after} if before.get(name) != after.get(name)), None)
+        if name is not None:
+            raise GraphError(
+                f'the groups of a graph that runs stay as they are, and "{name}" would be another; '
+                "declare all that you need before the run, and let nodes move between them with Move"
+            )
 
 
 def _is_to_begin(worker: Worker, on: Collection[Worker], scopes: Set[Scope | None]) -> bool:

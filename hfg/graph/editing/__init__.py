@@ -2,6 +2,7 @@
 
 commands    what is to change            performing  what carries it out: making, copying, enclosing
 changes     its steps, to be taken back  transactions  all or nothing, undo and redo       reloading  of modules
+telling     a graph as the commands that make it     type_texts    types of ports as text
 """
 
 from hfg.graph.editing.transactions import (

@@ -13,8 +13,10 @@ from typing import Any, Self
 
 from typing_extensions import override
 
+from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.groups import Groups, GroupsState
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.membership import close_box, leave, open_box, place, set_options, settle, write_parameter
 from hfg.graph.structure.options import NodeOptions
@@ -27,10 +29,12 @@ __all__ = [
     "EdgeChange",
     "EdgeSwap",
     "GateChange",
+    "GroupsChange",
     "NodeChange",
     "NodeSwap",
     "OptionsChange",
     "ParameterChange",
+    "PortChange",
     "PromotionChange",
     "Renaming",
     "undo_all",
@@ -257,3 +261,37 @@ class PromotionChange(Change):
     @override
     def inverse(self) -> Self:
         return replace(self, before=self.after, after=self.before)
+
+
+@dataclass(eq=False)
+class GroupsChange(Change):
+    """Other groups are declared, or the same otherwise."""
+
+    groups: Groups
+    before: GroupsState
+    after: GroupsState
+
+    @override
+    def do(self) -> None:
+        self.groups.restore(self.after)
+
+    @override
+    def inverse(self) -> Self:
+        return replace(self, before=self.after, after=self.before)
+
+
+@dataclass(eq=False)
+class PortChange(Change):
+    """A port of the whole graph is declared (`added`) or is none any more; always the last one of its kind."""
+
+    level: Level
+    port: GraphInput[Any] | GraphOutput[Any]
+    added: bool
+
+    @override
+    def do(self) -> None:
+        self.level.ports.add(self.port) if self.added else self.level.ports.remove(self.port)
+
+    @override
+    def inverse(self) -> Self:
+        return replace(self, added=not self.added)

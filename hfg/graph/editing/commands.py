@@ -12,11 +12,16 @@ from typing import Any, TypeAlias
 import msgspec
 
 from hfg.errors import GraphError
-from hfg.graph.structure.options import DEFAULT_CAPACITY, Overflow
+from hfg.graph.structure.options import DEFAULT_CAPACITY, Overflow, Policy
 
 __all__ = [
     "Add",
+    "AddGroup",
+    "AddInput",
+    "AddOutput",
+    "AddSubgraph",
     "AnyCommand",
+    "ChangeGroup",
     "Command",
     "Connect",
     "Copy",
@@ -29,6 +34,7 @@ __all__ = [
     "MakeActive",
     "Move",
     "Remove",
+    "RemoveGroup",
     "Rename",
     "Replace",
     "SetParameter",
@@ -56,6 +62,61 @@ class Add(Command, frozen=True):
     path: str
     parameters: dict[str, Any] = {}
     options: dict[str, Any] = {}
+
+
+class AddSubgraph(Command, frozen=True):
+    """Add an empty subgraph that has no type of its own, such as `Enclose` makes; what is inside is added behind it.
+
+    Attributes:
+      path: where, and how it is called there.
+      inputs: the types of its inputs by name, as texts: "int", "list[my_robot.types.Pose]"; so the next three.
+      options: as those of `graph.add`.
+    """
+
+    path: str
+    inputs: dict[str, str] = {}
+    outputs: dict[str, str] = {}
+    events: dict[str, str] = {}
+    slots: dict[str, str] = {}
+    options: dict[str, Any] = {}
+
+
+class AddInput(Command, frozen=True):
+    """Declare a port by which the whole graph is fed (rule P10); its type as a text, "list[my_robot.types.Pose]"."""
+
+    name: str
+    type: str
+
+
+class AddOutput(Command, frozen=True):
+    """Declare a port at which the whole graph is read (rule P10); its type as a text."""
+
+    name: str
+    type: str
+
+
+class AddGroup(Command, frozen=True):
+    """Declare where nodes run, as `graph.group` does."""
+
+    name: str
+    threads: int | None = None
+    policy: Policy = "fifo"
+    seed: int | None = None
+
+
+class ChangeGroup(Command, frozen=True):
+    """Declare a group otherwise; what is not given stays as it was."""
+
+    name: str
+    threads: int | msgspec.UnsetType = msgspec.UNSET
+    policy: Policy | msgspec.UnsetType = msgspec.UNSET
+    seed: int | msgspec.UnsetType | None = msgspec.UNSET
+
+
+class RemoveGroup(Command, frozen=True):
+    """Take a group away in which no node runs."""
+
+    name: str
 
 
 class Remove(Command, frozen=True):
@@ -172,6 +233,12 @@ class Replace(Command, frozen=True):
 
 AnyCommand: TypeAlias = (
     Add
+    | AddSubgraph
+    | AddInput
+    | AddOutput
+    | AddGroup
+    | ChangeGroup
+    | RemoveGroup
     | Remove
     | Copy
     | Rename

@@ -7,12 +7,12 @@ Each edge over the border gets a port of its own, in order, so that what a node 
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import msgspec
 
-from hfg.errors import GraphError
+from hfg.errors import GraphError, HfgError
 from hfg.graph.editing.changes import Change, EdgeChange, GateChange, NodeChange, PromotionChange
 from hfg.graph.structure.connecting import refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
@@ -23,7 +23,7 @@ from hfg.graph.structure.subgraph import Subgraph, inside
 from hfg.nodetype import Node
 from hfg.ports import Event, InnerSource, InnerTarget, Input, Output, ParameterPort, Port, slot
 
-__all__ = ["Enclosed", "dissolve", "enclose"]
+__all__ = ["Enclosed", "declared_box", "dissolve", "enclose"]
 
 Do: TypeAlias = Callable[[Change], None]
 End: TypeAlias = SourceEnd | TargetEnd
@@ -31,6 +31,41 @@ End: TypeAlias = SourceEnd | TargetEnd
 
 class Enclosed(Subgraph):
     """A subgraph that was made by grouping nodes; its ports are those that its edges needed."""
+
+
+# --- making ---
+
+
+def declared_box(ports: Mapping[Any, tuple[str, Any]], path: str) -> Enclosed:
+    """Make an empty subgraph with ports of these names, kinds and types.
+
+    Raises:
+      GraphError: a port cannot be called or typed so.
+    """
+    for name in ports:
+        if not (isinstance(name, str) and name.isidentifier() and _is_free(name)):
+            raise GraphError(f'subgraph "{path}": a port cannot be called {name!r}; choose another name')
+    try:
+        return _box_with({name: _declaration(kind, type_) for name, (kind, type_) in ports.items()})
+    except HfgError as error:
+        raise GraphError(f'subgraph "{path}": {error}') from error
+
+
+def _box_with(body: dict[str, Any]) -> Enclosed:
+    box: Enclosed = types.new_class("Enclosed", (Enclosed,), exec_body=lambda names: names.update(body))()
+    return box
+
+
+def _declaration(kind: str, type_: Any) -> Any:  # noqa: ANN401 - any type hint, and a port of any kind
+    """What stands in the body of the subgraph's class."""
+    match kind:
+        case "slot":
+            return slot(type=type_)
+        case "input":
+            return Input(type_)
+        case "event":
+            return Event(type_)
+    return Output(type_)
 
 
 # --- grouping ---
@@ -51,8 +86,7 @@ def enclose(do: Do, members: Sequence[Node], name: str) -> None:
     edges = [edge for edge in near if not inner.isdisjoint((owner_of(edge.source), owner_of(edge.target)))]
     crossing = [edge for edge in edges if not {owner_of(edge.source), owner_of(edge.target)} <= inner]
     ports = _Names(crossing, inner)
-    kind = types.new_class("Enclosed", (Enclosed,), exec_body=lambda body: body.update(ports.declarations()))
-    box: Enclosed = kind()
+    box = _box_with({port: _declaration(kind, type_) for port, kind, type_ in ports.of.values()})
     halves = [(edge, around.connections.position(edge), _outer_half(edge, box, ports, inner)) for edge in edges]
     for edge in reversed(edges):
         do(EdgeChange.of(around, edge, added=False, for_good=False))
@@ -126,21 +160,6 @@ class _Names:
             else:
                 kind = "event" if end.kind == "event" else "output"
             self.of[edge] = (name, kind, end.type)
-
-    def declarations(self) -> dict[str, Any]:
-        """What stands in the body of the subgraph's class."""
-        made: dict[str, Any] = {}
-        for name, kind, type_ in self.of.values():
-            match kind:
-                case "slot":
-                    made[name] = slot(type=type_)
-                case "input":
-                    made[name] = Input(type_)
-                case "event":
-                    made[name] = Event(type_)
-                case _:
-                    made[name] = Output(type_)
-        return made
 
     def port(self, edge: Edge, box: Enclosed) -> Any:  # noqa: ANN401 - of the kind that the edge needs
         """Give the bound port of an edge."""

@@ -19,27 +19,32 @@ from hfg.graph.editing.changes import (
     EdgeChange,
     EdgeSwap,
     GateChange,
+    GroupsChange,
     NodeChange,
     NodeSwap,
     OptionsChange,
     ParameterChange,
+    PortChange,
     PromotionChange,
     Renaming,
     undo_all,
 )
 from hfg.graph.editing.copying import copy_of
-from hfg.graph.editing.enclosing import dissolve, enclose
+from hfg.graph.editing.enclosing import declared_box, dissolve, enclose
 from hfg.graph.editing.making import as_meant, fitting, kept, made
+from hfg.graph.editing.type_texts import type_of_text
 from hfg.graph.structure.assigning import move
+from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.connecting import declare_edge, refuse
+from hfg.graph.structure.declaring import need_new_port
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of, type_of
 from hfg.graph.structure.finding import same_port
 from hfg.graph.structure.fitting import need_fitting
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.gating import refuse_gate
 from hfg.graph.structure.level import Level, level_of, nodes_within
-from hfg.graph.structure.naming import need_name
-from hfg.graph.structure.options import edge_options
+from hfg.graph.structure.naming import need_name, suggest
+from hfg.graph.structure.options import GroupSpec, edge_options, group_spec
 from hfg.graph.structure.places import side_of
 from hfg.graph.structure.pointing import level_and_name, node_at, parameter_at, source_at, target_at
 from hfg.graph.structure.promoting import refuse_standing, stands_for
@@ -114,13 +119,30 @@ class _Hand:
     # --- nodes ---
 
     def _add(self, command: c.Add) -> None:
-        around, name = level_and_name(self.root, command.path)
-        node = made(command.type, command.parameters, command.path)
+        self._add_node(made(command.type, command.parameters, command.path), command.path, command.options)
+
+    def _add_node(self, node: Node, path: str, options: dict[str, Any]) -> None:
+        around, name = level_and_name(self.root, path)
+        groups = self.root.whole.groups
+        before = groups.state()
         try:
-            around.face.add(node, name=name, **command.options)
+            around.face.add(node, name=name, **options)
         except TypeError as error:
-            raise GraphError(f'node "{command.path}": {error}; options are those of graph.add') from error
+            raise GraphError(f'node "{path}": {error}; options are those of graph.add') from error
+        if groups.state() != before:  # by build() of a subgraph
+            self.changes.append(GroupsChange(groups, before, groups.state()))
         self.changes.append(NodeChange.of(node, added=True))
+
+    def _addsubgraph(self, command: c.AddSubgraph) -> None:
+        declared = {}
+        for kind in ("input", "output", "event", "slot"):
+            for name, text in getattr(command, f"{kind}s").items():
+                if name in declared:
+                    raise GraphError(
+                        f'subgraph "{command.path}": it has two ports "{name}"; give each a name of its own'
+                    )
+                declared[name] = kind, type_of_text(text, f'port "{command.path}.{name}"')
+        self._add_node(declared_box(declared, command.path), command.path, command.options)
 
     def _remove(self, command: c.Remove) -> None:
         self.take_out(node_at(self.root, command.path))
@@ -217,6 +239,61 @@ class _Hand:
                 self.do(GateChange(level, gate, position, added=False))
                 self.do(GateChange(level, _gate_of(gate, old, new), position, added=True))
         self.promote(around, _promoted_by(around, around.promotions.by_name, old, new))
+
+    # --- groups and ports of the whole ---
+
+    def _addgroup(self, command: c.AddGroup) -> None:
+        known = self.root.whole.groups
+        if command.name in known.by_name and command.name != "loop":
+            raise GraphError(
+                f'group "{command.name}" is declared already, as {known.by_name[command.name]}; '
+                "change it with ChangeGroup, or choose another name"
+            )
+        threads = (0 if command.name == "loop" else 1) if command.threads is None else command.threads
+        self._declare(group_spec(command.name, threads, command.policy, command.seed))
+
+    def _changegroup(self, command: c.ChangeGroup) -> None:
+        said = msgspec.structs.asdict(self._group(command.name))
+        given = {name: getattr(command, name) for name in ("threads", "policy", "seed")}
+        self._declare(group_spec(**said | {name: value for name, value in given.items() if value is not msgspec.UNSET}))
+
+    def _declare(self, spec: GroupSpec) -> None:
+        groups = self.root.whole.groups
+        before = groups.state()
+        groups.change(spec)
+        self.changes.append(GroupsChange(groups, before, groups.state()))
+
+    def _removegroup(self, command: c.RemoveGroup) -> None:
+        self._group(command.name)
+        if command.name == "loop":
+            raise GraphError('group "loop" is the event loop itself and is always there; remove another')
+        for level in self.root.walk():
+            for node in level.nodes.values():
+                if node._options.group == command.name:
+                    raise GraphError(
+                        f'group "{command.name}" cannot be removed, for "{node.place.path}" runs in it; '
+                        "move it with Move first, or remove it"
+                    )
+        groups = self.root.whole.groups
+        before = groups.state()
+        groups.remove(command.name)
+        self.changes.append(GroupsChange(groups, before, groups.state()))
+
+    def _group(self, name: str) -> GroupSpec:
+        known = self.root.whole.groups.by_name
+        if name not in known:
+            raise GraphError(f'there is no group "{name}"; {suggest(str(name), known)}')
+        return known[name]
+
+    def _addinput(self, command: c.AddInput) -> None:
+        hint = type_of_text(command.type, f'input "{command.name}" of the graph')
+        need_new_port(self.root, "input", command.name, hint)
+        self.do(PortChange(self.root, GraphInput(self.root.face, command.name, hint), added=True))
+
+    def _addoutput(self, command: c.AddOutput) -> None:
+        hint = type_of_text(command.type, f'output "{command.name}" of the graph')
+        need_new_port(self.root, "output", command.name, hint)
+        self.do(PortChange(self.root, GraphOutput(self.root.face, command.name, hint), added=True))
 
     # --- options and parameters ---
 
@@ -325,11 +402,14 @@ def _refuse_malformed(command: c.Command) -> None:
     """
     for field in command.__struct_fields__:
         value = getattr(command, field)
-        if field in ("parameters", "options") and not isinstance(value, dict):
+        if field in ("parameters", "options", "inputs", "outputs", "events", "slots") and not isinstance(value, dict):
             raise GraphError(f"{type(command).__name__} takes {field} as a dict by name, got {value!r}")
         if field in ("source", "target", "type") and not isinstance(value, str):
-            what = '"module:name"' if field == "type" else '"camera.out"'
+            named = isinstance(command, c.AddInput | c.AddOutput)
+            what = '"camera.out"' if field != "type" else '"int"' if named else '"module:name"'
             raise GraphError(f"{type(command).__name__} takes {field} as a text such as {what}, got {value!r}")
+        if field == "name" and not isinstance(value, str):
+            raise GraphError(f"{type(command).__name__} takes name as a text, got {value!r}")
         if field == "paths" and not (isinstance(value, tuple | list) and all(isinstance(one, str) for one in value)):
             raise GraphError(f'{type(command).__name__} takes several paths, as in ("detect", "track"), got {value!r}')
 

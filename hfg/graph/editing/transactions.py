@@ -16,7 +16,17 @@ import msgspec
 from hfg.errors import GraphError, UsageError
 from hfg.graph.checks.checking import check_flat
 from hfg.graph.editing.changes import Change, undo_all
-from hfg.graph.editing.commands import Add, Command, Connect, Copy, Dissolve, Enclose, Move, Replace
+from hfg.graph.editing.commands import (
+    Add,
+    ChangeGroup,
+    Command,
+    Connect,
+    Copy,
+    Dissolve,
+    Enclose,
+    Move,
+    Replace,
+)
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat.flattening import flatten
@@ -39,7 +49,7 @@ __all__ = [
     "undo",
 ]
 
-_MAY_BREAK = (Add, Connect, Copy, Dissolve, Enclose, Move, Replace)
+_MAY_BREAK = (Add, ChangeGroup, Connect, Copy, Dissolve, Enclose, Move, Replace)
 """Commands after which something may be wrong that only the whole shows."""
 
 

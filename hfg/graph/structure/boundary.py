@@ -64,10 +64,13 @@ class Boundary:
         """Say whether it is one of the three that are the whole graph's, wherever they are named (rule A10)."""
         return port is self.start or port is self.stop or port is self.abort
 
-    def add_input(self, port: GraphInput[Any]) -> None:
-        """Add a port by which the graph is fed."""
-        self.inputs[port.name] = port
+    def add(self, port: GraphInput[Any] | GraphOutput[Any]) -> None:
+        """Add a port by which the graph is fed or read, behind the others."""
+        if isinstance(port, GraphInput):
+            self.inputs[port.name] = port
+        else:
+            self.outputs[port.name] = port
 
-    def add_output(self, port: GraphOutput[Any]) -> None:
-        """Add a port at which the graph is read."""
-        self.outputs[port.name] = port
+    def remove(self, port: GraphInput[Any] | GraphOutput[Any]) -> None:
+        """Take such a port away."""
+        del (self.inputs if isinstance(port, GraphInput) else self.outputs)[port.name]

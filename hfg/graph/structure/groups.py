@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 from hfg.errors import GraphError
 from hfg.graph.structure.options import GroupSpec
 
-__all__ = ["Groups"]
+__all__ = ["Groups", "GroupsState"]
+
+GroupsState: TypeAlias = tuple[dict[str, GroupSpec], set[str]]
+"""All groups by name, and which of them were declared."""
 
 
 class Groups:
@@ -35,10 +40,21 @@ class Groups:
         self._declared.add(spec.name)
         self.by_name[spec.name] = spec
 
-    def state(self) -> tuple[dict[str, GroupSpec], set[str]]:
+    def change(self, spec: GroupSpec) -> None:
+        """Let a group be declared otherwise, in its place in the order."""
+        self._declared.add(spec.name)
+        self.by_name[spec.name] = spec
+
+    def remove(self, name: str) -> None:
+        """Take a group away."""
+        self._declared.discard(name)
+        del self.by_name[name]
+
+    def state(self) -> GroupsState:
         """Give what `restore` takes."""
         return dict(self.by_name), set(self._declared)
 
-    def restore(self, state: tuple[dict[str, GroupSpec], set[str]]) -> None:
+    def restore(self, state: GroupsState) -> None:
         """Let everything be as it was."""
-        self.by_name, self._declared = state
+        by_name, declared = state
+        self.by_name, self._declared = dict(by_name), set(declared)

@@ -1,0 +1,227 @@
+"""Tells a graph as the commands that make it: carried out on an empty graph they give an equal one (rule R4).
+
+While they are found they are carried out on a second graph, so that it is known what the types of subgraphs build by
+themselves, and so that what is told is seen to be true. Stands on `performing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from hfg.errors import GraphError, HfgError
+from hfg.graph.editing import commands as c
+from hfg.graph.editing.enclosing import Enclosed
+from hfg.graph.editing.performing import perform
+from hfg.graph.editing.type_texts import text_of_type
+from hfg.graph.structure.edge import Edge, is_feed
+from hfg.graph.structure.level import Level
+from hfg.graph.structure.options import EdgeOptions, NodeOptions
+from hfg.graph.structure.subgraph import Subgraph, inside, is_box
+from hfg.graph.structure.whole import Whole
+from hfg.nodetype import Node
+
+__all__ = ["as_commands"]
+
+_PLAIN_NODE = NodeOptions()
+_PLAIN_EDGE = EdgeOptions()
+
+
+def as_commands(level: Level) -> list[c.Command]:
+    """See `Graph.as_commands`.
+
+    Raises:
+      GraphError: something of the graph cannot be said by commands.
+    """
+    if level.owner is not None:
+        raise GraphError(
+            f'{level.title} is told with the whole graph: write graph.as_commands() of "{level.whole.root.name}"'
+        )
+    telling = _Telling(level)
+    telling.tell()
+    return telling.commands
+
+
+class _Telling:
+    """Finds the commands, and carries each out on a second graph."""
+
+    def __init__(self, root: Level) -> None:
+        self.root = root
+        self.commands: list[c.Command] = []
+        self.made = Level(root.name, Whole(root.whole.make_face))
+
+    def say(self, command: c.Command) -> None:
+        """Say one more.
+
+        Raises:
+          GraphError: it cannot be carried out, so that nobody else could either.
+        """
+        try:
+            perform(self.made, [command])
+        except HfgError as error:
+            raise GraphError(f"the graph cannot be made by commands, for one of them is refused: {error}") from error
+        self.commands.append(command)
+
+    def tell(self) -> None:
+        """Tell all."""
+        for spec in self.root.whole.groups.by_name.values():
+            if spec != self.made.whole.groups.by_name.get(spec.name):
+                self.say(c.AddGroup(spec.name, spec.threads, spec.policy, spec.seed))
+        for name, port in self.root.ports.inputs.items():
+            self.say(c.AddInput(name, _text(port.type, f'input "{name}" of the graph')))
+        for name, out in self.root.ports.outputs.items():
+            self.say(c.AddOutput(name, _text(out.type, f'output "{name}" of the graph')))
+        self._tell_level(self.root, self.made)
+        self._tell_gates()
+
+    def _tell_level(self, level: Level, made: Level) -> None:
+        waiting = [(level, made)]
+        found: list[tuple[Level, Level]] = []
+        while waiting:  # without recursion, for subgraphs may be as deep as they like
+            level, made = waiting.pop(0)
+            found.append((level, made))
+            for name, node in level.nodes.items():
+                self._tell_node(node)
+                inner, inner_made = inside(node), inside(made.nodes[name])
+                if inner is None or inner_made is None:
+                    continue
+                if inner_made.nodes or inner_made.edges:
+                    self._tell_differences(node, inner, inner_made)
+                else:
+                    waiting.append((inner, inner_made))
+        for level, _ in found:
+            for edge in level.edges:
+                self.say(_connected(edge))
+
+    def _tell_node(self, node: Node) -> None:
+        path, options = node.place.path, _others(node._options, _PLAIN_NODE)
+        reference = node._type.reference
+        if reference is not None:
+            self.say(c.Add(reference, path, _parameters(node), options))
+        elif is_box(node) and type(node).__bases__[0] in (Subgraph, Enclosed) and not node._type.parameters:
+            self.say(_subgraph(node, options))
+        else:
+            raise GraphError(
+                f'node "{path}": its type {node._type.qualname} cannot be found by name, so no command can make it; '
+                "define it at the top of a module"
+            )
+
+    def _tell_differences(self, node: Node, inner: Level, made: Level) -> None:
+        """What is inside of a subgraph is first what its type builds; only values of parameters can be told beside.
+
+        Raises:
+          GraphError: something else was changed.
+        """
+        same = _walk(made)
+        for path, one in _walk(inner).items():
+            other = same.get(path)
+            if other is None or other._type.reference != one._type.reference:
+                continue
+            for name, value in one._parameters.items():
+                spec = one._type.parameters[name]
+                if spec.is_port and not _same(other._parameters.get(name), value):
+                    self.say(c.SetParameter(f"{path}.{name}", value))
+            if one._options.enabled != other._options.enabled:
+                self.say(c.Enable(path) if one._options.enabled else c.Disable(path))
+            if one._options.group != other._options.group:
+                self.say(c.Move(path, one._options.group))
+        if not _same(_drawn(inner), _drawn(made)):
+            raise GraphError(
+                f'subgraph "{node.place.path}": what is inside was edited and is not what {node._type.qualname} '
+                "builds, so no command makes it; let build() of the type make it so, or enclose the nodes in a "
+                "subgraph without a type of its own"
+            )
+
+    def _tell_gates(self) -> None:
+        there = {(gate.target.place.path, gate.by.place.path) for level in self.made.walk() for gate in level.gates}
+        for level in self.root.walk():
+            for gate in level.gates:
+                target, by = gate.target.place.path, gate.by.place.path
+                if (target, by) not in there:
+                    self.say(c.Gate(target, by, gate.idle_rate_hz))
+
+
+def _subgraph(node: Node, options: dict[str, Any]) -> c.AddSubgraph:
+    kind, path = node._type, node.place.path
+
+    def texts(specs: dict[str, Any]) -> dict[str, str]:
+        return {name: _text(spec.type, f'port "{path}.{name}"') for name, spec in specs.items()}
+
+    return c.AddSubgraph(
+        path,
+        texts(dict(kind.inputs)),
+        texts(dict(kind.outputs)),
+        texts(dict(kind.events)),
+        texts(dict(kind.slots)),
+        options,
+    )
+
+
+def _text(hint: object, where: str) -> str:
+    text = text_of_type(hint)
+    if text is None:
+        raise GraphError(
+            f"{where}: its type {hint!r} has no name, so no command can say it; "
+            "give it one in a module, as in Picture = Annotated[...], and declare the port with that"
+        )
+    return text
+
+
+def _parameters(node: Node) -> dict[str, Any]:
+    """The values that are not what the type gives by itself."""
+    specs = node._type.parameters
+    return {name: value for name, value in node._parameters.items() if not _same(specs[name].default, value)}
+
+
+def _others(said: Any, plain: Any) -> dict[str, Any]:  # noqa: ANN401 - options of nodes or of edges
+    return {name: getattr(said, name) for name in said.__struct_fields__ if getattr(said, name) != getattr(plain, name)}
+
+
+def _connected(edge: Edge) -> c.Connect:
+    if is_feed(edge.source):
+        raise GraphError(
+            f'edge "{edge.label}": an observable from outside is code, which no command can say; '
+            "connect it by hand, or feed the graph by graph.input(...)"
+        )
+    if edge.options.through:
+        raise GraphError(
+            f'edge "{edge.label}": its operators are code, which no command can say; '
+            "connect it by hand, or put a node between that does the same"
+        )
+    said = _others(edge.options, _PLAIN_EDGE)
+    if edge.overflow == "latest":
+        del said["capacity"]  # it is 1 by that
+    return c.Connect(edge.source.path, edge.target.path, **said)
+
+
+# --- what is the same ---
+
+
+def _same(one: object, other: object) -> bool:
+    """Whether two values are equal; arrays and others that do not say it count as the same if they are the same."""
+    if one is other:
+        return True
+    try:
+        return bool(one == other)
+    except Exception:  # values of users raise what they like
+        return False
+
+
+def _walk(level: Level) -> dict[str, Node]:
+    """All nodes at a level and inside it, by path."""
+    return {node.place.path: node for one in level.walk() for node in one.nodes.values()}
+
+
+def _drawn(level: Level) -> list[Any]:
+    """All that is inside, as data that can be compared."""
+    return [_drawn_level(one) for one in level.walk()]
+
+
+def _drawn_level(level: Level) -> Any:  # noqa: ANN401
+    paths: Callable[[Iterable[Any]], list[str]] = lambda ports: [port.path for port in ports]  # noqa: E731
+    return (
+        [(name, node._type.reference, node._options, node._parameters) for name, node in level.nodes.items()],
+        [(edge.label, edge.options) for edge in level.edges],
+        [(gate.target.place.path, gate.by.place.path, gate.idle_rate_hz) for gate in level.gates],
+        {name: paths(ports) for name, ports in level.promotions.by_name.items()},
+    )

@@ -1,0 +1,109 @@
+"""Types as text, "list[my_robot.types.Pose]", for commands that declare ports; and back.
+
+A class is called by its module and name, those of Python by their name alone. Stands on errors.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import sys
+import types
+from typing import Any, Literal, Union, get_args, get_origin
+
+from hfg.description import look_up
+from hfg.errors import GraphError
+
+__all__ = ["text_of_type", "type_of_text"]
+
+
+def text_of_type(hint: object) -> str | None:
+    """Give what `type_of_text` reads; None for a type that has no name."""
+    if hint is None or hint is type(None):
+        return "None"
+    if hint is Any:
+        return "Any"
+    if hint is Ellipsis:
+        return "..."
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        plain = all(type(one) in (int, str, bool, type(None)) for one in parts)
+        return f"Literal[{', '.join(map(repr, parts))}]" if plain else None
+    texts = [text_of_type(part) for part in parts]
+    if None not in texts and origin in (Union, types.UnionType):
+        return " | ".join(map(str, texts))
+    if None not in texts and isinstance(origin, type):
+        within = ", ".join(map(str, texts)) or "()"
+        named = _name_of_class(origin)
+        return None if named is None else f"{named}[{within}]"
+    return _name_of_class(hint) if isinstance(hint, type) and not parts else _name_of_alias(hint)
+
+
+def _name_of_class(kind: type) -> str | None:
+    if look_up(kind.__module__, kind.__qualname__) is not kind:
+        return None
+    return kind.__qualname__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__qualname__}"
+
+
+def _name_of_alias(hint: object) -> str | None:
+    """The name that a module has given to a type that has none of its own, such as an array of a shape."""
+    for name, module in list(sys.modules.items()):
+        for own, value in list(getattr(module, "__dict__", {}).items()):
+            if value is hint and own.isidentifier():
+                return f"{name}.{own}"
+    return None
+
+
+def type_of_text(text: str, where: str) -> Any:  # noqa: ANN401 - any type hint
+    """Read a type.
+
+    Raises:
+      GraphError: the text is none, or names what is not there; the message begins with `where`.
+    """
+    remedy = 'write it as in "int" or "list[my_robot.types.Pose]"'
+    if not isinstance(text, str):
+        raise GraphError(f"{where}: a type is given as a text, got {text!r}; {remedy}")
+    try:
+        return _read(ast.parse(text, mode="eval").body)
+    except (SyntaxError, ValueError, TypeError, RecursionError) as error:
+        raise GraphError(f'{where}: "{text}" is no type ({error}); {remedy}') from error
+
+
+def _read(node: ast.expr) -> Any:  # noqa: ANN401
+    match node:
+        case ast.Constant(value=None):
+            return None
+        case ast.Constant(value=value) if value is ...:
+            return ...
+        case ast.Name() | ast.Attribute():
+            return _found(ast.unparse(node))
+        case ast.BinOp(left=left, op=ast.BitOr(), right=right):
+            return Union[_read(left), _read(right)]  # noqa: UP007 - of values
+        case ast.Subscript(value=ast.Name(id="Literal"), slice=inner):
+            return Literal[ast.literal_eval(inner)]
+        case ast.Subscript(value=value, slice=ast.Tuple(elts=elements)):
+            return _read(value)[tuple(map(_read, elements))]
+        case ast.Subscript(value=value, slice=inner):
+            return _read(value)[_read(inner)]
+    raise ValueError(f"what is {ast.unparse(node)}?")
+
+
+def _found(name: str) -> Any:  # noqa: ANN401
+    """What has this name, of a module or of Python."""
+    if name == "Any":
+        return Any
+    *modules, last = name.split(".")
+    if not modules:
+        modules = ["builtins"]
+    for end in range(len(modules), 0, -1):
+        module = ".".join(modules[:end])
+        try:
+            importlib.import_module(module)
+        except ImportError:
+            continue
+        except Exception as error:  # code of users raises what it likes
+            raise ValueError(f"importing {module} failed, {type(error).__name__}: {error}") from error
+        found = look_up(module, ".".join([*modules[end:], last]))
+        if found is not None:
+            return found
+    raise ValueError(f"there is no {name}")
