@@ -422,7 +422,7 @@ REFUSED = [
     (c.Enclose((1,), "box"), "Enclose takes several paths"),  # type: ignore[arg-type]
     (c.Remove(3), "a path is a text"),  # type: ignore[arg-type]
     (c.AddGroup("busy"), 'group "busy" is declared already, as GroupSpec('),
-    (c.AddGroup("two", threads=2), 'group "two": threads must be 0 (on the loop) or 1 (a thread of its own), got 2'),
+    (c.AddGroup("two", threads=-2), 'group "two": threads must be 0 (on the loop), 1 (a thread of its own) or'),
     (c.AddGroup(""), "a group needs a name, got ''"),
     (c.ChangeGroup("bsuy"), 'there is no group "bsuy"; did you mean "busy"?'),
     (c.ChangeGroup("loop", threads=1), 'group "loop": it is the event loop itself and takes no thread'),
