@@ -88,7 +88,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             code = app(args=arguments, prog_name="hfg", standalone_mode=False)
         except TyperException as error:
-            show.sentence(f"{error.format_message().rstrip('.')}; hfg --help shows what there is")
+            said = error.format_message().rstrip(".").replace("Value error, ", "")
+            show.sentence(f"{said}; hfg --help shows what there is")
             return 2
         except TargetError as error:
             show.user_traceback(error.__cause__)

@@ -1,15 +1,13 @@
-"""Runs a graph on a loop of its own, ended by Ctrl-C, with a door for `hfg top`. Stands on the engine and `sockets`."""
+"""Runs a graph on a loop of its own, ended by Ctrl-C, watched by whoever likes. Stands on the engine."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from contextlib import AsyncExitStack
 from typing import Any
 
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.options import Clock
-from hfg.cli.sockets import open_door
 from hfg.engine import PunctualLoop, Report, Run, VirtualTimeLoop, run_async
 from hfg.errors import HfgError, TargetError, UsageError
 from hfg.graph import Graph
@@ -43,22 +41,18 @@ def execute(
     async def main() -> Report:
         task = asyncio.current_task()
         assert task is not None
-        async with AsyncExitStack() as stack:
-            stack.enter_context(interrupt.cancels(task))
-            # On a virtual clock a socket would make the loop look for guests instead of jumping ahead.
-            door = await stack.enter_async_context(open_door(graph.name, target)) if clock is Clock.real else None
+        watch = target if clock is Clock.real else False
+        with interrupt.cancels(task):
             beside: list[Awaitable[None]] = []
 
             def begun(run: Run) -> None:
                 nonlocal begun_run
                 begun_run = run
-                if door is not None:
-                    door.run = run
                 if begin is not None and (waits := begin(run)) is not None:
                     beside.append(asyncio.ensure_future(waits))
 
             try:
-                return await run_async(graph, clock=clock.value, begin=begun, **options)
+                return await run_async(graph, clock=clock.value, begin=begun, watch=watch, **options)
             finally:
                 for one in beside:
                     await one

@@ -21,7 +21,7 @@ class Clock(StrEnum):
 
 def _not_negative(seconds: float | None) -> float | None:
     if seconds is not None and seconds < 0:
-        raise typer.BadParameter(f"--until: seconds are not negative, got {seconds:g}")
+        raise typer.BadParameter(f"seconds are not negative, got {seconds:g}")
     return seconds
 
 

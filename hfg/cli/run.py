@@ -5,30 +5,34 @@ Stands on `execute`, `live`, `target`, `settings`, `interrupt` and `show`.
 
 from __future__ import annotations
 
+import asyncio
 import io
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, TextIO
 
 import typer
 
 from hfg.cli import show
-from hfg.cli.encoding import encode
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.live import live_table
 from hfg.cli.options import ArgOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
+from hfg.engine import Run
+from hfg.engine.observing.encoding import encode
 from hfg.errors import TargetError
 from hfg.graph import Graph
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
 
 __all__ = ["run"]
+
+_TRACES: Final = ("", ".jsonl", ".json")
 
 
 def run(
@@ -64,14 +68,22 @@ def run(
     records.loaded()
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()
+    output = _Output(sys.stdout)
     with (
-        redirect_stdout(sys.stderr if json else sys.stdout),
+        redirect_stdout(sys.stderr if json else output),
         _writing(trace, graph, interrupt) as write,
         live_table(table and not json and clock is Clock.real) as live,
     ):
         interrupt.before_leaving.append(live.leave)
         options = {"until_s": until, "debug": debug, "policy": policy, "seed": seed, "trace": write}
-        report, error = execute(graph, target, clock, interrupt, live.begin, **options)
+
+        def begin(run: Run) -> None:
+            output.when_broken = partial(asyncio.get_running_loop().call_soon_threadsafe, run.stop)
+            live.begin(run)
+
+        report, error = execute(graph, target, clock, interrupt, begin, **options)
+    if output.broken is not None:
+        raise output.broken
     if json and report is not None:
         show.json(report)
     if error is not None:
@@ -90,6 +102,11 @@ def _writing(file: Path | None, graph: Graph, interrupt: Interrupt) -> Iterator[
     if file is None:
         yield None
         return
+    if file.suffix not in _TRACES:
+        raise TargetError(
+            f"the trace cannot be written as {file}: name it {file.with_suffix('.jsonl').name}, one JSON object a "
+            f"line, or {file.with_suffix('.json').name}, a timeline"
+        )
     try:
         stream = _Stream(file)
     except OSError as error:
@@ -131,6 +148,41 @@ class _Stream(io.BufferedWriter):
             self._is_broken = True
             show.sentence(f"the trace in {self._file} is not whole: {error.strerror}")
             return None
+
+
+class _Output:
+    """Stands in for standard output: when nobody reads it any more, as in `hfg run ... | head`, the run is stopped.
+
+    Attributes:
+      broken: why nothing can be written any more.
+      when_broken: called then, from whatever thread has written.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self.broken: BrokenPipeError | None = None
+        self.when_broken: Callable[[], object] = lambda: None
+
+    def write(self, text: str) -> int:
+        self._try(partial(self._stream.write, text))
+        return len(text)
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        self.write("".join(lines))
+
+    def flush(self) -> None:
+        self._try(self._stream.flush)
+
+    def _try(self, call: Callable[[], object]) -> None:
+        if self.broken is None:
+            try:
+                call()
+            except BrokenPipeError as error:
+                self.broken = error
+                self.when_broken()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 def _write(write: Callable[[bytes], object], event: TraceEvent) -> None:

@@ -16,8 +16,8 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from hfg.cli.encoding import encode
 from hfg.clock import current_elapsed
+from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import Report
 from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
 from hfg.frames import is_machinery

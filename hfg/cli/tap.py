@@ -1,6 +1,6 @@
-"""`hfg tap TARGET PATH`: runs a graph and prints the tokens that pass a port or an edge of it.
+"""`hfg tap TARGET PATH`: prints the tokens that pass a port or an edge of a graph, which it runs or which runs already.
 
-Stands on `execute`, `target`, `settings`, `interrupt` and `show`.
+Stands on `execute`, `sockets`, `target`, `settings`, `interrupt` and `show`.
 """
 
 from __future__ import annotations
@@ -8,20 +8,22 @@ from __future__ import annotations
 import sys
 from collections.abc import Awaitable
 from contextlib import redirect_stdout
+from itertools import islice
 from typing import Annotated, Any
 
 import typer
 
 from hfg.cli import completing, show
-from hfg.cli.encoding import encode, text
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.options import Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
 from hfg.cli.settings import set_parameters
+from hfg.cli.sockets import Line
 from hfg.cli.target import load_graph
 from hfg.engine import Run
+from hfg.engine.face.watching import Question
+from hfg.engine.observing.encoding import line_of
 from hfg.errors import GraphError, TargetError, UsageError
-from hfg.token import Token
 
 __all__ = ["tap"]
 
@@ -46,9 +48,19 @@ def tap(
     json: Annotated[bool, typer.Option("--json", help="Write each token as a JSON object.")] = False,
     debug: DebugOption = False,
 ) -> int:
-    """Run a graph and print the tokens of a port or an edge, one a line; what nodes print goes to standard error."""
+    """Print the tokens of a port or an edge, one a line; what nodes print goes to standard error.
+
+    The graph is run for it. If TARGET is the number of a process, as hfg top shows it, look at what runs there.
+    """
     show.set_debug(debug)
     records = show.Records(0, debug, virtual=clock is Clock.virtual)
+    if target.replace("-", "", 1).isdecimal():
+        if param or until is not None or clock is not Clock.real:
+            raise TargetError(
+                f"the run in process {target} goes on as it is, it is only looked at: leave out --param, --until and "
+                "--clock"
+            )
+        return _look_at(target, Question("tap", path, rate, json), limit)
     graph = load_graph(target)
     records.loaded()
     set_parameters(graph, param or [])
@@ -67,6 +79,22 @@ def tap(
     if interrupt.count:
         show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
     return 1 if error is not None or interrupt.count else 0
+
+
+def _look_at(name: str, question: Question, limit: int | None) -> int:
+    """Print what passes in the run of another process, until that is over or nobody wants more."""
+    with Line(name) as line:
+        if line.ask(question) is None:
+            raise TargetError(f"the run in process {name} does not answer: a node blocks its loop")
+        try:
+            for text in islice(line.lines(), limit):
+                sys.stdout.write(text)
+                sys.stdout.flush()
+            if limit is None:
+                show.sentence(f"the run in process {name} is over")
+        except KeyboardInterrupt:  # how one leaves it
+            pass
+    return 0
 
 
 class _Printer:
@@ -100,7 +128,7 @@ class _Printer:
         printed = 0
         try:
             async for token in looking:
-                self._out.write(self._line(token, began))
+                self._out.write(line_of(token, began, json=self._json))
                 self._out.flush()
                 printed += 1
                 if printed == self._limit:
@@ -112,9 +140,3 @@ class _Printer:
         self.seen = looking.seen
         looking.close()
         run.stop()
-
-    def _line(self, token: Token[Any], began: float) -> str:
-        if self._json:
-            return encode(token).decode() + "\n"
-        modifier = f"  ({token.activity:+d})" if token.activity else ""
-        return f"{token.stamp - began:.3f} s  {text(token.value)}{modifier}\n"

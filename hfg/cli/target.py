@@ -17,7 +17,9 @@ from typing import Any
 
 from hfg.cli.arguments import builder_arguments
 from hfg.errors import TargetError, in_words
+from hfg.functions import NodeFunction
 from hfg.graph import Graph
+from hfg.nodetype import Node
 
 __all__ = ["load_graph", "load_module"]
 
@@ -69,6 +71,8 @@ def load_module(place: str) -> ModuleType:
         )
     if place.endswith(".py") or "/" in place or "\\" in place:
         return _load_file(Path(place))
+    if Path(place).is_file():
+        raise TargetError(f"{place} is no Python file: name one that ends in .py, or a module that builds the graph")
     if place.startswith("."):
         raise TargetError(f'"{place}" is no module; name one from here on, as in package.module, or a file')
     _import_from(Path.cwd())
@@ -141,6 +145,8 @@ def _named(module: ModuleType, name: str, place: str, has_arguments: bool) -> An
         if not hasattr(found, part):
             raise TargetError(f'{place} has no "{name}"; {_there_are(module)}')
         found = getattr(found, part)
+    if isinstance(found, NodeFunction) or (isinstance(found, type) and issubclass(found, Node)):
+        raise TargetError(f"{place}:{name} is a node type: add it to a Graph, and name that; {_there_are(module)}")
     if isinstance(found, Graph) or _can_build(found) or (has_arguments and inspect.isroutine(found)):
         return found
     if callable(found) and not isinstance(found, type):

@@ -46,7 +46,8 @@ class Foot:
         self._lines: Sequence[str] = ()
         self._widths: list[int] = []
         self._gone = False
-        self._in_a_line = False  # somebody has written a part of one, a prompt perhaps: the lines wait
+        self._part = ""  # of a line that somebody has written and not ended; ours stand below it
+        self._in_a_line = False  # it may be a prompt: the lines wait. If more of it comes, it is none
         self._lock = threading.RLock()
         self.coloured = not os.environ.get("NO_COLOR")
 
@@ -73,7 +74,8 @@ class Foot:
             if self._gone or self._in_a_line:
                 return
             over = "".join(f"{line}\x1b[K\n" for line in lines)
-            self._write(f"{self._up()}{over}\x1b[J")
+            begin = self._up() if self._lines or not self._part else "\n"
+            self._write(f"{begin}{over}\x1b[J")
             self._lines = lines
             self._widths = [cell_len(line) for line in lines] if widths is None else widths
 
@@ -81,7 +83,9 @@ class Foot:
         """Take the lines away."""
         with self._lock:
             if self._lines:
-                self._write(f"{self._up()}\x1b[J")
+                column = cell_len(self._part) % self.size()[0]
+                back = f"\x1b[1A\x1b[{column + 1}G" if self._part else ""
+                self._write(f"{self._up()}\x1b[J{back}")
                 self._lines = ()
 
     def leave(self) -> None:
@@ -114,7 +118,10 @@ class Foot:
             self.clear()
             stream.write(text)
             stream.flush()
-            self._in_a_line = not text.endswith("\n")
+            _, newline, part = text.rpartition("\n")
+            more_of_it = bool(self._part) and not newline
+            self._part = (part if newline else self._part + part).rpartition("\r")[2]
+            self._in_a_line = bool(self._part) and (not more_of_it or not self._part.isprintable())
             if lines:
                 self.draw(lines, widths)
 

@@ -14,10 +14,11 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.live import EVERY_S
-from hfg.cli.sockets import Answer, Line, runs
+from hfg.cli.sockets import Line, runs
 from hfg.cli.table import View
 from hfg.cli.terminal import Foot, is_terminal
 from hfg.engine import Glance
+from hfg.engine.face.watching import Answer, Question
 from hfg.errors import TargetError
 
 __all__ = ["top"]
@@ -32,16 +33,15 @@ def top(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write one look at the run as JSON.")] = False,
 ) -> int:
-    """Watch a graph that `hfg run` runs in another process, on the real clock; without a terminal, one table."""
+    """Watch a graph that runs in another process, by `hfg run` or a program; without a terminal, one table."""
     there = _find(run)
     if len(there) > 1:
-        rows = [(one.pid, one.graph, one.target) for one in there]
+        rows = [(one.name, one.graph, one.target) for one in there]
         show.table("", ("process", "graph", "target"), rows)
-        show.sentence("more than one graph runs: name its process, as in hfg top " + str(there[0].pid))
+        show.sentence("more than one graph runs: name its process, as in hfg top " + there[0].name)
         return 2
-    pid = there[0].pid
     try:
-        with Line(pid) as line:
+        with Line(there[0].name) as line:
             if json or not is_terminal(sys.stdout):
                 return _once(line, json)
             _watch(line)
@@ -56,18 +56,19 @@ def _find(named: str | None) -> list[Answer]:
     Raises:
       TargetError: none is.
     """
-    if named is not None and named.isdecimal():
-        return [Answer(pid=int(named))]
+    if named is not None and named.replace("-", "", 1).isdecimal():
+        return [Answer(name=named)]
     found = runs()
     if not found:
         raise TargetError(
-            "no graph runs that could be looked at: hfg run begins one, on the real clock, as the same user"
+            "no graph runs that could be looked at: hfg run begins one, or a program with hfg.run(graph, watch=True) "
+            "or HFG_WATCH=1, on the real clock, as the same user"
         )
     if named is None:
         return found
     fitting = [one for one in found if one.graph == named]
     if not fitting:
-        there = ", ".join(f'"{one.graph}" in process {one.pid}' for one in found)
+        there = ", ".join(f'"{one.graph}" in process {one.name}' for one in found)
         raise TargetError(f'no graph "{named}" runs that could be looked at; there is {there}')
     return fitting
 
@@ -118,5 +119,5 @@ def _watch(line: Line) -> None:
 
 
 def _glance(line: Line) -> Glance | None:
-    answer = line.ask("glance")
+    answer = line.ask(Question("glance"))
     return None if answer is None else answer.glance

@@ -30,6 +30,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 import hfg
+from hfg.errors import UsageError
 from hfg.graph import Graph
 from hfg.nodetype import Node
 from hfg.testing.recording import Recorder
@@ -201,6 +202,11 @@ def run(
     Raises:
       ValueError: a name is no input and no slot.
     """
+    if not isinstance(node, Node):
+        raise UsageError(f'a diagram drives a node, got {node!r:.80}: write run(double(), value="1-2")')
+    for name, line in lines.items():
+        if not isinstance(line, str):
+            raise UsageError(f'a diagram is a text, as in {name}="1-2|", got {line!r:.80}')
     graph, seen = Graph(), Recorder()
     graph.add(node, name="node", **(options or {}))
     for name, line in lines.items():
@@ -226,7 +232,7 @@ def _drive(graph: Graph, node: Node, name: str, steps: tuple[Step, ...], tick_s:
         graph.connect(driver.ports.events["signal"], node.ports.slots[name], active=active)
     else:
         known = ", ".join([*node.ports.inputs, *node.ports.slots])
-        raise ValueError(f'"{name}" is no input and no slot; there are {known}')
+        raise ValueError(f'"{name}" is no input and no slot; there are {known or "none"}')
 
 
 def _seen(node: Node, seen: Recorder, tick_s: float) -> dict[str, list[Step]]:

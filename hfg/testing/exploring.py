@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import random
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import hfg
-from hfg.errors import RunError
+from hfg.errors import RunError, UsageError, in_words
 from hfg.graph import Graph
 from hfg.testing.conformance import Divergence, describe, replay
 from hfg.testing.invariants import Invariant, broken, of_graph
@@ -63,6 +64,7 @@ class _Tried:
     outcome: str
     result: Any
     wrong: list[str]
+    error: str = ""
 
     @property
     def length(self) -> int:
@@ -78,23 +80,26 @@ def explore(
     seed: int = 0,
     until_s: float | None = None,
     conform: bool = False,
+    debug: bool = True,
 ) -> Exploration:
     """Run a graph under many seeded schedules in virtual time.
 
     Args:
       build: makes the graph, afresh for every run.
-      runs: how many schedules.
-      invariants: functions over traces that give sentences about what is wrong; by default all of
-        `hfg.testing.invariants`.
+      runs: how many schedules, 1 at least.
+      invariants: functions over traces that give sentences about what is wrong, or `assert` what is right; by default
+        all of `hfg.testing.invariants`.
       result: what must be the same for every schedule; by default how the run ended and, if the graph has synchronous
         edges alone, every sequence of
         tokens that somebody had a use for (rule F7).
       seed: of the seeds.
       until_s: ends every run at that time.
       conform: also compares each run with the reference oracle.
+      debug: checks every value against the type of its port, and that shared values are not changed.
 
     Raises:
       ScheduleFailure: with the shortest of the schedules that fail.
+      UsageError: there is nothing to explore.
 
     Example:
       >>> from hfg.testing.nodes import double, script, sink
@@ -105,14 +110,18 @@ def explore(
       >>> explore(build, runs=5)
       Exploration(runs=5, outcomes={'done': 5}, results=1)
     """
-    checks = list(of_graph(build()) if invariants is None else invariants)
-    measure = result or _default_result(build())
+    graph = _built(build)
+    _need_counts(runs, seed)
+    checks = of_graph(graph) if invariants is None else _need_functions(invariants)
+    if result is not None and not callable(result):
+        raise UsageError(f"result= is a function that takes a trace, got {result!r:.80}")
+    measure = result or _default_result(graph)
     seeds = random.Random(seed)
     outcomes: Counter[str] = Counter()
     first = failing = other = None  # of all traces only these are kept: a thousand do not fit into memory
     failures = 0
     for _ in range(runs):
-        one = _try(build, seeds.randrange(2**31), checks, measure, until_s, conform)
+        one = _try(build, seeds.randrange(2**31), checks, measure, until_s, conform, debug)
         first = first or one
         outcomes[one.outcome] += 1
         if one.wrong:
@@ -131,13 +140,52 @@ def explore(
     return Exploration(runs, dict(outcomes), min(runs, 1))
 
 
+def _built(build: object) -> Graph:
+    """Make the graph once, to see whether it can be made."""
+    again = "explore(build) takes the function that builds the graph, for each run has a graph of its own"
+    if isinstance(build, Graph):
+        raise UsageError(f'{again}; got graph "{build.name}": write def build() -> hfg.Graph: ... around it')
+    if not callable(build):
+        raise UsageError(f"{again}; got {build!r:.80}")
+    try:
+        inspect.signature(build).bind()
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{again}, without arguments: {error}; write explore(lambda: build(...))") from None
+    graph = build()
+    if inspect.iscoroutine(graph):
+        graph.close()
+        raise UsageError(f"{again}; this one is async: let a plain function build it")
+    if not isinstance(graph, Graph):
+        raise UsageError(f"{again}; this one gave back {graph!r:.80}: return the graph")
+    return graph
+
+
+def _need_counts(runs: object, seed: object) -> None:
+    if type(runs) is not int or runs < 1:
+        raise UsageError(f"runs= is how many schedules to try, 1 at least, got {runs!r}: nothing would be explored")
+    if type(seed) is not int:
+        raise UsageError(f"seed= is a whole number, got {seed!r}")
+
+
+def _need_functions(invariants: object) -> list[Invariant]:
+    if not isinstance(invariants, Iterable) or isinstance(invariants, str):
+        raise UsageError(f"invariants= is a list of functions, got {invariants!r:.80}: write invariants=[...]")
+    found = list(invariants)
+    for one in found:
+        if not callable(one) or isinstance(one, type):
+            raise UsageError(f"an invariant is a function that takes a trace, got {one!r:.80}")
+    return found
+
+
 def _shorter(known: _Tried | None, new: _Tried) -> _Tried:
     return new if known is None or new.length < known.length else known
 
 
 def _difference(first: _Tried, other: _Tried) -> str:
     where, one, two = _parting(first.result, other.result)
-    return f"  result{where} is {one!r} with seed {first.seed}\n  result{where} is {two!r} with seed {other.seed}"
+    failed = [f"\n  with seed {run.seed} it failed: {run.error}" for run in (first, other) if run.error]
+    said = f"  result{where} is {one!r} with seed {first.seed}\n  result{where} is {two!r} with seed {other.seed}"
+    return said + "".join(failed)
 
 
 def _parting(one: Any, two: Any) -> tuple[str, Any, Any]:
@@ -166,20 +214,27 @@ def _try(
     measure: Callable[[Recorder], Any],
     until_s: float | None,
     conform: bool,
+    debug: bool,
 ) -> _Tried:
     trace = Recorder()
-    outcome = "failed"
+    outcome, failed = "failed", ""
+    options: dict[str, Any] = {"policy": "random", "seed": seed, "until_s": until_s, "trace": trace, "debug": debug}
     try:
-        outcome = hfg.run(build(), clock="virtual", policy="random", seed=seed, until_s=until_s, trace=trace).outcome
+        outcome = hfg.run(build(), clock="virtual", **options).outcome
     except RunError as error:
-        outcome = trace.outcome or type(error).__name__
+        outcome, failed = trace.outcome or type(error).__name__, str(error)
     wrong = broken(trace, checks)
     if conform and not wrong:
         try:
             replay(build, trace, until_s=until_s)
         except Divergence as divergence:
             wrong = [str(divergence)]
-    return _Tried(seed, trace, outcome, measure(trace), wrong)
+    measured = None
+    try:
+        measured = measure(trace)
+    except Exception as error:
+        wrong.append(f"result: {in_words(error)}")
+    return _Tried(seed, trace, outcome, measured, wrong, failed)
 
 
 def _default_result(graph: Graph) -> Callable[[Recorder], Any]:

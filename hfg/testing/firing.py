@@ -6,17 +6,23 @@ Runs the node's own code and nothing else: no edges, no markers, no rules of act
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 from weakref import WeakSet
 
 from hfg.activity.rules import asked_for
 from hfg.clock import time_told_by
+from hfg.declaration import HOOKS
 from hfg.errors import EndOfStream, UsageError
-from hfg.nodetype import Node
+from hfg.functions import NodeFunction
+from hfg.graph import Graph
+from hfg.graph.structure.naming import suggest
+from hfg.nodetype import Node, Place
 from hfg.testing.reference.waiting import hand_turned_loop
 from hfg.token import Token
+from hfg.types import accepts, describe
 
 __all__ = ["Firing", "Sent", "fire"]
 
@@ -43,39 +49,45 @@ class Firing:
       events: signals in order, as (event, value).
       sent: both with their modifiers and stamps, events first.
       ended: the source has nothing more to give.
+      answer: what a hook gave back, as `ready` does.
     """
 
     outputs: dict[str, Any]
     events: list[tuple[str, Any]]
     sent: list[Sent] = field(repr=False, default_factory=list)
     ended: bool = False
+    answer: Any = field(repr=False, default=None)
 
 
 def fire(
     node: Node,
     /,
-    *,
+    *unnamed: Any,
     slot: str | None = None,
     hook: str | None = None,
     active: bool | None = None,
     parameters: Mapping[str, Any] | None = None,
+    debug: bool = True,
     **values: Any,
 ) -> Firing:
     """Run one firing of a node, one call of a slot, or one hook; state is kept from one to the next.
 
-    `setup()` runs before the first. A value may be a token where the node wants to see one.
+    `setup()` runs before the first. A value may be a token where the node wants to see one. A generator gives its next
+    value with each firing. A node that is in no graph has the place "name of its type" meanwhile.
 
     Args:
       node: belongs to no run at the moment.
+      *unnamed: refused: values go by the names of inputs.
       slot: calls this slot instead, with `value=`, if it takes one.
       hook: runs this hook instead: "end", "teardown", "on_activated" ...
       active: what `node.active` says from now on.
       parameters: are set before.
+      debug: checks what goes in and comes out against the types of the ports.
       values: by input; those left out must be optional.
 
     Raises:
-      UsageError: an input is missing or unknown, or an output was written twice.
-      TypeError: the result does not fit the outputs.
+      UsageError: an input is missing or unknown, or an output was written twice; it is no node, or no hook of one.
+      TypeError: the result does not fit the outputs, or a value its port.
 
     Example:
       >>> import hfg
@@ -100,14 +112,24 @@ def fire(
       >>> fire(door, push=True).outputs
       {'out': 1}
     """
-    place = node._place
-    if place is not None and place.graph._run is not None:
-        raise UsageError(f'"{place.path}" is running: fire a node that no run has')
+    _need_node(node)
+    if unnamed:
+        named = ", ".join(f"{name}={value!r:.20}" for name, value in zip(node._type.inputs, unnamed, strict=False))
+        raise UsageError(f"fire takes values by the names of inputs: write fire(node, {named})")
+    _need_one(node, slot, hook, values)
+    if active is not None and not isinstance(active, bool):
+        raise UsageError(f"active= is what node.active says, True or False, got {active!r}")
+    if parameters is not None and not isinstance(parameters, Mapping):
+        raise UsageError(f'parameters= holds values by name, as in {{"limit": 3}}, got {parameters!r:.80}')
     for name, value in (parameters or {}).items():
         node._set_parameter(name, value)
     if active is not None:
         node._active = active
-    firing = _Firing(node)
+    with _placed(node):
+        return _fire(node, _Firing(node, debug), slot, hook, values)
+
+
+def _fire(node: Node, firing: _Firing, slot: str | None, hook: str | None, values: dict[str, Any]) -> Firing:
     if node not in _SET_UP:
         node._reset_states()
         setup = node._hook("setup")
@@ -121,9 +143,60 @@ def fire(
     return firing.of_process(values)
 
 
+def _need_node(node: object) -> None:
+    if isinstance(node, type) and issubclass(node, Node):
+        raise UsageError(f"fire takes a node, not its type: write fire({node._type.qualname}(...), ...)")
+    if isinstance(node, Graph):
+        raise UsageError(f'fire takes one node; graph "{node.name}" runs as a whole: hfg.run(graph, clock="virtual")')
+    if isinstance(node, NodeFunction):
+        raise UsageError(f"fire takes a node, not its type: write fire({node.__name__}(...), ...)")
+    if not isinstance(node, Node):
+        raise UsageError(
+            f"fire takes a node, as a node type makes it when it is called, got {node!r:.80}: decorate a function "
+            "with @hfg.node, then write fire(function(), ...)"
+        )
+    if node._type.is_subgraph:
+        raise UsageError(
+            f"{node._type.name} is a subgraph and does not fire itself: add it to a graph and run that, or fire a "
+            "node inside"
+        )
+    place = node._place
+    if place is not None and place.graph._run is not None:
+        raise UsageError(f'"{place.path}" is running: fire a node that no run has')
+
+
+def _need_one(node: Node, slot: str | None, hook: str | None, values: dict[str, Any]) -> None:
+    """One thing at a time: a firing, a call or a hook."""
+    if slot is not None and hook is not None:
+        raise UsageError(f'fire runs slot "{slot}" or hook "{hook}", one at a time: write two calls')
+    if hook is None:
+        return
+    if hook not in HOOKS:
+        instead = ": leave hook= out for a firing" if hook == "process" else f"; {suggest(str(hook), HOOKS)}"
+        raise UsageError(f'"{hook}" is no hook of a node{instead}')
+    if values:
+        raise UsageError(f'hook "{hook}" takes no values, got {_names(values)}: leave them out')
+    if hook not in node._type.hooks and hook != "teardown":
+        raise UsageError(f'{node._type.name} does not define "{hook}", so there is nothing to run: leave it out')
+
+
+@contextmanager
+def _placed(node: Node) -> Iterator[None]:
+    """Give a node that is in no graph a place of its own meanwhile, so that its code may ask for its path."""
+    if node._place is not None:
+        yield
+        return
+    node._place = Place(Graph("fire"), node._type.name, node._type.name)
+    try:
+        yield
+    finally:
+        node._place = None
+
+
 class _Firing:
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, debug: bool) -> None:
         self.node = node
+        self.debug = debug
         self.type = node._type
         self.now = 0.0
         self.loop = hand_turned_loop(lambda: self.now)
@@ -165,17 +238,19 @@ class _Firing:
         if strange := set(values) - {"value"}:
             raise UsageError(f"a slot takes value=..., got {_names(strange)}")
         value = values.get("value")
+        spec = self.type.slots[slot]
+        if spec.takes_value and "value" not in values:
+            raise UsageError(f'slot "{self.type.name}.{slot}" takes a value: fire(node, slot="{slot}", value=...)')
+        self._check("slot", slot, spec.type, value)
         token = value if isinstance(value, Token) else Token(value, 0, self.now)
         self.run(lambda: self.node._slot_call(slot)(token))
         return self.result()
 
     def of_hook(self, name: str) -> Firing:
-        found = self.node._hook(name)
-        if found is not None:
-            self.run(found)
+        answer = self.run(getattr(self.node, name))
         if name == "teardown":
             _SET_UP.discard(self.node)
-        return self.result()
+        return replace(self.result(), answer=answer)
 
     def result(self) -> Firing:
         outputs = {sent.name: _plain(sent.value) for sent in self.outputs.values() if _plain(sent.value) is not None}
@@ -224,6 +299,7 @@ class _Firing:
         for name, spec in self.type.inputs.items():
             if name in values:
                 value = values[name]
+                self._check("input", name, spec.type, value)
                 if spec.token:
                     arguments.append(value if isinstance(value, Token) else Token(value, 0, self.now))
                 else:
@@ -238,18 +314,34 @@ class _Firing:
         def write(value: Any, activity: int | None, stamp: float | None) -> None:
             if name in self.outputs:
                 raise UsageError(f'"{self.type.name}.{name}" was written twice in one firing')
+            self._check("output", name, self.type.outputs[name].type, value)
             self.outputs[name] = _sent(name, value, activity, stamp)
 
         return write
 
     def _trigger(self, name: str) -> Callable[[Any, int | None, float | None], None]:
-        return lambda value, activity, stamp: self.signals.append(_sent(name, value, activity, stamp))
-
-    def _wait(self, name: str) -> Callable[[Any, int | None, float | None], Any]:
-        async def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
+        def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
+            self._check("event", name, self.node.ports.events[name].type, value)
             self.signals.append(_sent(name, value, activity, stamp))
 
         return trigger
+
+    def _wait(self, name: str) -> Callable[[Any, int | None, float | None], Any]:
+        at_once = self._trigger(name)
+
+        async def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
+            at_once(value, activity, stamp)
+
+        return trigger
+
+    def _check(self, kind: str, name: str, hint: Any, value: Any) -> None:
+        """With `debug`, what goes through a port is of its type; no value is silence, or a signal without one (T2)."""
+        plain = _plain(value)
+        if self.debug and plain is not None and not accepts(plain, hint):
+            raise TypeError(
+                f'{kind} "{self.type.name}.{name}" is declared {describe(hint)}, got {describe(type(plain))}: '
+                f"{plain!r:.80}"
+            )
 
 
 def _sent(name: str, value: Any, activity: int | None, stamp: float | None) -> Sent:

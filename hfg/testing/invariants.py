@@ -5,11 +5,15 @@ They need no oracle, so they can be asked of a user's own graph: `explore(build,
 
 from __future__ import annotations
 
+import inspect
+import traceback
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, Final
 
+from hfg.errors import UsageError, in_words
 from hfg.token import NO_MESSAGE
 from hfg.trace import (
     ActivityChanged,
@@ -46,7 +50,8 @@ __all__ = [
     "time_never_goes_back",
 ]
 
-Invariant = Callable[[list[TraceEvent]], list[str]]
+Invariant = Callable[[list[TraceEvent]], Iterable[str] | None]
+"""Gives sentences about what is wrong, or None; it may also `assert`."""
 
 
 def no_token_lost(events: list[TraceEvent]) -> list[str]:
@@ -232,12 +237,44 @@ def of_graph(graph: Any) -> list[Invariant]:
 
 
 def broken(events: list[TraceEvent], invariants: Iterable[Invariant] = ALL) -> list[str]:
-    """Ask all of them; give every sentence that says what is wrong."""
-    return [f"{_title(invariant)}: {sentence}" for invariant in invariants for sentence in invariant(events)]
+    """Ask all of them; give every sentence that says what is wrong. One that raises says so, too.
+
+    Raises:
+      UsageError: an invariant gave back something else.
+    """
+    return [f"{_title(invariant)}: {sentence}" for invariant in invariants for sentence in _asked(invariant, events)]
+
+
+def _asked(invariant: Invariant, events: list[TraceEvent]) -> list[str]:
+    try:
+        found: object = invariant(events)
+        if found is None:
+            return []
+        if not isinstance(found, str | bytes) and isinstance(found, Iterable):
+            sentences = list(found)
+            if all(isinstance(one, str) for one in sentences):
+                return sentences
+            found = next(one for one in sentences if not isinstance(one, str))
+    except Exception as error:
+        return [_raised(error)]
+    if inspect.iscoroutine(found):
+        found.close()
+        raise UsageError(f'invariant "{_title(invariant)}" is async: let a plain function look at the trace')
+    raise UsageError(
+        f'invariant "{_title(invariant)}" gave back {found!r:.80}: let it give a list of sentences about what is '
+        "wrong, empty if nothing is, or assert what holds"
+    )
+
+
+def _raised(error: Exception) -> str:
+    """What it raised, and where, for an `assert` often has no words."""
+    frames = traceback.extract_tb(error.__traceback__)
+    last = frames[-1]
+    return f"{in_words(error)} ({Path(last.filename).name}, line {last.lineno}: {last.line})"
 
 
 def _title(invariant: Invariant) -> str:
-    return str(getattr(invariant, "__name__", invariant)).replace("_", " ")
+    return str(getattr(invariant, "__name__", type(invariant).__name__)).replace("_", " ")
 
 
 def _name(event: FiringStarted | CallStarted) -> str:

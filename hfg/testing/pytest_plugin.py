@@ -53,15 +53,18 @@ def virtual_time() -> Callable[[Coroutine[Any, Any, T]], T]:
 
 @pytest.fixture
 def run_graph() -> Callable[..., Ran]:
-    """Give a function that runs a graph in virtual time, with the arguments of `hfg.run`; errors are told."""
+    """Give a function that runs a graph in virtual time, with the arguments of `hfg.run`; errors are told.
 
-    def run(graph: Graph, **options: Any) -> Ran:
+    In debug mode, unless it is said otherwise: values fit the types of their ports, and shared ones are not changed.
+    """
+
+    def run(graph: Graph, *, debug: bool = True, **options: Any) -> Ran:
         import hfg
         from hfg.testing.recording import Recorder
 
         trace = Recorder()
         try:
-            return Ran(hfg.run(graph, clock="virtual", trace=trace, **options), trace)
+            return Ran(hfg.run(graph, clock="virtual", trace=trace, debug=debug, **options), trace)
         except hfg.errors.RunError as error:
             return Ran(None, trace, error)
 

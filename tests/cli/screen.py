@@ -37,6 +37,8 @@ class Screen(io.StringIO):
         elif part.endswith("A") and len(part) > 1:
             self.row -= int(part[2:-1])
             assert self.row >= 0, "above the top"
+        elif part.endswith("G") and len(part) > 1:
+            self.column = int(part[2:-1]) - 1
         elif part == "\x1b[K":
             self.rows[self.row] = self.rows[self.row][: self.column]
         elif part == "\x1b[J":

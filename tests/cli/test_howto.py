@@ -65,4 +65,4 @@ def test_line_works_as_written(command: Command, line: list[str], monkeypatch: p
     program, *arguments = line[: line.index("|")] if "|" in line else line
     assert program == "hfg"
     shown = command(*arguments)
-    assert shown.code == (NOTHING_RUNS if arguments == ["top"] else 0), shown.err
+    assert shown.code == (NOTHING_RUNS if "top" in arguments or "4711" in arguments else 0), shown.err

@@ -71,6 +71,28 @@ def test_a_prompt_is_shown_and_the_table_waits_for_its_end(screen: Screen) -> No
         assert screen.shown == ["name? thanks", "table"]
 
 
+def test_dots_of_progress_stand_above_the_table(screen: Screen) -> None:
+    with table_on(screen) as foot:
+        for dots in (".", "..", "..."):
+            print(".", end="", flush=True)
+            foot.draw(["table", "again"])
+            assert screen.shown == ([dots] if dots == "." else [dots, "table", "again"])
+        print(" done")
+        foot.draw(["table"])
+        assert screen.shown == ["... done", "table"]
+        print("behind")
+    assert screen.shown == ["... done", "behind"]
+
+
+def test_a_line_that_is_written_over_again_and_again_stands_above_the_table(screen: Screen) -> None:
+    with table_on(screen) as foot:
+        for percent in (10, 20, 30):
+            print(f"\r{percent} %", end="", flush=True)
+            foot.draw(["table"])
+        assert screen.shown == ["30 %", "table"]
+    assert screen.shown == ["30 %"]
+
+
 def test_a_terminal_made_narrower_has_no_remains(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
     foot = Foot(screen)
     foot.draw(["x" * 30, "short"])

@@ -17,7 +17,9 @@ import pytest
 
 import hfg
 from hfg.cli import sockets, top
-from hfg.cli.sockets import Line, open_door, runs
+from hfg.cli.sockets import Line, runs
+from hfg.engine.face import watching
+from hfg.engine.face.watching import Question
 from hfg.errors import TargetError
 from tests.cli.conftest import Command
 
@@ -49,8 +51,7 @@ def running(name: str = "ticking") -> Iterator[asyncio.AbstractEventLoop]:
     async def live() -> None:
         graph = hfg.Graph(name)
         graph.add(ticks(), max_rate_hz=50)
-        async with open_door(name, f"{name}.py") as door, hfg.running(graph) as run:
-            door.run = run
+        async with hfg.running(graph, watch=f"{name}.py"):
             loops.append(asyncio.get_running_loop())
             ends.append(asyncio.Event())
             ready.set()
@@ -124,7 +125,7 @@ def test_nothing_runs(command: Command, arguments: tuple[str, ...], sentence: st
 
 
 def test_what_a_dead_process_left_is_removed(command: Command, place: Path) -> None:
-    sockets.folder()
+    watching.folder()
     for pid in (5, 6):
         with socket.socket(socket.AF_UNIX) as dead:
             dead.bind(str(place / f"{pid}.sock"))
@@ -139,21 +140,21 @@ def test_what_a_dead_process_left_is_removed(command: Command, place: Path) -> N
 
 def test_a_run_that_ends_meanwhile_is_over(place: Path) -> None:
     with running():
-        line = Line(os.getpid())
-        assert line.ask("glance") is not None
+        line = Line(str(os.getpid()))
+        assert line.ask(Question("glance")) is not None
     with line, pytest.raises(TargetError, match="is over"):
-        line.ask("glance")
+        line.ask(Question("glance"))
 
 
 def test_a_run_that_blocks_its_loop_is_waited_for(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sockets, "_PATIENCE_S", 0.02)
     free = threading.Event()
-    with running() as loop, Line(os.getpid()) as line:
+    with running() as loop, Line(str(os.getpid())) as line:
         loop.call_soon_threadsafe(free.wait)
-        assert line.ask("glance") is None
+        assert line.ask(Question("glance")) is None
         assert command("top", str(os.getpid())).err == "hfg: the run does not answer: a node blocks its loop\n"
         free.set()
-        while (answer := line.ask("glance")) is None:
+        while (answer := line.ask(Question("glance"))) is None:
             pass
         assert answer.glance is not None
 
@@ -164,7 +165,7 @@ def test_a_run_that_blocks_its_loop_is_waited_for(command: Command, monkeypatch:
 def test_a_question_that_makes_no_sense_gets_an_error(question: bytes) -> None:
     with running(), socket.socket(socket.AF_UNIX) as stranger:
         stranger.settimeout(5)
-        stranger.connect(str(sockets.folder() / f"{os.getpid()}.sock"))
+        stranger.connect(str(watching.folder() / f"{os.getpid()}.sock"))
         stranger.sendall(question)
         assert b'{"error":"the question cannot be understood' in stranger.recv(1000)
 
@@ -173,7 +174,7 @@ def test_a_question_that_makes_no_sense_gets_an_error(question: bytes) -> None:
 def test_whoever_talks_too_much_is_shown_the_door(noise: bytes) -> None:
     with running(), socket.socket(socket.AF_UNIX) as stranger:
         stranger.settimeout(5)
-        stranger.connect(str(sockets.folder() / f"{os.getpid()}.sock"))
+        stranger.connect(str(watching.folder() / f"{os.getpid()}.sock"))
         stranger.sendall(noise)
         with suppress(ConnectionResetError):
             assert stranger.recv(1000) == b""
@@ -182,11 +183,11 @@ def test_whoever_talks_too_much_is_shown_the_door(noise: bytes) -> None:
 
 def test_only_so_many_may_look_at_once() -> None:
     with running():
-        lines = [Line(os.getpid()) for _ in range(sockets._MOST_GUESTS + 1)]
-        answers = [line.ask("name") for line in lines[:-1]]
+        lines = [Line(str(os.getpid())) for _ in range(watching._MOST_GUESTS + 1)]
+        answers = [line.ask(Question("name")) for line in lines[:-1]]
         assert all(answer is not None for answer in answers)
         with pytest.raises(TargetError, match="is over"):
-            lines[-1].ask("name")
+            lines[-1].ask(Question("name"))
         for line in lines:
             with line:
                 pass
@@ -207,7 +208,7 @@ def test_a_folder_that_others_could_enter_is_not_used(
     shown = command("top")
     assert (shown.code, shown.err.count("\n")) == (2, 1)
     assert "must be a folder of yours that others cannot enter" in shown.err
-    with caplog.at_level("INFO", "hfg.cli"), running():
+    with caplog.at_level("INFO", "hfg.engine"), running():
         pass  # a run goes on all the same
     assert "hfg top cannot look at this run" in caplog.text
 
@@ -217,8 +218,8 @@ def test_without_a_runtime_folder_there_is_one_below_the_temporary_ones(
 ) -> None:
     monkeypatch.delenv("XDG_RUNTIME_DIR")
     monkeypatch.setattr(tempfile, "tempdir", str(place.parent))
-    assert sockets.folder() == place.parent / f"hfg-{os.geteuid()}"
-    assert sockets.folder().stat().st_mode & 0o777 == 0o700
+    assert watching.folder() == place.parent / f"hfg-{os.geteuid()}"
+    assert watching.folder().stat().st_mode & 0o777 == 0o700
 
 
 def test_a_path_too_long_for_a_socket_does_not_stop_a_run(
@@ -227,7 +228,7 @@ def test_a_path_too_long_for_a_socket_does_not_stop_a_run(
     long = place.parent / ("x" * 120)
     long.mkdir()
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(long))
-    with caplog.at_level("INFO", "hfg.cli"), running():
+    with caplog.at_level("INFO", "hfg.engine"), running():
         pass
     assert "too long" in caplog.text
 

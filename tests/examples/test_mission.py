@@ -148,7 +148,7 @@ def watched(graph: hfg.Graph, *, until_s: float | None = None, trace: Recorder |
     try:
         hfg.run(graph, clock="virtual", trace=trace, until_s=until_s)
     finally:
-        assert not [sentence for look in OURS for sentence in look(trace)]
+        assert not [sentence for look in OURS for sentence in look(trace) or ()]
     return trace
 
 
@@ -157,7 +157,7 @@ def watched(graph: hfg.Graph, *, until_s: float | None = None, trace: Recorder |
 
 @pytest.mark.rule("A3", "A5", "A6", "F9", "R6")
 def test_the_mission_is_the_same_under_fifty_schedules() -> None:
-    found = explore(partial(mission.build, cubes=(4,)), runs=50, invariants=OURS, result=story)
+    found = explore(partial(mission.build, cubes=(4,)), runs=50, invariants=OURS, result=story, debug=False)
     assert found.outcomes == {"stopped": 50}
 
 

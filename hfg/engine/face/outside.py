@@ -75,11 +75,7 @@ class Feed(Generic[T]):
                 f'the feed of "{self._worker.port_name}" is closed: use it inside "async with run.feed(...)"'
             )
         need_sendable(activity, stamp)
-        if value is not None and not isinstance(value, Token | Marker) and not accepts(value, self._hint):
-            raise TypeError(
-                f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got '
-                f"{describe(type(value))}: {value!r:.80}"
-            )
+        self._check_type(value)
         waiting = _Waiting(self._engine, self._worker)
         try:
             async with self._lock:
@@ -96,8 +92,21 @@ class Feed(Generic[T]):
     def send_from_thread(
         self, value: T | Token[T] | Marker | None, *, activity: int | None = None, stamp: float | None = None
     ) -> concurrent.futures.Future[None]:
-        """Send from any other thread, in order; the future is done when the token is processed."""
+        """Send from any other thread, in order; the future is done when the token is processed.
+
+        Raises:
+          TypeError: the value is not of the input's type.
+        """
+        need_sendable(activity, stamp)
+        self._check_type(value)
         return asyncio.run_coroutine_threadsafe(self.send(value, activity=activity, stamp=stamp), self._engine.loop)
+
+    def _check_type(self, value: object) -> None:
+        if value is not None and not isinstance(value, Token | Marker) and not accepts(value, self._hint):
+            raise TypeError(
+                f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got '
+                f"{describe(type(value))}: {value!r:.80}"
+            )
 
     def _check_not_ended(self) -> None:
         if self._worker.blocked & ENDED:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from types import TracebackType
@@ -17,6 +18,7 @@ from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.face import outside
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
+from hfg.engine.face.watching import watched
 from hfg.engine.observing.report import Report
 from hfg.engine.runtime.interrupt import CtrlC
 from hfg.engine.runtime.settings import RunOptions, Settings
@@ -49,6 +51,11 @@ def _need_no_loop() -> None:
     raise UsageError("hfg.run blocks, and an event loop is running here: write `report = await hfg.run_async(graph)`")
 
 
+def _no_graph(found: object) -> UsageError:
+    how = f"hfg.run({found.__name__}())" if inspect.isfunction(found) else "hfg.run(graph)"
+    return UsageError(f"a Graph can run, not {type(found).__name__}: write {how}")
+
+
 def _settings(options: RunOptions, *, allow_idle: bool = False) -> Settings:
     for name in options.keys() - RunOptions.__annotations__.keys():
         raise TypeError(f'a run has no option "{name}"; {suggest(name, RunOptions.__annotations__)}')
@@ -58,7 +65,7 @@ def _settings(options: RunOptions, *, allow_idle: bool = False) -> Settings:
 def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Composition]:
     """Check the graph and make its running form; nothing has happened yet."""
     if not isinstance(graph, Graph):
-        raise UsageError(f"a Graph can run, not {type(graph).__name__}: write hfg.run(graph)")
+        raise _no_graph(graph)
     _need_clock(clock)
     level = level_of(graph)
     if level.owner is not None:
@@ -71,6 +78,13 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
             'clock="virtual" needs a loop in virtual time: hfg.run(graph, clock="virtual"), or '
             "asyncio.Runner(loop_factory=hfg.VirtualTimeLoop).run(main()) around the whole program"
         )
+    if isinstance(loop, VirtualTimeLoop):
+        if settings.watch_said and settings.watch:
+            raise UsageError(
+                "watch= needs the real clock: in virtual time a run is over before anybody looks; leave watch= out, or "
+                'write clock="real"'
+            )
+        settings.watch = False
     flat = flatten(graph)
     _need_use_of_seed(flat, settings)
     problems = check_flat(flat)
@@ -99,6 +113,22 @@ def _need_use_of_seed(flat: FlatGraph, settings: Settings) -> None:
         )
 
 
+def _need_begin(begin: object) -> None:
+    if begin is None:
+        return
+    if not callable(begin) or inspect.iscoroutinefunction(begin):
+        raise UsageError(
+            f"begin= is a plain function that takes the run, as in begin=lambda run: ..., got {begin!r:.80}; for what "
+            "waits, write `async with hfg.running(graph) as run:`"
+        )
+    try:
+        inspect.signature(begin).bind(None)
+    except TypeError as error:
+        raise UsageError(f"begin= takes the run, as in begin=lambda run: ..., and this one does not: {error}") from None
+    except ValueError:
+        pass  # a builtin that does not tell
+
+
 def _refuse_endless(flat: FlatGraph) -> None:
     """R6: under a virtual clock a source that never ends and waits for nothing would hold time still for ever.
 
@@ -114,25 +144,30 @@ def _refuse_endless(flat: FlatGraph) -> None:
 async def _run_to_end(
     graph: Graph, clock: Clock, settings: Settings, begin: Callable[[Run], object] | None, ctrl_c: CtrlC | None = None
 ) -> Report:
+    _need_begin(begin)
     run, parts = _prepare(graph, clock, settings)
     engine, lifetime = parts.engine, parts.lifetime
     if ctrl_c is not None:
         ctrl_c.task, ctrl_c.lifetime = asyncio.current_task(), lifetime
         ctrl_c.error = lambda: engine.error
     try:
-        for worker in engine.core.readers:
-            outside.collect(engine, worker, parts.outputs.setdefault(worker.port_name, []))
-        if begin is not None:
-            begin(run)
-        if settings.allow_idle:
-            engine.hold()
-        await lifetime.start()
-        await engine.ending.wait()
+        async with watched(run, settings.watch):
+            try:
+                for worker in engine.core.readers:
+                    outside.collect(engine, worker, parts.outputs.setdefault(worker.port_name, []))
+                if begin is not None:
+                    answer = begin(run)
+                    if inspect.iscoroutine(answer):
+                        answer.close()
+                        _need_begin(answer)
+                if settings.allow_idle:
+                    engine.hold()
+                await lifetime.start()
+                await engine.ending.wait()
+            finally:
+                await lifetime.close()
     finally:
-        try:
-            await lifetime.close()
-        finally:
-            level_of(graph).whole.end_run()
+        level_of(graph).whole.end_run()
     parts.raise_failure()
     return parts.report()
 
@@ -167,7 +202,7 @@ def run(
       graph: it is checked first; a graph has one run at a time, and each run starts fresh.
       clock: "real", or "virtual": as fast as the machine can, with the same values and stamps each time (R6).
       until_s: end the run after so many seconds on its clock.
-      debug: check every value against the type of its port.
+      debug: check every value against the type of its port, and that nobody changes a value that is shared (T1).
       policy: for all groups, in place of their own: "fifo", "priority", "random" (R2).
       seed: of the policy "random".
       trace: receives every event of the run (R7); one that raises is removed.
@@ -175,6 +210,8 @@ def run(
       allow_idle: a quiet graph does not end; it waits for subscribers, `stop` or Ctrl-C.
       block_warning_s: after how long a firing on the loop group is warned about; 0 for never.
       fast: fuse plain nodes and take fast paths; outcomes do not differ.
+      watch: let `hfg top` and `hfg tap` in other processes of the same user look at it, on the real clock; a text is
+        what they show as the program. By default if the environment has HFG_WATCH=1.
 
     Returns:
       How it went; `outcome` is "done", "stopped" or "until".
@@ -229,10 +266,15 @@ class _Block(AbstractAsyncContextManager[Run]):
                 "`async with hfg.running(graph) as run:` in an async function, or hfg.run(graph) to run it to its end"
             )
 
-        __await__ = __enter__
+        __await__ = __iter__ = __enter__
 
         def __exit__(self, *exc_info: object) -> None:
             """Never reached; Python looks for it first."""
+
+        def __getattr__(self, name: str) -> NoReturn:
+            raise AttributeError(
+                f'nothing runs yet, so there is no "{name}": write `async with hfg.running(graph) as run:` first'
+            )
 
 
 def running(
@@ -251,15 +293,17 @@ def running(
 
 @asynccontextmanager
 async def _running(graph: Graph, clock: Clock | None, options: RunOptions) -> AsyncIterator[Run]:
-    run, parts = _prepare(graph, clock or "real", _settings(options))
+    settings = _settings(options)
+    run, parts = _prepare(graph, clock or "real", settings)
     engine = parts.engine
     guard = _Guard(parts)
     try:
         parts.stay_open()
-        await parts.lifetime.start()
-        if engine.error is None:
-            guard.begin(graph.name)
-            yield run
+        async with watched(run, settings.watch):
+            await parts.lifetime.start()
+            if engine.error is None:
+                guard.begin(graph.name)
+                yield run
     except asyncio.CancelledError:
         if not guard.has_cancelled():
             engine.finish("cancelled", None)

@@ -252,6 +252,7 @@ class Core:
         self.now = host.now
         self.trace: Callable[[TraceEvent], None] | None = None
         self.debug = False
+        self.sharing: Any = None  # in debug mode: who uses which values (T1)
         self.fast = True
         self.seed = 0  # of the run: what is drawn by chance is the same each time
         self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save

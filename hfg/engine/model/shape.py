@@ -52,7 +52,7 @@ def _announced(vertex: Vertex) -> tuple[tuple[str, int | None], ...]:
 
 
 def _is_plain(vertex: Vertex) -> bool:
-    if vertex.type is None or vertex.process is None or vertex.gates_over or vertex.paced:
+    if vertex.type is None or vertex.process is None or vertex.gates_over or vertex.paced or vertex.core.debug:
         return False
     if vertex.options is not None and (vertex.options.concurrency > 1 or vertex.options.retries):
         return False

@@ -7,6 +7,7 @@ modifiers   what activity does           activity    what follows when it change
 listening   slots that are awake only while their node is active
 wiring      which edges are live         subgraphs   as wholes
 lifecycle   setup, teardown, restart, disable, enable
+sharing     what becomes of it when a value that is shared is changed
 ending      of one node                  sources     which rest, or work for nobody
 quiet       what happens when nothing moves          errors  what becomes of failures
 iterating   when what iterates lets the next element in (G4)

@@ -7,11 +7,12 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import builtin_slots
+from hfg.engine.rules import builtin_slots, sharing
 from hfg.engine.rules.agenda import idle_again
 from hfg.engine.rules.modifiers import derive_scopes, lose, receive, touch
 from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import flush_automatic
+from hfg.errors import UsageError
 from hfg.ports.edges import AnyEdge, SyncEdge
 from hfg.token import Token
 from hfg.trace import CallEnded, CallOutcome, CallStarted, ParameterSet, TokenTaken
@@ -25,6 +26,10 @@ def call(worker: Worker) -> None:
     edge = worker.take_call()
     token = edge.take()
     worker.begin_call(edge, token.stamp)
+    if core.sharing is not None:
+        sharing.taken(worker, (edge,), (token,))
+        if core.over:
+            return
     name = edge.port_name
     if core.trace is not None:
         now = core.now()
@@ -71,10 +76,7 @@ def _run_handler(worker: Worker, name: str, token: Token[Any]) -> None:
                 await_call(worker, name, result)
                 return
             error = refuse_coroutine(worker, result)
-        if error is None:
-            finish_call(worker, "done")
-        else:
-            worker.core.upstairs.fail_call(worker, name, error)
+        _over(worker, name, error)
 
     core.code.execute(worker, handler, (token,), done)
 
@@ -83,12 +85,22 @@ def await_call(worker: Worker, name: str, coroutine: Coroutine[Any, Any, Any]) -
     """A handler that was called by a fast path turned out to wait."""
 
     def done(_result: object, error: BaseException | None) -> None:
-        if error is None:
-            finish_call(worker, "done")
-        else:
-            worker.core.upstairs.fail_call(worker, name, error)
+        _over(worker, name, error)
 
     worker.core.code.drive(worker, coroutine, done)
+
+
+def _over(worker: Worker, name: str, error: BaseException | None) -> None:
+    """The handler's code is over."""
+    if error is None:
+        try:
+            sharing.need_unchanged(worker)
+        except UsageError as changed:
+            error = changed
+    if error is None:
+        finish_call(worker, "done")
+    else:
+        worker.core.upstairs.fail_call(worker, name, error)
 
 
 def refuse_coroutine(worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> TypeError:
@@ -112,6 +124,8 @@ def finish_call(worker: Worker, outcome: CallOutcome) -> None:
         release((edge,))
     worker.leave()
     idle_again(worker)
+    if core.sharing is not None:
+        core.sharing.sweep()
 
 
 def set_parameter(worker: Worker, name: str, value: object) -> None:

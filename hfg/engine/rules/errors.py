@@ -53,6 +53,8 @@ def as_node_error(worker: Worker, what: str, error: BaseException) -> NodeError:
     elif isinstance(error, Exception) and what.startswith("firing") and worker.iteration is None:
         blame = _wrong_value(worker, error)
         cause = f"{in_words(error)}; {blame}" if blame else error
+    if worker.core.sharing is not None:
+        cause = worker.core.sharing.explain(worker, error) or cause
     problem = NodeError(worker.path, what + amid_element(worker), cause)
     problem.__cause__ = error
     return problem

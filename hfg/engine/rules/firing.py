@@ -12,6 +12,7 @@ from types import CoroutineType
 from typing import Any
 
 from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, SAME_MOMENT_S, UNREADY, Worker
+from hfg.engine.rules import sharing
 from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
 from hfg.engine.rules.ending import end, end_itself, ends_itself
@@ -105,6 +106,10 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
     tokens = [take(edge) for edge in edges]
     now = core.now()
     worker.took(shape.sequential, now if worker.is_source else _newest_stamp(tokens, now))
+    if core.sharing is not None:
+        sharing.taken(worker, edges, tokens)
+        if core.over:
+            return
     modifiers = [token.activity for token in tokens if token.activity]
     kind: Any = "end" if ends else _kind(worker, edges, tokens)
     if core.trace is not None:
@@ -396,18 +401,26 @@ def merge(
                     f"firing: return or send, once"
                 )
             written[position] = unwrapped(value)
-    if worker.core.debug and written is not None:
-        for position, name in enumerate(node_type.outputs):
-            entry = written[position]
-            hint = node_type.outputs[name].type
-            if entry is not None and not accepts(entry[0], hint):
-                raise TypeError(
-                    f'output "{worker.path}.{name}" is declared {describe(hint)}, got '
-                    f"{describe(type(entry[0]))}: {entry[0]!r:.80}"
-                )
+    if worker.core.debug:
+        _check_values(worker, written)
     if node_type is not None and node_type.parameters:
         written = _add_parameters(worker, written, worker.node._parameters if parameters is None else parameters)
     return written
+
+
+def _check_values(worker: Worker, written: list[Any] | None) -> None:
+    """In debug mode: what leaves is of its output's type, and what was taken is as it was (T1)."""
+    sharing.need_unchanged(worker)
+    for position, (name, spec) in enumerate(worker.type.outputs.items() if written is not None else ()):
+        entry = written[position]  # type: ignore[index]
+        if entry is None:
+            continue
+        if not accepts(entry[0], spec.type):
+            raise TypeError(
+                f'output "{worker.path}.{name}" is declared {describe(spec.type)}, got '
+                f"{describe(type(entry[0]))}: {entry[0]!r:.80}"
+            )
+        sharing.need_unwritten(worker, name, entry[0])
 
 
 def _add_parameters(worker: Worker, written: list[Any] | None, parameters: dict[str, Any]) -> list[Any]:
@@ -470,3 +483,5 @@ def finish_firing(worker: Worker, outcome: FiringOutcome) -> None:
         release(released)
     worker.leave()
     idle_again(worker)
+    if core.sharing is not None:
+        core.sharing.sweep()

@@ -151,6 +151,8 @@ def put(edge: SyncEdge | BufferEdge, value: object, modifier: int, stamp: float)
     core = target.core
     if core.trace is not None or edge.tap is not None:
         _show(edge, token)
+    if core.sharing is not None:
+        core.sharing.sent(edge, token)
     slot = edge.target_kind == "slot"
     if _is_unheard(edge, token) if slot else target.blocked & ENDED:
         _drain(edge, token)
@@ -364,6 +366,8 @@ def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None
     core = target.core
     if core.trace is not None or edge.tap is not None:
         _show(edge, token)
+    if core.sharing is not None:
+        core.sharing.sent(edge, token)
     if edge.end_sent and value is not END:  # END came first: nobody waits for what comes behind it (F13)
         count_dropped(edge, token, "ended")
         if modifier > 0:

@@ -22,6 +22,7 @@ from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
 from hfg.engine.model.policies import make_policy
+from hfg.engine.model.sharing import Sharing
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import iterating, quiet
 from hfg.engine.runtime import plan, rx
@@ -111,6 +112,9 @@ class Engine:
         self.core: Core = Core(self, Deciders())
         self.callbacks = Callbacks()
         self.core.debug = settings.debug
+        if settings.debug:
+            self.core.sharing = Sharing()
+            self.callbacks.finished.append(self.core.sharing.end)
         self.core.fast = settings.fast
         self.core.seed = settings.seed or 0
         self.core.fuse_after = settings.fuse_after

@@ -14,6 +14,7 @@ from hfg.engine.model.vertex import RunningEvent
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import concurrency, firing
 from hfg.engine.rules.sending import trigger
+from hfg.engine.rules.sharing import need_unwritten
 from hfg.engine.runtime import plan, relays
 from hfg.ports.automatic import is_automatic_event
 from hfg.ports.events import EventPort
@@ -69,7 +70,7 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
         port._emit = concurrency.triggering(worker, port._emit)
         port._emit_wait = concurrency.triggering(worker, port._emit_wait)
     if worker.core.debug:
-        port._emit, port._emit_wait = _checked(port, port._emit), _checked(port, port._emit_wait)
+        port._emit, port._emit_wait = _checked(worker, port, port._emit), _checked(worker, port, port._emit_wait)
     host.adopt_event(port)
     if is_automatic_event(name) and worker.scope is not None:
         plan.watch_scope(worker.scope)
@@ -80,7 +81,9 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     return event
 
 
-def _checked(port: EventPort[Any], emit: Callable[..., Any]) -> Callable[[Any, int | None, float | None], Any]:
+def _checked(
+    worker: Worker, port: EventPort[Any], emit: Callable[..., Any]
+) -> Callable[[Any, int | None, float | None], Any]:
     """In debug mode a signal's value must be of its event's type; none at all always is (T2)."""
 
     def checked(value: Any, activity: int | None, stamp: float | None) -> Any:
@@ -89,8 +92,11 @@ def _checked(port: EventPort[Any], emit: Callable[..., Any]) -> Callable[[Any, i
             raise TypeError(
                 f'event "{port.path}" is declared {describe(port.type)}, got {describe(type(plain))}: {plain!r:.80}'
             )
+        if host.on_loop():  # from a thread values are looked at when they are on their edges
+            need_unwritten(worker, port.name, value)
         return emit(value, activity, stamp)
 
+    host = worker.core.host
     return checked
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TypedDict
 
 from hfg.errors import UsageError
@@ -26,6 +27,7 @@ class RunOptions(TypedDict, total=False):
     trace: Consumer | None
     block_warning_s: float
     fast: bool
+    watch: bool | str | None
 
 
 class Settings:
@@ -46,13 +48,19 @@ class Settings:
         until_s: float | None = None,
         allow_idle: bool = False,
         block_warning_s: float = 0.1,
+        watch: bool | str | None = None,
     ) -> None:
         if until_s is not None and not _seconds(until_s):
             raise UsageError(f"until_s must be seconds from 0 on, or None for no end, got {until_s!r}")
         if not _seconds(block_warning_s):
             raise UsageError(f"block_warning_s must be seconds, or 0 for never, got {block_warning_s!r}")
+        for name, value in (("debug", debug), ("fast", fast), ("allow_idle", allow_idle)):
+            if not isinstance(value, bool):
+                raise UsageError(f"{name} must be True or False, got {value!r}")
         if seed is not None and type(seed) is not int:
             raise UsageError(f"seed must be a whole number, got {seed!r}")
+        if not _may_be_watched(watch):
+            raise UsageError(f"watch must be True or False, or what hfg top shows as the program, got {watch!r}")
         self.debug = debug
         self.check_all = CHECK_ALL
         self.policy = policy
@@ -63,7 +71,25 @@ class Settings:
         self.until_s = until_s
         self.allow_idle = allow_idle
         self.block_warning_s = block_warning_s
+        self.watch = _watch_asked() if watch is None else watch
+        self.watch_said = watch is not None
         self.teardown_limit_s = 5.0  # X3
+
+
+def _may_be_watched(watch: object) -> bool:
+    return watch is None or isinstance(watch, bool) or (isinstance(watch, str) and watch != "")
+
+
+def _watch_asked() -> bool:
+    """Whether the environment asks for runs that other processes can look at.
+
+    Raises:
+      UsageError: nobody knows what it asks for.
+    """
+    asked = os.environ.get("HFG_WATCH", "")
+    if asked not in ("", "0", "1"):
+        raise UsageError(f'HFG_WATCH is "{asked}": set it to 1, so that hfg top can look at runs, or to 0')
+    return asked == "1"
 
 
 def _seconds(value: object) -> bool:

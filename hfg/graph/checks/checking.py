@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Final, TypeAlias
 
+from hfg.graph.checks.changing import changed_inputs
 from hfg.graph.checks.edges import borders, joined_edges, promotions, unseen_parameters
 from hfg.graph.checks.flow import (
     endless_sources,
@@ -59,7 +60,7 @@ _OF_EACH_LEVEL: Final[list[Check]] = [
     endless_sources,
     unfed_slots,
 ]
-_OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions]
+_OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions, changed_inputs]
 
 
 def also(check: Check) -> Check:

@@ -26,8 +26,10 @@ def draw(graph: Graph, path: str | os.PathLike[str] | None = None) -> str:
     """Draw a graph into a file; see `Graph.draw`."""
     if path is None:
         return mermaid(graph)
-    file = Path(path)
     title = level_of(graph).title
+    if not isinstance(path, str | os.PathLike):
+        raise UsageError(f'{title} is drawn into a file, as in graph.draw("graph.mmd"), got {path!r:.80}')
+    file = Path(path)
     write = FORMATS.get(file.suffix)
     if write is None:
         endings = " or ".join(FORMATS)

@@ -38,11 +38,14 @@ def reloaded(graph: Graph, module: str | ModuleType) -> Iterator[list[Replace]]:
     Raises:
       GraphError: the module is not imported, has no source, or its source fails.
     """
+    if not isinstance(module, str | ModuleType):
+        raise GraphError(f'reload takes a module or its name, as in run.reload("robot.nodes"), got {module!r:.80}')
     name = module if isinstance(module, str) else module.__name__
     old = sys.modules.get(name)
     if old is None:
+        named = f'; name the module, "{name[:-3]}", not its file' if name.endswith(".py") else ""
         raise GraphError(
-            f'module "{name}" cannot be reloaded: it is not imported, so no node of the graph is from there'
+            f'module "{name}" cannot be reloaded: it is not imported, so no node of the graph is from there{named}'
         )
     commands = [Replace(node.place.path, reference) for node, reference in _nodes_of(graph, name)]
     code = _compiled(old)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from hfg.errors import UsageError
 from hfg.testing.reference.machine import Move, ReferenceMachine
 from hfg.token import Token
 from hfg.trace import ActivityChanged, QueueGrown, TokenDrained, TokenDropped, TokenSent, TraceEvent
@@ -64,6 +65,7 @@ def reference_run(
 
     Raises:
       RuntimeError: after `max_moves` moves the run is not over.
+      UsageError: it is no graph.
 
     Example:
       >>> import hfg
@@ -74,6 +76,8 @@ def reference_run(
       [1, 2, 3, END]
     """
     machine = ReferenceMachine(graph, until_s=until_s)
+    if choose is not None and not callable(choose):
+        raise UsageError(f"choose= is a function that takes a list of moves and gives one back, got {choose!r:.80}")
     pick = choose or (random.Random(seed).choice if seed is not None else lambda moves: moves[0])
     taken: list[Move] = []
     machine.start()

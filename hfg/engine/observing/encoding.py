@@ -15,7 +15,7 @@ import numpy as np
 
 from hfg.token import Token
 
-__all__ = ["encode", "text"]
+__all__ = ["encode", "line_of", "text"]
 
 _LONGEST_VALUE: Final = 200
 _DEEPEST: Final = 5
@@ -49,6 +49,14 @@ def text(value: Any) -> str:
     if isinstance(value, str):
         value = repr(value)
     return " ".join(str(_text(value)).split("\n"))
+
+
+def line_of(token: Token[Any], began: float, *, json: bool) -> str:
+    """Describe a token on one line, for people with the seconds since `began`, or as JSON."""
+    if json:
+        return encode(token).decode() + "\n"
+    modifier = f"  ({token.activity:+d})" if token.activity else ""
+    return f"{token.stamp - began:.3f} s  {text(token.value)}{modifier}\n"
 
 
 def _writable(value: Any, depth: int) -> Any:

@@ -1,0 +1,257 @@
+"""How other processes look at a run: a Unix domain socket for each, in a folder that belongs to the user alone.
+
+`<folder>/<process id>.sock` is there while the run is; a second run of a process has `<process id>-2.sock`. One line
+of JSON asks and one answers: {"want": "name"} or {"want": "glance"}; {"want": "tap", "path": ...} is answered by a
+line, and then a line for each token. Nothing that comes in is ever executed, and there is a limit to each line and to
+how many may ask. While nobody asks nothing is done. Stands on `run`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import re
+import socket
+import stat
+import sys
+import tempfile
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Final, Literal
+
+import msgspec
+
+from hfg.engine.face.run import Run
+from hfg.engine.observing.encoding import encode, line_of
+from hfg.engine.observing.glance import Glance
+from hfg.engine.observing.taps import Tap
+from hfg.errors import HfgError, TargetError
+from hfg.logs import Log
+
+__all__ = ["Answer", "Door", "Question", "folder", "sockets", "watched"]
+
+_LOGGER = Log("hfg.engine")
+_LONGEST_QUESTION: Final = 1024
+_MOST_GUESTS: Final = 8
+_ID: Final = re.compile(r"[0-9]+(-[0-9]+)?")
+_KEPT: Final = 10_000  # tokens, for a tap: more than a graph sends between two turns of the loop
+
+
+class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is asked.
+
+    Attributes:
+      path: of a tap: a port or an edge.
+      max_rate_hz: of a tap: at most so many tokens a second.
+      json: of a tap: tokens as JSON, not for people.
+    """
+
+    want: Literal["name", "glance", "tap"]
+    path: str = ""
+    max_rate_hz: float | None = None
+    json: bool = False
+
+
+class Answer(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What is answered.
+
+    Attributes:
+      pid: the process that answers.
+      graph: the name of the graph that runs there.
+      target: as `hfg run` was given it, or the program that runs it.
+      glance: if it was asked for.
+      error: why there is no answer.
+      name: of the socket, without its ending: the process, and which of its runs if it has several.
+    """
+
+    pid: int = 0
+    graph: str = ""
+    target: str = ""
+    glance: Glance | None = None
+    error: str = ""
+    name: str = ""
+
+
+def folder() -> Path:
+    """Where the sockets of this user are; made if need be.
+
+    Raises:
+      TargetError: there is none that belongs to this user alone.
+    """
+    if not hasattr(socket, "AF_UNIX") or not hasattr(os, "geteuid"):
+        raise TargetError("runs cannot be looked at from other processes here: that needs Unix domain sockets")
+    own = os.environ.get("XDG_RUNTIME_DIR")
+    place = Path(own, "hfg") if own and Path(own).is_dir() else Path(tempfile.gettempdir(), f"hfg-{os.geteuid()}")
+    try:
+        with contextlib.suppress(FileExistsError):
+            place.mkdir(mode=0o700)
+        found = place.lstat()  # not what a link leads to: somebody else may have put it there
+    except OSError as error:
+        raise TargetError(f"{place}, the folder for sockets of runs, cannot be used: {error.strerror}") from None
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o077:
+        raise TargetError(
+            f"{place}, the folder for sockets of runs, must be a folder of yours that others cannot enter: "
+            f"remove it, or write chmod 700 {place}"
+        )
+    return place
+
+
+def sockets(place: Path) -> dict[str, Path]:
+    """What lies there for each run; nothing else in the folder is ours."""
+    found = {file.stem: file for file in place.glob("*.sock") if _ID.fullmatch(file.stem) and file.is_socket()}
+    return dict(sorted(found.items(), key=lambda item: [int(part) for part in item[0].split("-")]))
+
+
+class Door:
+    """Lets other processes look at a run: nothing is done until one asks."""
+
+    def __init__(self, run: Run, target: str, name: str) -> None:
+        self.run = run
+        self.guests: set[asyncio.Transport] = set()
+        self.name = Answer(os.getpid(), run.graph.name, target, name=name)
+
+    def answer(self, line: bytes) -> Answer | Question:
+        """Answer one question; a tap's is given back."""
+        try:
+            question = msgspec.json.decode(line, type=Question)
+        except msgspec.MsgspecError as error:
+            return Answer(error=f"the question cannot be understood: {error}")
+        if question.want == "name":
+            return self.name
+        if question.want == "tap":
+            return question
+        return msgspec.structs.replace(self.name, glance=self.run.glance())
+
+
+@asynccontextmanager
+async def watched(run: Run, watch: bool | str) -> AsyncIterator[None]:
+    """Let others look inside the block, if they may. If that cannot be, the block goes on, and a log record says why.
+
+    Args:
+      run: what they see.
+      watch: whether they may, or what they are told the program is called.
+    """
+    if watch is False:
+        yield
+        return
+    server: asyncio.Server | None = None
+    file: Path | None = None
+    door: Door | None = None
+    try:
+        file, listening = _listen()
+        door = Door(run, sys.argv[0] if watch is True else watch, file.stem)
+        server = await asyncio.get_running_loop().create_unix_server(lambda: _Guest(door), sock=listening)
+    except (TargetError, OSError) as error:
+        _LOGGER.info("hfg top cannot look at this run: %s", error)
+    try:
+        yield
+    finally:
+        if file is not None:
+            file.unlink(missing_ok=True)
+        if server is not None:
+            server.close()
+        for guest in () if door is None else door.guests:
+            guest.abort()
+
+
+def _listen() -> tuple[Path, socket.socket]:
+    """A socket that listens, under its name only when it does: so who is refused there can be removed."""
+    runs_here = folder()
+    there = sockets(runs_here)
+    for other in there.values():
+        _remove_if_dead(other)
+    own, number = str(os.getpid()), 1
+    while (name := own if number == 1 else f"{own}-{number}") in there and there[name].exists():
+        number += 1
+    file = runs_here / f"{name}.sock"
+    new = file.with_suffix(".new")
+    new.unlink(missing_ok=True)
+    listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        listening.bind(str(new))
+        listening.listen(_MOST_GUESTS)
+        new.rename(file)
+    except OSError:
+        listening.close()
+        new.unlink(missing_ok=True)
+        raise
+    return file, listening
+
+
+def _remove_if_dead(file: Path) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as knocking:
+        knocking.setblocking(False)
+        try:
+            knocking.connect(str(file))
+        except ConnectionRefusedError:
+            file.unlink(missing_ok=True)
+        except OSError:
+            pass  # alive and busy, or gone by now
+
+
+class _Guest(asyncio.Protocol):
+    """One connection: a question, its answer, the next question; a tap has no next."""
+
+    def __init__(self, door: Door) -> None:
+        self._door = door
+        self._asked = b""
+        self._transport: asyncio.Transport
+        self._tapping: asyncio.Task[None] | None = None
+        self._may_write = asyncio.Event()
+        self._may_write.set()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        if len(self._door.guests) >= _MOST_GUESTS:
+            transport.abort()
+            return
+        self._door.guests.add(transport)
+        transport.set_write_buffer_limits(0)  # one answer at a time: whoever does not read is not heard
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._door.guests.discard(self._transport)
+        if self._tapping is not None:
+            self._tapping.cancel()
+
+    def pause_writing(self) -> None:
+        self._transport.pause_reading()
+        self._may_write.clear()
+
+    def resume_writing(self) -> None:
+        self._transport.resume_reading()
+        self._may_write.set()
+
+    def data_received(self, data: bytes) -> None:
+        self._asked += data
+        line, newline, rest = self._asked.partition(b"\n")
+        if (
+            rest or len(line) > _LONGEST_QUESTION or self._tapping is not None
+        ):  # nobody who keeps to the rules does that
+            self._transport.abort()
+        elif newline:
+            self._asked = b""
+            answer = self._door.answer(line)
+            self._say(self._tap(answer) if isinstance(answer, Question) else answer)
+
+    def _say(self, answer: Answer) -> None:
+        self._transport.write(encode(answer) + b"\n")
+
+    def _tap(self, question: Question) -> Answer:
+        size = _KEPT if question.max_rate_hz is None else None
+        try:
+            looking = self._door.run.tap(question.path, size=size, max_rate_hz=question.max_rate_hz)
+        except HfgError as error:
+            return Answer(error=str(error))
+        self._tapping = asyncio.get_running_loop().create_task(self._tell(looking, json=question.json))
+        return self._door.name
+
+    async def _tell(self, looking: Tap, *, json: bool) -> None:
+        began = self._door.run.now()
+        with looking:
+            async for token in looking:
+                await self._may_write.wait()
+                self._transport.write(line_of(token, began, json=json).encode())
+        self._transport.close()

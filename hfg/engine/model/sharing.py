@@ -1,0 +1,411 @@
+"""Values that are shared are not changed (rule T1): debug mode locks arrays, and finds who changes what all the same.
+
+While a value lies on an edge, or a node that has taken it is at work, the arrays in it are read-only, and what else can
+be looked at cheaply is compared with what it was like when it was sent. Who is still at work is read from the edges and
+workers themselves, so that whatever becomes of a token, nothing stays locked. Stands on `worker`; decides nothing.
+"""
+
+from __future__ import annotations
+
+import gc
+import inspect
+import re
+import sys
+import weakref
+from collections import deque
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import chain, islice
+from types import FrameType
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from hfg.engine.model.worker import Worker
+from hfg.nodetype import Node
+from hfg.ports.edges import Edge, SyncEdge
+from hfg.token import Marker, Token
+
+__all__ = ["DEPTH", "Sharing"]
+
+Array = npt.NDArray[Any]
+
+DEPTH: Final = 4
+"""How many containers deep arrays are looked for, and values compared."""
+
+_MOST_PARTS: Final = 1000  # of one value
+_SAMPLE: Final = 4096  # elements of an array, spread over it: a megapixel takes some 20 us
+_SMALL_AXIS: Final = 16  # that short an axis, as of colours, is not thinned out
+_MOST_REMEMBERED: Final = 256
+_READ_ONLY: Final = re.compile("read-?only")
+_CANNOT_CHANGE: Final = frozenset({int, float, complex, bool, str, bytes, type(None), Marker})
+
+
+class _Look:
+    """One walk through a value.
+
+    Attributes:
+      arrays: those that were met.
+    """
+
+    def __init__(self) -> None:
+        self.arrays: list[Array] = []
+        self._left = _MOST_PARTS
+
+    def of(self, value: object) -> object:
+        """What the value is like, to be compared with what it is like later; of what cannot be looked into, which."""
+        try:
+            return self._at(value, DEPTH)
+        except RuntimeError:  # a thread changes it at this moment
+            return object()
+
+    def _at(self, value: object, depth: int) -> object:
+        kind = type(value)
+        if kind in _CANNOT_CHANGE:
+            return value
+        if isinstance(value, np.ndarray):
+            self.arrays.append(value)
+            return _sample(value)
+        if isinstance(value, bytearray):
+            return len(value), bytes(value[:_SAMPLE])
+        parts = _parts(value) if depth else None
+        if parts is None:
+            return id(value)
+        found: list[Any] = [kind, len(parts)]
+        for part in parts:
+            self._left -= 1
+            if self._left < 0:
+                break
+            found.append(self._at(part, depth - 1))
+        return tuple(found)
+
+
+def _parts(value: object) -> Collection[object] | None:
+    """What a container or a record holds, as something with a length; None: it cannot be looked into."""
+    kind: Any = type(value)
+    if isinstance(value, dict):
+        return [part for item in islice(list(value.items()), _MOST_PARTS) for part in item] + [len(value)]
+    if isinstance(value, list | tuple | deque | set | frozenset):
+        return value
+    for names in ("__dataclass_fields__", "__struct_fields__"):
+        if hasattr(kind, names):
+            return [getattr(value, name, None) for name in getattr(kind, names)]
+    if hasattr(kind, "__attrs_attrs__"):
+        return [getattr(value, one.name, None) for one in kind.__attrs_attrs__]
+    return None
+
+
+def _sample(array: Array) -> object:
+    large = sum(length > _SMALL_AXIS for length in array.shape)
+    if array.size > _SAMPLE and large:
+        step = int(np.ceil((array.size / _SAMPLE) ** (1 / large)))
+        array = array[tuple(slice(None, None, step if length > _SMALL_AXIS else 1) for length in array.shape)]
+    return array.shape, hash(array.tobytes())
+
+
+def _whole(array: Array) -> list[Array]:
+    """The array and those that it is a view of, the one with the memory first."""
+    found = [array]
+    while isinstance(found[-1].base, np.ndarray):
+        found.append(found[-1].base)
+    found.reverse()
+    return found
+
+
+def _can_be_unlocked(owner: Array) -> bool:
+    """Whether numpy would let us make it writeable again; memory that others lent it may not be."""
+    if owner.base is None:
+        return owner.flags.owndata
+    try:
+        with memoryview(owner.base) as lent:  # type: ignore[arg-type]
+            return not lent.readonly
+    except (TypeError, BufferError, ValueError):
+        return False
+
+
+class _Lock:
+    """Keeps one piece of memory from being written to, as long as anybody holds it.
+
+    Attributes:
+      arrays: those that were writeable, the owner of the memory first.
+      holders: how many hold it.
+    """
+
+    __slots__ = ("arrays", "holders")
+
+    def __init__(self) -> None:
+        self.arrays: dict[int, Array] = {}
+        self.holders = 0
+
+    def hold(self, arrays: Iterable[Array]) -> None:
+        """One more holds it."""
+        self.holders += 1
+        for array in arrays:
+            if array.flags.writeable:
+                array.flags.writeable = False
+                self.arrays[id(array)] = array
+
+    def release(self) -> None:
+        """One fewer; the last gives back what was writeable, owners before their views, as numpy wants it."""
+        self.holders -= 1
+        if not self.holders:
+            for array in self.arrays.values():
+                with suppress(ValueError):  # somebody has made its owner read-only meanwhile
+                    array.flags.writeable = True
+            self.arrays.clear()
+
+
+class _Lease:
+    """One token in use: on its edge, then by the firing or call that has taken it.
+
+    Attributes:
+      number: of the token on its edge.
+      looks: what the value was like when it was sent.
+      locks: by owner of memory.
+      ticket: of the firing or call that has taken it; `senders_ticket` that of its sender then.
+      firing: its number, by which several under way at once are told apart (F14); 0: a call.
+    """
+
+    __slots__ = ("edge", "firing", "locks", "looks", "number", "senders_ticket", "ticket", "value")
+
+    def __init__(self, edge: Edge, number: int, value: object, looks: object) -> None:
+        self.edge = edge
+        self.number = number
+        self.value = value
+        self.looks = looks
+        self.locks: list[int] = []
+        self.ticket = 0
+        self.firing = 0
+        self.senders_ticket = 0
+
+
+class _Sent:
+    """Memory that was sent: by which array, what was in it, and how many referred to the array then.
+
+    Attributes:
+      refs: by the calls on the way to where they were counted, each of which holds some of its own.
+    """
+
+    __slots__ = ("array", "looks", "refs")
+
+    def __init__(self, array: weakref.ref[Array], looks: object) -> None:
+        self.array = array
+        self.looks = looks
+        self.refs: dict[int, int] = {}
+
+    def is_held_beside(self, array: Array, way: int, refs: int) -> bool:
+        """Whether somebody holds what was sent, beside the node that sends this array over the same memory now."""
+        known = self.array()
+        if known is None:
+            return False
+        return known is not array or self.refs.get(way, refs) < refs
+
+
+class Sharing:
+    """Who uses which values of a run; on the loop alone."""
+
+    def __init__(self) -> None:
+        self._lying: dict[Edge, deque[_Lease]] = {}
+        self._at_work: dict[Worker, list[_Lease]] = {}
+        self._locks: dict[int, _Lock] = {}
+        self._sent: dict[Any, _Sent] = {}
+        self._last_locked: dict[int, tuple[weakref.ref[Array], Edge]] = {}
+
+    # --- the way of a value -----------------------------------------------------------------------------------------
+
+    def rewritten(self, value: object) -> bool:
+        """Whether a node sends memory again, with another content, while somebody holds what it has sent before."""
+        if type(value) in _CANNOT_CHANGE:
+            return False
+        self.sweep()
+        look = _Look()
+        look.of(value)
+        found = False
+        while look.arrays:
+            array = look.arrays.pop()
+            found = self._is_rewritten(array) or found
+        return found
+
+    def _is_rewritten(self, array: Array) -> bool:
+        where = array.__array_interface__["data"][0], array.shape, array.strides
+        looks, way = _sample(array), _way()
+        before = self._sent.get(where)
+        refs = self._count(array)
+        held = before is not None and before.looks != looks and before.is_held_beside(array, way, refs)
+        if held and before is not None:
+            gc.collect()  # what only garbage refers to is held by nobody
+            refs = self._count(array)
+            held = before.is_held_beside(array, way, refs)
+        if before is None or before.array() is not array:
+            before = self._sent[where] = _Sent(weakref.ref(array, lambda _: self._sent.pop(where, None)), looks)
+        before.looks = looks
+        before.refs.setdefault(way, refs)
+        return held
+
+    def _count(self, array: Array) -> int:
+        """How many refer to it, but for its lock."""
+        return sys.getrefcount(array) - any(id(array) in lock.arrays for lock in self._locks.values())
+
+    def sent(self, edge: Edge, token: Token[Any]) -> None:
+        """A token is put on an edge: from here on it is shared."""
+        value = token.value
+        if type(value) in _CANNOT_CHANGE:
+            return
+        look = _Look()
+        lease = _Lease(edge, token.sequence, value, look.of(value))
+        for array in look.arrays:
+            whole = _whole(array)
+            owner = id(whole[0])
+            if owner in self._locks or (whole[0].flags.writeable and _can_be_unlocked(whole[0])):
+                self._remember(edge, whole[0])
+                self._locks.setdefault(owner, _Lock()).hold(whole)
+                lease.locks.append(owner)
+        self._lying.setdefault(edge, deque()).append(lease)
+
+    def _remember(self, edge: Edge, owner: Array) -> None:
+        """A thread may learn that it was locked when it is free again."""
+        if len(self._last_locked) > _MOST_REMEMBERED:
+            self._last_locked.clear()
+        self._last_locked[id(owner)] = weakref.ref(owner), edge
+
+    def take(self, worker: Worker, edges: Sequence[Edge], tokens: Sequence[Token[Any]]) -> list[Edge]:
+        """A firing or call has taken these tokens; gives those edges on which the value was changed meanwhile."""
+        changed = []
+        for edge, token in zip(edges, tokens, strict=True):
+            leases = self._lying.get(edge)
+            while leases and leases[0].number < token.sequence:
+                self._end(leases.popleft())
+            if leases and leases[0].number == token.sequence:
+                lease = leases.popleft()
+                lease.ticket = worker.ticket
+                lease.firing = worker.firings if worker.busy == "firing" else 0
+                lease.senders_ticket = edge.source.ticket
+                self._at_work.setdefault(worker, []).append(lease)
+                if self._is_changed(lease):
+                    changed.append(edge)
+        self.sweep()
+        return changed
+
+    def changed_by(self, worker: Worker) -> tuple[Edge, bool] | None:
+        """Its code is over: from where it has a value that is not what it was, if it has one.
+
+        And whether the code of who has sent that ran meanwhile, too.
+        """
+        for lease in self._at_work.get(worker, ()):
+            if self._is_changed(lease):
+                return lease.edge, lease.edge.source.ticket != lease.senders_ticket
+        return None
+
+    def _is_changed(self, lease: _Lease) -> bool:
+        looks = _Look().of(lease.value)
+        changed = bool(looks != lease.looks)
+        lease.looks = looks  # told once
+        return changed
+
+    def sweep(self) -> None:
+        """Let go of what is not in use any more."""
+        for edge, leases in list(self._lying.items()):
+            oldest = _oldest(edge)
+            while leases and (oldest is None or leases[0].number < oldest):
+                self._end(leases.popleft())
+            if not leases:
+                del self._lying[edge]
+        for worker, taken in list(self._at_work.items()):
+            ticket = worker.ticket if worker.busy else None
+            beside = () if worker.flights is None else {one.number for one in worker.flights if not one.outcome}
+            going_on = [lease for lease in taken if lease.ticket == ticket or lease.firing in beside]
+            if len(going_on) == len(taken):
+                continue
+            for lease in taken:
+                if lease not in going_on:
+                    self._end(lease)
+            if going_on:
+                self._at_work[worker] = going_on
+            else:
+                del self._at_work[worker]
+
+    def end(self) -> None:
+        """The run is over: let go of everything."""
+        for lease in chain(*self._lying.values(), *self._at_work.values()):
+            self._end(lease)
+        self._lying.clear()
+        self._at_work.clear()
+
+    def _end(self, lease: _Lease) -> None:
+        for owner in lease.locks:
+            lock = self._locks[owner]
+            lock.release()
+            if not lock.holders:
+                del self._locks[owner]
+
+    # --- who has tried ----------------------------------------------------------------------------------------------
+
+    def explain(self, worker: Worker, error: BaseException) -> str | None:
+        """Say what a node's code has tried to write to, if it failed because we have made that read-only."""
+        if not isinstance(error, Exception) or _READ_ONLY.search(str(error)) is None:
+            return None
+        for arrays in _arrays_in_frames(error):
+            ours = [(name, owner) for name, array in arrays for owner in _whole(array)[:1] if self._is_ours(owner)]
+            if any(not array.flags.writeable and not self._is_ours(_whole(array)[0]) for _, array in arrays):
+                return None  # it may be that one
+            if not ours:
+                continue
+            name, owner = ours[0]
+            for lease in self._at_work.get(worker, ()):
+                if id(owner) in lease.locks:
+                    return (
+                        f'it wrote into the array that it took from "{lease.edge.label}", which others may use too, '
+                        f"so it is read-only (T1): change a copy, as in {name}.copy()"
+                    )
+            edge = self._last_locked[id(owner)][1]
+            whose = "it has" if edge.source is worker else f'"{edge.source.path}" has'
+            return (
+                f'it wrote into the array that {whose} sent on "{edge.label}" and that was in use there, so it was '
+                f"read-only (T1): send a copy, as in {name}.copy(), or a new array each time"
+            )
+        return None
+
+    def _is_ours(self, owner: Array) -> bool:
+        """Whether it is locked, or was lately."""
+        remembered = self._last_locked.get(id(owner))
+        return remembered is not None and remembered[0]() is owner
+
+
+def _oldest(edge: Edge) -> int | None:
+    """The number of the oldest token on an edge; None: there is none."""
+    if isinstance(edge, SyncEdge):
+        return None if edge.token is None else edge.token.sequence
+    queue: deque[Token[Any]] = edge.queue  # type: ignore[attr-defined]
+    return queue[0].sequence if queue else None
+
+
+def _way() -> int:
+    """By which calls we have come here."""
+    frame: FrameType | None = inspect.currentframe()
+    found = []
+    while frame is not None:  # to its end: a firing may have begun inside the end of another, with what that has
+        found.append(id(frame.f_code))
+        frame = frame.f_back
+    return hash(tuple(found))
+
+
+def _arrays_in_frames(error: BaseException) -> Iterator[list[tuple[str, Array]]]:
+    """The arrays that the code in which something failed had at hand, by call, the innermost first, and their names."""
+    frames = []
+    place = error.__traceback__
+    while place is not None:
+        frames.append(place.tb_frame)
+        place = place.tb_next
+    for frame in reversed(frames):
+        arrays = []
+        for name, value in frame.f_locals.items():
+            if isinstance(value, Node):
+                parts = ((f"{name}.{own}", part) for own, part in vars(value).items())
+            else:
+                parts = (one for one in [(name, value)])
+            for found, part in parts:
+                look = _Look()
+                look.of(part)
+                arrays += [(found, array) for array in look.arrays]
+        yield arrays
