@@ -176,6 +176,8 @@ def _over(flight: Flight) -> None:
 
 def _rest(worker: Worker) -> None:
     """Code of a firing is over: those leave whose turn it is, and who waits until none works has its turn."""
+    if worker.core.sharing is not None:
+        worker.core.sharing.sweep()
     land(worker)
     _flights(worker).let_others()
     if worker.on_idle is not None and not worker.busy:
