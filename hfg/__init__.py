@@ -23,7 +23,7 @@ from hfg.clock import elapsed, now
 from hfg.engine import PunctualLoop, Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
 from hfg.errors import EndOfStream, Failure
 from hfg.functions import node
-from hfg.graph import Graph, Subgraph, commands
+from hfg.graph import Graph, Subgraph, commands, operator
 from hfg.logs import log
 from hfg.nodetype import Node
 from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
@@ -60,6 +60,7 @@ __all__ = [
     "log",
     "node",
     "now",
+    "operator",
     "reference_of",
     "run",
     "run_async",

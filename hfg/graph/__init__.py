@@ -15,6 +15,7 @@ from hfg.graph.graph import Graph
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.gates import Gate
+from hfg.graph.structure.operators import operator
 from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
 from hfg.graph.structure.subgraph import Subgraph
 
@@ -29,4 +30,5 @@ __all__ = [
     "NodeOptions",
     "Subgraph",
     "commands",
+    "operator",
 ]

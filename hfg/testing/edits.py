@@ -161,7 +161,18 @@ def _about_an_edge(graph: Graph, choose: Chooser) -> c.Command | None:
     source, target = _path(edge.source), _path(edge.target)
     if choose.chance(60):
         return c.Disconnect(source, target)
-    return c.MakeActive(source, target, not edge.active)
+    if choose.chance(50):
+        return c.MakeActive(source, target, not edge.active)
+    if getattr(edge.source, "kind", "event") == "event":
+        return choose.one_of(
+            (
+                c.SetEdge(source, target, capacity=choose.number(1, 4)),
+                c.SetEdge(source, target, overflow=choose.one_of(("wait", "latest", "drop_oldest"))),
+                c.SetEdge(source, target, active=not edge.active, overflow="wait", capacity_limit=40, through=()),
+                c.SetEdge(source, target, through=(c.Operator("reactivex.operators:skip", (1,)),)),
+            )
+        )
+    return c.SetEdge(source, target, buffer=choose.number(0, 2), active=not edge.active)
 
 
 def _about_a_gate(graph: Graph, choose: Chooser, node: str) -> c.Command:

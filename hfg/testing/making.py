@@ -12,7 +12,7 @@ from typing import Any, Protocol, TypeVar
 
 from hfg.ports.automatic import sent_name
 from hfg.testing import nodes as types
-from hfg.testing.operators import Through
+from hfg.testing.operators import through
 from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
 
 __all__ = [
@@ -431,7 +431,7 @@ class _Making:
                     options.pop("capacity", None)
             if allowed.through and not active and choose.chance(15):
                 name, amounts = choose.one_of(_OPERATORS)
-                options["through"] = [Through(name, choose.one_of(amounts))]
+                options["through"] = [through(name, choose.one_of(amounts))]
         if initial:
             options["initial"] = initial
         if source[1] != "event" and target[1] in ("input", "parameter") and choose.chance(15):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 import reactivex
 import reactivex.operators as ops
 
-__all__ = ["OPERATORS", "WITH_TIME", "Through"]
+from hfg.graph import operator
+
+__all__ = ["OPERATORS", "WITH_TIME", "through"]
 
 OPERATORS: Final[dict[str, Callable[[Any], Any]]] = {
     "start_with": ops.start_with,
@@ -29,13 +30,8 @@ WITH_TIME: Final = ("debounce", "delay", "throttle_first", "beside_a_timer")
 """Of those the ones that need a scheduler."""
 
 
-@dataclass(frozen=True)
-class Through:
-    """One of `OPERATORS`, with what it is made of: a number, or seconds."""
-
-    name: str
-    amount: float
-
-    def __call__(self, source: Any) -> Any:
-        """Put it behind an observable."""
-        return OPERATORS[self.name](self.amount)(source)
+@operator
+def through(name: str, amount: float) -> Callable[[Any], Any]:
+    """Make one of `OPERATORS`, of a number or seconds."""
+    made: Callable[[Any], Any] = OPERATORS[name](amount)
+    return made

@@ -274,7 +274,7 @@ class _Writing:
     def text(self) -> str:
         lines = ["import hfg", "from typing import Any", "from hfg.testing.nodes import *"]
         if any("through" in edge.options for edge in self.plan.edges):
-            lines.append("from hfg.testing.operators import Through")
+            lines.append("from hfg.testing.operators import through")
         lines.append("")
         for box in self.plan.boxes:
             lines += self._class(box)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import annotated_types as at
 import pytest
 import reactivex
+import reactivex.operators as ops
 
 import hfg
 from hfg import commands as c
@@ -19,7 +21,7 @@ from hfg.graph import GroupSpec
 from hfg.graph.flat import flatten
 from hfg.graph.structure.history import MOST_STEPS
 from hfg.testing.edits import drawn, random_edit
-from hfg.testing.making import Allowed, SeededChooser, random_plan
+from hfg.testing.making import WIDE, Allowed, SeededChooser, random_plan
 from hfg.testing.nodes import Counter, Scaled, Tally, add, double, script, sink
 from tests.semantics.nodes import named
 
@@ -211,7 +213,7 @@ def walk(seed: int, *, edits: int) -> None:
 def test_the_commands_of_a_graph_make_it_again_and_are_those_of_what_they_made(block: int) -> None:
     """Also by way of JSON, in one edit that is undone as one; subgraphs and edits included."""
     for seed in range(block * 15, block * 15 + 15):
-        graph = random_plan(seed, Allowed(feeds=True, threads=seed % 3 == 0, operators=False)).build()
+        graph = random_plan(seed, replace(WIDE, feeds=True, threads=seed % 3 == 0)).build()
         choose = SeededChooser(seed)
         for number in range(seed % 4):
             with suppress(GraphError):
@@ -310,11 +312,21 @@ def _untold() -> dict[str, tuple[Callable[[hfg.Graph], object], str]]:
         ),
         "an inside that was edited": (
             edited,
-            'subgraph "box": what is inside was edited and is not what Louder builds',
+            'subgraph "box": what is inside was edited and is not what Louder builds, and its promoted',
         ),
         "an observable": (
             observable,
             'edge "observable -> sink.value": an observable from outside is code, .* feed the graph by graph.input',
+        ),
+        "an operator without a name": (
+            lambda graph: graph.connect(graph.start, graph.add(sink()).activate, through=[ops.skip(1)]),
+            'edge "start -> sink.activate": its operator .* cannot be found by name, .* hfg.operator',
+        ),
+        "an operator made inside of a function": (
+            lambda graph: graph.connect(
+                graph.start, graph.add(sink()).activate, through=[hfg.operator(lambda: ops.skip(1))()]
+            ),
+            "its operator .*lambda.* cannot be found by name",
         ),
         "a type without a text": (
             lambda graph: graph.input("in", Annotated[int, at.Gt(3)]),
@@ -335,6 +347,104 @@ def test_what_no_command_can_say_is_named_with_what_to_do(what: str) -> None:
 def test_the_inside_is_told_with_the_whole_graph() -> None:
     with pytest.raises(GraphError, match='the graph inside "loud" is told with the whole graph'):
         louder()["loud"].graph.as_commands()
+
+
+# --- edges and operators ---
+
+
+def _first(row: list[int]) -> int:
+    return row[0]
+
+
+@hfg.operator
+def every(count: int, *, first: int = 0) -> Any:
+    """Let one of so many through."""
+    return reactivex.compose(ops.skip(first), ops.buffer_with_count(count), ops.map(_first))
+
+
+def heard(graph: hfg.Graph) -> list[object]:
+    hfg.run(graph, clock="virtual")
+    return list(graph["ear"].heard)
+
+
+class Ear(hfg.Node):
+    """Keeps what it heard."""
+
+    heard = hfg.State[list[int]](factory=list)
+
+    @hfg.slot
+    def hear(self, value: int) -> None:
+        self.heard.append(value)
+
+
+class Bell(hfg.Node):
+    """Rings once with each number."""
+
+    rang = hfg.Event(int)
+
+    @hfg.slot
+    def ring(self) -> None:
+        for number in range(9):
+            self.rang.trigger(number)
+
+
+def bells() -> hfg.Graph:
+    graph = hfg.Graph("bells")
+    bell, ear = graph.add(Bell(), name="bell"), graph.add(Ear(), name="ear")
+    graph.connect(graph.start, bell.ring)
+    graph.connect(bell.rang, ear.hear)
+    graph.connect(bell.rang, graph.add(Ear(), name="other").hear)
+    return graph
+
+
+@pytest.mark.rule("R4", "P5", "P9")
+def test_an_edge_is_declared_otherwise_in_its_place_and_all_is_undone() -> None:
+    graph = bells()
+    states, at = [drawn(graph)], ("bell.rang", "ear.hear")
+    every_third = c.Operator("tests.graph.test_commands:every", (3,), {"first": 1})
+    for command, expected in (
+        (c.SetEdge(*at, overflow="latest"), [8]),
+        (c.SetEdge(*at, overflow="drop_newest"), list(range(9))),  # the capacity is not that of "latest" any more
+        (c.SetEdge(*at, capacity=2), [0, 1]),
+        (c.SetEdge(*at, overflow="wait", capacity=16), list(range(9))),
+        (c.SetEdge(*at, through=(every_third,)), [1, 4, 7]),
+        (c.SetEdge(*at, through=(c.Operator("reactivex.operators:take", (2,)),)), [0, 1]),
+        (c.SetEdge(*at, through=(), active=True), list(range(9))),
+    ):
+        graph.edit(*c.decode(c.encode([command])))
+        assert heard(graph) == expected, command
+        states.append(drawn(graph))
+        other = hfg.Graph()
+        other.edit(*graph.as_commands())
+        assert heard(other) == expected
+        assert [edge.label for edge in graph.edges] == [edge.label for edge in bells().edges]
+    for state in reversed(states[:-1]):
+        graph.undo()
+        assert drawn(graph) == state
+
+
+@pytest.mark.rule("R4", "P4", "P7")
+def test_buffer_and_initial_tokens_of_an_edge_are_set_and_what_stays_as_it_was_is_no_change() -> None:
+    graph = chain()
+    before = drawn(graph)
+    graph.edit(c.SetEdge("first.out", "second.value", buffer=2, initial=(5,)))
+    assert sent(graph) == [10, 4, 8, 12]
+    graph.edit(c.SetEdge("first.out", "second.value", buffer=2))
+    assert graph.edges[1].options.initial == (5,)
+    graph.undo()
+    graph.undo()
+    assert drawn(graph) == before
+
+
+def test_an_operator_says_what_it_was_made_of_and_equals_one_made_the_same() -> None:
+    assert repr(every(2, first=1)) == "every(2, first=1)"
+    assert every(2) == every(2)
+    assert every(2) != every(3)
+    assert hfg.operator(ops.debounce)(0.2) == hfg.operator(ops.debounce)(0.2)
+    with pytest.raises(hfg.errors.DeclarationError, match="hfg.operator takes a function .*, got 3; write it above"):
+        hfg.operator(3)  # type: ignore[arg-type]
+    with pytest.raises(hfg.errors.DeclarationError, match="gave 5, which is no reactivex operator; let it return one"):
+        hfg.operator(lambda: 5)()  # type: ignore[arg-type, return-value]
 
 
 # --- groups and history ---
@@ -383,7 +493,11 @@ def test_the_history_tells_what_can_be_taken_back_and_cannot_be_written() -> Non
 
 
 def ends_by_path(graph: hfg.Graph) -> list[object]:
-    return [(flat.label, flat.active, flat.capacity, flat.overflow, flat.initial) for flat in flatten(graph).edges]
+    """What a run sees of them."""
+    return [
+        (flat.label, flat.active, flat.capacity, flat.overflow, flat.through, flat.initial, flat.buffer)
+        for flat in flatten(graph).edges
+    ]
 
 
 # --- refusals: one clear sentence, nothing changed ---
@@ -421,6 +535,32 @@ REFUSED = [
     (c.Enclose(None, "box"), "Enclose takes several paths"),  # type: ignore[arg-type]
     (c.Enclose((1,), "box"), "Enclose takes several paths"),  # type: ignore[arg-type]
     (c.Remove(3), "a path is a text"),  # type: ignore[arg-type]
+    (c.SetEdge("first.out", "sink.value"), 'there is no edge "first.out" -> "sink.value"; graph.edges lists'),
+    (c.SetEdge("second.out", "sink.value", capacity=3), "capacity=3 is for edges from events"),
+    (c.SetEdge("second.out", "sink.value", buffer=-1), "buffer must be a whole number from 0 on, got -1"),
+    (c.SetEdge("second.out", "sink.value", initial=("a",)), "an initial value must be of type int, got 'a'"),
+    (c.SetEdge("second.out", "sink.value", initial=3), "initial takes a list, as in initial=[0], got 3"),  # type: ignore[arg-type]
+    (c.SetEdge("second.out", "sink.value", through=(ops.skip(1),)), "a command says operators by name, got"),  # type: ignore[arg-type]
+    (
+        c.Connect("start", "sink.activate", through=(c.Operator("skip"),)),
+        '"start" -> "sink.activate": "skip" is no reference to an operator; write "my_robot.operators:smoothed"',
+    ),
+    (
+        c.Connect("start", "sink.activate", through=(c.Operator("os:getcwd"),)),
+        'operator "os:getcwd": it is <built-in function getcwd>, no operator; write @hfg.operator above',
+    ),
+    (
+        c.Connect("start", "sink.activate", through=(c.Operator("reactivex.operators:skpi", (1,)),)),
+        'operator "reactivex.operators:skpi": module "reactivex.operators" has no "skpi"',
+    ),
+    (
+        c.Connect("start", "sink.activate", through=(c.Operator("no_such_module:skip"),)),
+        'operator "no_such_module:skip": importing "no_such_module" failed',
+    ),
+    (
+        c.Connect("start", "sink.activate", through=(c.Operator("reactivex.operators:skip", (1, 2)),)),
+        'operator "reactivex.operators:skip" cannot be made: TypeError',
+    ),
     (c.AddGroup("busy"), 'group "busy" is declared already, as GroupSpec('),
     (c.AddGroup("two", threads=-2), 'group "two": threads must be 0 (on the loop), 1 (a thread of its own) or'),
     (c.AddGroup(""), "a group needs a name, got ''"),

@@ -507,6 +507,7 @@ def test_groups_and_ports_of_a_run_stay_as_they_are_also_by_undo_and_it_goes_on(
         c.AddGroup("more"): 'the groups of a graph that runs stay as they are, and "more" would be another; declare',
         c.ChangeGroup("late", policy="priority"): '"late" would be another',
         c.RemoveGroup("late"): '"late" would be another',
+        c.SetEdge("script.out", "sink.value", buffer=2): '"script.out -> sink.value" keeps its buffer while the graph',
         c.AddInput("in", "int"): 'the ports of a graph that runs stay as they are, and "in" is one; edit it when',
     }
 
@@ -518,7 +519,8 @@ def test_groups_and_ports_of_a_run_stay_as_they_are_also_by_undo_and_it_goes_on(
         with pytest.raises(GraphError, match='"late" would be another'):
             await run.undo()
         assert drawn(graph) == before
-        await run.edit(c.Move("script", "late"))
+        await run.edit(c.Move("script", "late"), c.SetEdge("script.out", "sink.value", active=True, buffer=0))
+        assert graph.edges[0].active
         await run.wait_finished()
 
     trace = drive(graph, body, compare=build())

@@ -37,6 +37,7 @@ from hfg.graph.checks import check_flat
 from hfg.graph.editing import Transaction, history_of, may_break, prepare, refuse_new_errors
 from hfg.graph.editing.changes import (
     Change,
+    EdgeSwap,
     GroupsChange,
     NodeSwap,
     OptionsChange,
@@ -416,7 +417,7 @@ class Edits:
 
 
 def _refuse_for_good(change: Change) -> None:
-    """Refuse what a run has from its beginning to its end: the threads of its groups, the ports of the whole.
+    """Refuse what a run has from beginning to end: its groups, the ports of the whole, what an edge holds.
 
     Raises:
       GraphError: it is such a change.
@@ -426,6 +427,14 @@ def _refuse_for_good(change: Change) -> None:
             f'the ports of a graph that runs stay as they are, and "{change.port.name}" is one; '
             "edit it when the run is over, with graph.edit(...)"
         )
+    if isinstance(change, EdgeSwap):
+        old, new = change.old.options, change.new.options
+        others = [one for one in old.__struct_fields__ if one != "active" and getattr(old, one) != getattr(new, one)]
+        if others:
+            raise GraphError(
+                f'"{change.new.label}" keeps its {others[0]} while the graph runs, for tokens may lie on it; '
+                "Disconnect and Connect it in one edit, which drops them, or edit it when the run is over"
+            )
     if isinstance(change, GroupsChange):
         before, after = change.before[0], change.after[0]
         name = next((name for name in {**before, **after} if before.get(name) != after.get(name)), None)

@@ -33,10 +33,12 @@ __all__ = [
     "Gate",
     "MakeActive",
     "Move",
+    "Operator",
     "Remove",
     "RemoveGroup",
     "Rename",
     "Replace",
+    "SetEdge",
     "SetParameter",
     "Ungate",
     "decode",
@@ -146,8 +148,22 @@ class Move(Command, frozen=True):
     group: str | None = None
 
 
+class Operator(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """An operator on an edge, made by a function that `hfg.operator` knows.
+
+    Attributes:
+      type: the reference of the function, "my_robot.operators:smoothed" or "reactivex.operators:debounce".
+      arguments: what it is given by position.
+      parameters: what it is given by name.
+    """
+
+    type: str
+    arguments: tuple[Any, ...] = ()
+    parameters: dict[str, Any] = {}
+
+
 class Connect(Command, frozen=True):
-    """Declare an edge, as `graph.connect` does; operators are no data, so an edge with them is connected by hand."""
+    """Declare an edge, as `graph.connect` does; operators by their names."""
 
     source: str
     target: str
@@ -157,6 +173,7 @@ class Connect(Command, frozen=True):
     capacity_limit: int | None = None
     initial: tuple[Any, ...] = ()
     buffer: int = 0
+    through: tuple[Operator, ...] = ()
 
 
 class Disconnect(Command, frozen=True):
@@ -172,6 +189,20 @@ class MakeActive(Command, frozen=True):
     source: str
     target: str
     active: bool = True
+
+
+class SetEdge(Command, frozen=True):
+    """Declare an edge otherwise, in its place in the order; what is not given stays as it was."""
+
+    source: str
+    target: str
+    active: bool | msgspec.UnsetType = msgspec.UNSET
+    capacity: int | msgspec.UnsetType = msgspec.UNSET
+    overflow: Overflow | msgspec.UnsetType = msgspec.UNSET
+    capacity_limit: int | msgspec.UnsetType | None = msgspec.UNSET
+    initial: tuple[Any, ...] | msgspec.UnsetType = msgspec.UNSET
+    buffer: int | msgspec.UnsetType = msgspec.UNSET
+    through: tuple[Operator, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class Enable(Command, frozen=True):
@@ -246,6 +277,7 @@ AnyCommand: TypeAlias = (
     | Connect
     | Disconnect
     | MakeActive
+    | SetEdge
     | Enable
     | Disable
     | Gate

@@ -44,7 +44,8 @@ from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.gating import refuse_gate
 from hfg.graph.structure.level import Level, level_of, nodes_within
 from hfg.graph.structure.naming import need_name, suggest
-from hfg.graph.structure.options import GroupSpec, edge_options, group_spec
+from hfg.graph.structure.operators import find_operator
+from hfg.graph.structure.options import DEFAULT_CAPACITY, GroupSpec, edge_options, group_spec
 from hfg.graph.structure.places import side_of
 from hfg.graph.structure.pointing import level_and_name, node_at, parameter_at, source_at, target_at
 from hfg.graph.structure.promoting import refuse_standing, stands_for
@@ -354,8 +355,8 @@ class _Hand:
             "capacity": command.capacity,
             "overflow": command.overflow,
             "capacity_limit": command.capacity_limit,
-            "through": (),
-            "initial": tuple(as_meant(value, type_of(target)) for value in command.initial),
+            "through": self._operators(command),
+            "initial": _meant(command.initial, target),
             "buffer": command.buffer,
         }
         edge = declare_edge(around, source, target, said)
@@ -367,12 +368,38 @@ class _Hand:
 
     def _makeactive(self, command: c.MakeActive) -> None:
         around, edge = self._edge(command.source, command.target)
-        if edge.active == command.active:
-            return
-        said = msgspec.structs.asdict(edge.options) | {"active": command.active}
-        options = edge_options(lambda: f'"{command.source}" -> "{command.target}"', said)
+        self._say(around, edge, {"active": command.active})
+
+    def _setedge(self, command: c.SetEdge) -> None:
+        around, edge = self._edge(command.source, command.target)
+        given = {name: getattr(command, name) for name in edge.options.__struct_fields__}
+        said = {name: value for name, value in given.items() if value is not msgspec.UNSET}
+        if "initial" in said:
+            said["initial"] = _meant(said["initial"], edge.target)
+        if "through" in said:
+            said["through"] = self._operators(command)
+        if "latest" in (said.get("overflow"), edge.overflow) and said.get("overflow", edge.overflow) != edge.overflow:
+            said.setdefault("capacity", DEFAULT_CAPACITY)  # the 1 of "latest" is its own
+        self._say(around, edge, said)
+
+    def _say(self, around: Level, edge: Edge, said: dict[str, Any]) -> None:
+        """Let other options hold of an edge, if they are others."""
+        options = edge_options(lambda: f'"{edge.label}"', msgspec.structs.asdict(edge.options) | said)
         refuse(around, edge.source, edge.target, options)
-        self.do(EdgeSwap(around, edge, Edge(edge.source, edge.target, options)))
+        if options != edge.options:
+            self.do(EdgeSwap(around, edge, Edge(edge.source, edge.target, options)))
+
+    def _operators(self, command: c.Connect | c.SetEdge) -> tuple[Any, ...]:
+        where = f'"{command.source}" -> "{command.target}"'
+        if not isinstance(command.through, tuple | list):
+            raise GraphError(f"{where}: through takes several operators, got {command.through!r}; write ([...])")
+        for one in command.through:
+            if not isinstance(one, c.Operator):
+                raise GraphError(
+                    f"{where}: a command says operators by name, got {one!r}; "
+                    'write commands.Operator("reactivex.operators:debounce", (0.2,))'
+                )
+        return tuple(find_operator(one.type, one.arguments, one.parameters, where) for one in command.through)
 
     def _edge(self, source_path: str, target_path: str) -> tuple[Level, Edge]:
         source, target = source_at(self.root, source_path), target_at(self.root, target_path)
@@ -412,6 +439,11 @@ def _refuse_malformed(command: c.Command) -> None:
             raise GraphError(f"{type(command).__name__} takes name as a text, got {value!r}")
         if field == "paths" and not (isinstance(value, tuple | list) and all(isinstance(one, str) for one in value)):
             raise GraphError(f'{type(command).__name__} takes several paths, as in ("detect", "track"), got {value!r}')
+
+
+def _meant(values: Any, target: TargetEnd) -> Any:  # noqa: ANN401 - what is no list is refused with the edge
+    """Initial values that may have come over a wire."""
+    return tuple(as_meant(value, type_of(target)) for value in values) if isinstance(values, tuple | list) else values
 
 
 def _touches(edge: Edge, node: Node) -> bool:

@@ -6,7 +6,6 @@ themselves, and so that what is told is seen to be true. Stands on `performing`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from typing import Any
 
 from hfg.errors import GraphError, HfgError
@@ -16,6 +15,7 @@ from hfg.graph.editing.performing import perform
 from hfg.graph.editing.type_texts import text_of_type
 from hfg.graph.structure.edge import Edge, is_feed
 from hfg.graph.structure.level import Level
+from hfg.graph.structure.operators import NamedOperator
 from hfg.graph.structure.options import EdgeOptions, NodeOptions
 from hfg.graph.structure.subgraph import Subgraph, inside, is_box
 from hfg.graph.structure.whole import Whole
@@ -85,10 +85,11 @@ class _Telling:
                 inner, inner_made = inside(node), inside(made.nodes[name])
                 if inner is None or inner_made is None:
                     continue
-                if inner_made.nodes or inner_made.edges:
-                    self._tell_differences(node, inner, inner_made)
-                else:
-                    waiting.append((inner, inner_made))
+                if _same(_shape(inner), _shape(inner_made)):
+                    self._tell_values(node, inner, inner_made)
+                    continue
+                self._clear(node, inner_made)
+                waiting.append((inner, inner_made))
         for level, _ in found:
             for edge in level.edges:
                 self.say(_connected(edge))
@@ -106,31 +107,44 @@ class _Telling:
                 "define it at the top of a module"
             )
 
-    def _tell_differences(self, node: Node, inner: Level, made: Level) -> None:
-        """What is inside of a subgraph is first what its type builds; only values of parameters can be told beside.
+    def _tell_values(self, node: Node, inner: Level, made: Level) -> None:
+        """What is inside of a subgraph is what its type builds; what was set or switched there is told beside.
 
         Raises:
-          GraphError: something else was changed.
+          GraphError: something else is different, too.
         """
         same = _walk(made)
         for path, one in _walk(inner).items():
-            other = same.get(path)
-            if other is None or other._type.reference != one._type.reference:
-                continue
+            other = same[path]
             for name, value in one._parameters.items():
-                spec = one._type.parameters[name]
-                if spec.is_port and not _same(other._parameters.get(name), value):
+                if one._type.parameters[name].is_port and not _same(other._parameters[name], value):
                     self.say(c.SetParameter(f"{path}.{name}", value))
             if one._options.enabled != other._options.enabled:
                 self.say(c.Enable(path) if one._options.enabled else c.Disable(path))
             if one._options.group != other._options.group:
                 self.say(c.Move(path, one._options.group))
-        if not _same(_drawn(inner), _drawn(made)):
-            raise GraphError(
-                f'subgraph "{node.place.path}": what is inside was edited and is not what {node._type.qualname} '
-                "builds, so no command makes it; let build() of the type make it so, or enclose the nodes in a "
-                "subgraph without a type of its own"
-            )
+        for path, one in _walk(inner).items():
+            if one._options != same[path]._options or not _same(one._parameters, same[path]._parameters):
+                raise self._not_as_built(node)
+
+    def _clear(self, node: Node, made: Level) -> None:
+        """What its type builds inside is something else by now: it is taken out, and what is there told instead.
+
+        Raises:
+          GraphError: a parameter of the subgraph stands for one inside, which only build() can say.
+        """
+        if any(one.promotions.by_name for one in (inside(node), made) if one is not None):
+            raise self._not_as_built(node)
+        for edge in list(made.edges):
+            self.say(c.Disconnect(edge.source.path, edge.target.path))
+        for name in list(made.nodes):
+            self.say(c.Remove(made.path_to(name)))
+
+    def _not_as_built(self, node: Node) -> GraphError:
+        return GraphError(
+            f'subgraph "{node.place.path}": what is inside was edited and is not what {node._type.qualname} '
+            "builds, and its promoted parameters can be said by build() alone; let build() make it so"
+        )
 
     def _tell_gates(self) -> None:
         there = {(gate.target.place.path, gate.by.place.path) for level in self.made.walk() for gate in level.gates}
@@ -183,15 +197,23 @@ def _connected(edge: Edge) -> c.Connect:
             f'edge "{edge.label}": an observable from outside is code, which no command can say; '
             "connect it by hand, or feed the graph by graph.input(...)"
         )
-    if edge.options.through:
-        raise GraphError(
-            f'edge "{edge.label}": its operators are code, which no command can say; '
-            "connect it by hand, or put a node between that does the same"
-        )
     said = _others(edge.options, _PLAIN_EDGE)
     if edge.overflow == "latest":
         del said["capacity"]  # it is 1 by that
+    if edge.options.through:
+        said["through"] = tuple(_operator(edge, one) for one in edge.options.through)
     return c.Connect(edge.source.path, edge.target.path, **said)
+
+
+def _operator(edge: Edge, operator: object) -> c.Operator:
+    reference = operator.made_by.reference if isinstance(operator, NamedOperator) else None
+    if not isinstance(operator, NamedOperator) or reference is None:
+        raise GraphError(
+            f'edge "{edge.label}": its operator {operator!r} cannot be found by name, so no command can say it; '
+            "make it by a function at the top of a module with @hfg.operator, or by one of reactivex, as in "
+            "hfg.operator(ops.debounce)(0.2)"
+        )
+    return c.Operator(reference, operator.arguments, operator.parameters)
 
 
 # --- what is the same ---
@@ -212,16 +234,15 @@ def _walk(level: Level) -> dict[str, Node]:
     return {node.place.path: node for one in level.walk() for node in one.nodes.values()}
 
 
-def _drawn(level: Level) -> list[Any]:
-    """All that is inside, as data that can be compared."""
-    return [_drawn_level(one) for one in level.walk()]
+def _shape(level: Level) -> list[Any]:
+    """All that is inside, as data that can be compared, but for what commands say of a node that is there."""
+    return [_shape_of_level(one) for one in level.walk()]
 
 
-def _drawn_level(level: Level) -> Any:  # noqa: ANN401
-    paths: Callable[[Iterable[Any]], list[str]] = lambda ports: [port.path for port in ports]  # noqa: E731
+def _shape_of_level(level: Level) -> tuple[Any, ...]:
     return (
-        [(name, node._type.reference, node._options, node._parameters) for name, node in level.nodes.items()],
+        [(name, node._type.reference or node._type) for name, node in level.nodes.items()],
         [(edge.label, edge.options) for edge in level.edges],
         [(gate.target.place.path, gate.by.place.path, gate.idle_rate_hz) for gate in level.gates],
-        {name: paths(ports) for name, ports in level.promotions.by_name.items()},
+        {name: [port.path for port in ports] for name, ports in level.promotions.by_name.items()},
     )

@@ -26,6 +26,7 @@ from hfg.graph.editing.commands import (
     Enclose,
     Move,
     Replace,
+    SetEdge,
 )
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.reloading import reloaded
@@ -49,7 +50,7 @@ __all__ = [
     "undo",
 ]
 
-_MAY_BREAK = (Add, ChangeGroup, Connect, Copy, Dissolve, Enclose, Move, Replace)
+_MAY_BREAK = (Add, ChangeGroup, Connect, Copy, Dissolve, Enclose, Move, Replace, SetEdge)
 """Commands after which something may be wrong that only the whole shows."""
 
 

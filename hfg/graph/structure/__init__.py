@@ -6,7 +6,7 @@ gates        who works while whom is active       promotions   which parameters 
 boundary     the ports of the whole graph         groups       where nodes run      history  what can be undone
 sequence     an order in which places are found without counting, of members and connections
 edge         Edge, and what is asked of its ends  subgraph     Subgraph: a node that holds a graph
-options      what is said about nodes, edges and groups besides
+options      what is said about nodes, edges and groups besides               operators    of edges, by name
 
 adding, connecting, gating, promoting, declaring, assigning      what changes a level, and refuses what cannot be
 membership   where a node is, said to the node    naming, finding, pointing    names, and what paths lead to
