@@ -6,7 +6,7 @@ Rules F3, F5, F10, P8, R2 to R5, X1, X3. While the wave gives way others meddle 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from typing import Any
 
 import pytest
@@ -126,6 +126,33 @@ def test_others_of_the_group_have_their_turn_while_a_wave_gives_way() -> None:
         graph = hfg.Graph()
         chain(graph, graph.add(numbers(count=4), name="a").out, polite(), forward(), sink())
         chain(graph, graph.add(numbers(count=4), name="b").out, other())
+        hfg.run(graph, clock="virtual", fast=fast)
+        return list(seen)
+
+    assert run(fast=True) == run(fast=False)
+
+
+@pytest.mark.rule("P4", "R2")
+def test_a_head_with_a_buffer_goes_on_before_who_fills_that_though_it_has_given_way() -> None:
+    seen: list[tuple[str, int]] = []
+
+    @hfg.node
+    def source() -> Iterator[int]:
+        for value in range(4):
+            seen.append(("source", value))
+            yield value
+
+    @hfg.node
+    async def polite(value: int) -> int:
+        seen.append(("polite", value))
+        await asyncio.sleep(0)
+        return value
+
+    def run(fast: bool) -> list[tuple[str, int]]:
+        seen.clear()
+        graph, head = hfg.Graph(), polite()
+        graph.connect(graph.add(source()).out, graph.add(head).value, buffer=1)
+        chain(graph, head.out, forward(), Keep())
         hfg.run(graph, clock="virtual", fast=fast)
         return list(seen)
 

@@ -88,6 +88,7 @@ class Region:
         self.detached = False  # the call under way waits, and goes on as a firing like any other
         self._coroutine: Any = None  # of the wave that has waited
         self._after: Callable[[Any, BaseException | None], None] | None = None
+        self._may_give_way = schedule.may_give_way()
         self._lender = next((worker for worker in order if worker.is_async), None)
         self._put_off = self._patience = 0  # waves before one asks again whether it may be armed
         self.waves = 0  # not yet in the counts of members and edges
@@ -438,7 +439,10 @@ class Region:
         carrier: Any = self._lender.carrier  # type: ignore[union-attr]  # there is async code
         self._coroutine = waves
         if carrier.start(waves, self._late, self._detach) is PENDING and not self.detached:
-            self._give_way()
+            if self._may_give_way:
+                self._give_way()
+            else:
+                self._detach()
 
     def _give_way(self) -> None:
         """The wave has given way to others: its members are busy until it is over."""
@@ -462,6 +466,8 @@ class Region:
 
     def _detach(self) -> None:
         """The call under way waits for more than its turn: from here on it is a firing like any other."""
+        if self.detached:
+            return  # it was told before
         lender: Any = self._lender
         k, found = self._place()
         worker = self.order[k]
@@ -492,6 +498,8 @@ class Region:
             self.called_off = False
             for worker in self.order:
                 worker.busy = ""
+            if self.head.placed:  # by what came in meanwhile; its turn is decided when the wave is over, as always
+                self.head.unplace()
 
     def _go_on(self, called_off: bool) -> None:
         """Those who have come to a member while it was busy have their turn."""

@@ -48,6 +48,13 @@ class Schedule:
         source = self.position[edge.source]
         return f"v{source}_{next(output for one, output, _ in self.outs[source] if one is edge)}"
 
+    def may_give_way(self) -> bool:
+        """Whether no other member could fire while async code of one waits: then the wave may go on behind it."""
+        return not any(
+            worker.is_async and any(other in self.position for other in self.behind[k])
+            for k, worker in enumerate(self.order)
+        )
+
     def _inside(self, edge: SyncEdge | BufferEdge, output: int) -> int | None:
         """Where the edge leads to, if that is a member and the edge belongs to its waves."""
         return self.position.get(edge.target) if edge.follows and not asks_who_hears(edge.source, output) else None
