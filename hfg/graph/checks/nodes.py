@@ -63,7 +63,7 @@ def names(whole: FlatGraph) -> list[Problem]:
     return [
         Problem(
             path=path,
-            severity="warning",
+            severity="hint",
             what=f'its type "{kind.name}" cannot be found by name'
             + (f", as for {count - 1} more nodes" if count > 1 else ""),
             why="files, workers and reload make nodes again from module and name",
