@@ -7,6 +7,7 @@ wings, which know it by name alone; knows nobody who runs it.
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Callable, Iterable
 from types import ModuleType
@@ -33,6 +34,7 @@ from hfg.graph.structure.gating import set_gate
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import DEFAULT_CAPACITY, GroupSpec, OnError, Overflow, Policy, Release
+from hfg.graph.structure.pointing import node_at
 from hfg.graph.structure.promoting import promote
 from hfg.graph.structure.whole import Whole
 from hfg.nodetype import Node, Place
@@ -461,6 +463,17 @@ class Graph:
     def history(self) -> tuple[tuple[Command, ...], ...]:
         """The edits that can be taken back, as they were given, the last one last; of the last 1,000."""
         return tuple(transaction.commands for transaction in self._level.whole.history.done)
+
+    def notes(self, path: str = "") -> dict[str, Any]:
+        """Give what editors have noted by `commands.Note` about a node or subgraph, by name; nothing else reads it.
+
+        Args:
+          path: of the node; "" for the free notes about the whole graph.
+
+        Raises:
+          GraphError: there is no such node.
+        """
+        return copy.deepcopy(self._level.whole.notes.get(node_at(self._level, path) if path else None, {}))
 
     def as_commands(self) -> list[Command]:
         """Give the commands that make this graph: in one edit of an empty graph they give an equal one.

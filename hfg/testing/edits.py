@@ -48,6 +48,9 @@ def drawn(graph: Graph, *, identity: bool = True) -> dict[str, Any]:
         "gates": [(gate.target.place.path, gate.by.place.path, gate.idle_rate_hz) for gate in graph.gates],
         "groups": dict(graph.groups) if level.owner is None else {},
         "ports": [(port.path, port.kind, port.type) for port in (*graph.inputs.values(), *graph.outputs.values())],
+        "notes": {path: graph.notes(path) for path in ("", *(node.place.path for node in _all_nodes(graph)))}
+        if level.owner is None
+        else {},
         "promoted": {name: [port.path for port in ports] for name, ports in level.promotions.by_name.items()},
         "gated": sorted(node.place.path for node in level.whole.gated if node._place is not None)
         if level.owner is None
@@ -106,6 +109,8 @@ def random_command(graph: Graph, choose: Chooser, name: str) -> c.Command:
         kind = graph[node]._type.reference if choose.chance(50) else None
         return c.Replace(node, kind or f"hfg.testing.nodes:{choose.one_of(_TYPES)}")
     if what < 97:
+        if choose.chance(40):
+            return c.Note(node, choose.one_of(("position", "text")), choose.one_of(([1, 2], "here", None)))
         return c.Move(node, choose.one_of([None, *graph.groups]))
     return _about_a_gate(graph, choose, node)
 

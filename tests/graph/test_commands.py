@@ -447,6 +447,45 @@ def test_an_operator_says_what_it_was_made_of_and_equals_one_made_the_same() -> 
         hfg.operator(lambda: 5)()  # type: ignore[arg-type, return-value]
 
 
+# --- notes ---
+
+
+@pytest.mark.rule("R4")
+def test_notes_go_with_their_node_and_are_undone_like_all_else() -> None:
+    graph = chain()
+    states = [drawn(graph)]
+    for command in (
+        c.Note("", "title", {"text": "two doublers", "at": (0, 10)}),
+        c.Note("first", "position", (40, 2.5)),
+        c.Note("first", "text", "the first"),
+        c.Rename("first", "one"),
+        c.Replace("one", "hfg.testing.nodes:some"),
+        c.Copy("one", "twin"),
+        c.Note("one", "text"),
+        c.Enclose(("one", "second"), "box"),
+        c.Note("box", "colour", "red"),
+        c.Copy("box", "other"),
+        c.Dissolve("box"),
+        c.Remove("twin"),
+    ):
+        graph.edit(*c.decode(c.encode([command])))
+        states.append(drawn(graph))
+        made = hfg.Graph()
+        made.edit(*graph.as_commands())
+        assert drawn(made, identity=False)["notes"] == states[-1]["notes"]
+    assert graph.notes() == {"title": {"text": "two doublers", "at": [0, 10]}}
+    assert graph.notes("one") == graph.notes("other/one") == {"position": [40, 2.5]}
+    assert graph.notes("other") == {"colour": "red"}
+    graph.notes("one")["position"].append(3)
+    assert graph.notes("one") == {"position": [40, 2.5]}  # what was given is a copy
+    for state in reversed(states[:-1]):
+        graph.undo()
+        assert drawn(graph) == state
+    for state in states[1:]:
+        graph.redo()
+        assert drawn(graph) == state
+
+
 # --- groups and history ---
 
 
@@ -561,6 +600,9 @@ REFUSED = [
         c.Connect("start", "sink.activate", through=(c.Operator("reactivex.operators:skip", (1, 2)),)),
         'operator "reactivex.operators:skip" cannot be made: TypeError',
     ),
+    (c.Note("frist", "x", 1), 'there is no "frist"'),
+    (c.Note("first", "x", object()), 'note "x" of "first": notes are plain data, got <object'),
+    (c.Note("first", 3, 1), "Note takes name as a text, got 3"),  # type: ignore[arg-type]
     (c.AddGroup("busy"), 'group "busy" is declared already, as GroupSpec('),
     (c.AddGroup("two", threads=-2), 'group "two": threads must be 0 (on the loop), 1 (a thread of its own) or'),
     (c.AddGroup(""), "a group needs a name, got ''"),

@@ -32,6 +32,7 @@ __all__ = [
     "GroupsChange",
     "NodeChange",
     "NodeSwap",
+    "NotesChange",
     "OptionsChange",
     "ParameterChange",
     "PortChange",
@@ -295,3 +296,24 @@ class PortChange(Change):
     @override
     def inverse(self) -> Self:
         return replace(self, added=not self.added)
+
+
+@dataclass(eq=False)
+class NotesChange(Change):
+    """Editors have noted something else about a node, or about the whole graph."""
+
+    notes: dict[Node | None, dict[str, Any]]
+    node: Node | None
+    before: dict[str, Any]
+    after: dict[str, Any]
+
+    @override
+    def do(self) -> None:
+        if self.after:
+            self.notes[self.node] = self.after
+        else:
+            self.notes.pop(self.node, None)
+
+    @override
+    def inverse(self) -> Self:
+        return replace(self, before=self.after, after=self.before)

@@ -33,6 +33,7 @@ __all__ = [
     "Gate",
     "MakeActive",
     "Move",
+    "Note",
     "Operator",
     "Remove",
     "RemoveGroup",
@@ -238,6 +239,20 @@ class SetParameter(Command, frozen=True):
     value: Any
 
 
+class Note(Command, frozen=True):
+    """Note something for editors, which nothing else reads: a position, a colour, a comment.
+
+    Attributes:
+      path: the node or subgraph; "" for a free note about the whole graph.
+      name: of the note, "position".
+      value: plain data; None takes the note away.
+    """
+
+    path: str
+    name: str
+    value: Any = None
+
+
 class Enclose(Command, frozen=True):
     """Group nodes of one graph into a new subgraph beside them, which is called `name` (rule G1)."""
 
@@ -283,6 +298,7 @@ AnyCommand: TypeAlias = (
     | Gate
     | Ungate
     | SetParameter
+    | Note
     | Enclose
     | Dissolve
     | Replace

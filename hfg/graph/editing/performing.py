@@ -22,6 +22,7 @@ from hfg.graph.editing.changes import (
     GroupsChange,
     NodeChange,
     NodeSwap,
+    NotesChange,
     OptionsChange,
     ParameterChange,
     PortChange,
@@ -161,6 +162,8 @@ class _Hand:
             name: [port for port in ports if port.node is not node] for name, ports in around.promotions.by_name.items()
         }
         self.promote(around, promoted)
+        for one in gone:
+            self._note_of(one, {})
         self.do(NodeChange.of(node, added=False))
 
     def promote(self, around: Level, promoted: Promoted) -> None:
@@ -176,6 +179,8 @@ class _Hand:
         _need_free(around, name, command.to)
         copy, inner = copy_of(node, around)
         self.do(NodeChange(around, name, copy, node._options, len(around.nodes), inner, added=True))
+        for one, other in zip(nodes_within(node), nodes_within(copy), strict=True):
+            self._note_of(other, self.root.whole.notes.get(one, {}))
 
     def _rename(self, command: c.Rename) -> None:
         node = node_at(self.root, command.path)
@@ -217,6 +222,7 @@ class _Hand:
             (level, gate) for level in self._gated_levels() for gate in level.gates if old in (gate.target, gate.by)
         ]
         promoted = around.promotions.copied()
+        notes = self.root.whole.notes.get(old, {})
         self.take_out(old)
         around.face.add(new, name=name, **msgspec.structs.asdict(options))
         added = NodeChange.of(new, added=True)
@@ -231,6 +237,7 @@ class _Hand:
         for level, gate in gates:
             self.do(GateChange(level, _gate_of(gate, old, new), len(level.gates.listed), added=True))
         self.promote(around, _promoted_by(around, promoted, old, new))
+        self._note_of(new, notes)
 
     def _hand_over(self, around: Level, old: Node, new: Node) -> None:
         """Gates and promotions go on with the new node."""
@@ -240,6 +247,9 @@ class _Hand:
                 self.do(GateChange(level, gate, position, added=False))
                 self.do(GateChange(level, _gate_of(gate, old, new), position, added=True))
         self.promote(around, _promoted_by(around, around.promotions.by_name, old, new))
+        notes = self.root.whole.notes.get(old, {})
+        self._note_of(old, {})
+        self._note_of(new, notes)
 
     # --- groups and ports of the whole ---
 
@@ -335,6 +345,25 @@ class _Hand:
                     return
         raise GraphError(f'"{command.path}" has no gate that could be taken away')
 
+    def _note(self, command: c.Note) -> None:
+        node = None if command.path == "" else node_at(self.root, command.path)
+        try:
+            value = msgspec.json.decode(msgspec.json.encode(command.value))  # as it comes over a wire
+        except (TypeError, ValueError, RecursionError) as error:
+            raise GraphError(
+                f'note "{command.name}" of "{command.path}": notes are plain data, got {command.value!r:.80} '
+                f"({error}); give numbers, texts, lists and dicts"
+            ) from error
+        notes = {name: value for name, value in self.root.whole.notes.get(node, {}).items() if name != command.name}
+        self._note_of(node, notes if value is None else notes | {command.name: value})
+
+    def _note_of(self, node: Node | None, after: dict[str, Any]) -> None:
+        """Let these be the notes about a node, if they are others."""
+        notes = self.root.whole.notes
+        before = notes.get(node, {})
+        if before != after:
+            self.do(NotesChange(notes, node, before, after))
+
     def _setparameter(self, command: c.SetParameter) -> None:
         port = parameter_at(self.root, command.path)
         reached = list(stands_for(port))
@@ -418,7 +447,9 @@ class _Hand:
         enclose(self.do, members, command.name)
 
     def _dissolve(self, command: c.Dissolve) -> None:
-        dissolve(self.do, node_at(self.root, command.path), self._gated_levels())
+        box = node_at(self.root, command.path)
+        dissolve(self.do, box, self._gated_levels())
+        self._note_of(box, {})
 
 
 def _refuse_malformed(command: c.Command) -> None:

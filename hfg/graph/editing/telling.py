@@ -73,6 +73,9 @@ class _Telling:
             self.say(c.AddOutput(name, _text(out.type, f'output "{name}" of the graph')))
         self._tell_level(self.root, self.made)
         self._tell_gates()
+        for node in (None, *_walk(self.root).values()):
+            for name, value in self.root.whole.notes.get(node, {}).items():
+                self.say(c.Note("" if node is None else node.place.path, name, value))
 
     def _tell_level(self, level: Level, made: Level) -> None:
         waiting = [(level, made)]

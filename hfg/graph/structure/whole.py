@@ -26,10 +26,11 @@ class Whole:
       gated: nodes that have a gate, of which each has at most one (rule A11); written by the levels' `Gates`.
       run: the run it has, if any; a graph has one at a time.
       takes_commands: commands are being carried out, which a run follows and the history knows.
+      notes: of editors, by node; None: those about the whole. Nothing else reads them, and they go with their node.
       history: of edits; what lies on it is the matter of who edits.
     """
 
-    __slots__ = ("gated", "groups", "history", "make_face", "root", "run", "takes_commands")
+    __slots__ = ("gated", "groups", "history", "make_face", "notes", "root", "run", "takes_commands")
 
     root: Level
 
@@ -39,6 +40,7 @@ class Whole:
         self.gated: set[Node] = set()
         self.run: object | None = None
         self.takes_commands = False
+        self.notes: dict[Node | None, dict[str, Any]] = {}
         self.history: History[Any] = History(lambda: self.root.title)
 
     def begin_run(self, run: object) -> None:
