@@ -16,13 +16,14 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-from benchmarks import bench_edits, bench_shape, rates, threaded, variants
+from benchmarks import asking, bench_edits, bench_shape, rates, threaded, variants
 from benchmarks.goals import Goal, Side
 from benchmarks.measure import BEFORE, Case
 from benchmarks.ours import ASYNC, FUNCTION, SUSPENDING, Machine
 
 HOPS = 500_000
 LETTERS = 4_000
+REQUESTS = 200
 STAGE_TOKENS = 100
 PICTURES = 20 * threaded.PHOTOGRAPHS
 SECONDS = 20
@@ -121,6 +122,13 @@ def coroutines() -> None:
         goal(f"{kind.name}, chain of 10 / asyncio.Queue(1)", ours, theirs, at_most)
 
 
+def requests() -> None:
+    """Requests that wait, several at once."""
+    ours = case(f"hfg, {REQUESTS} requests", asking.by_hfg, REQUESTS, "s")
+    by_hand = case(f"by hand, {REQUESTS} requests", asking.by_hand, REQUESTS, "s")
+    goal(f"{REQUESTS} requests of 80 ms, 8 at once / semaphore and gather", ours, by_hand, 1.1, by="wall")
+
+
 def machines() -> None:
     """State machines of a few and of many states."""
     for states in (10, 100):
@@ -169,7 +177,7 @@ def sizes() -> None:
             goal(f"{name}, in {length:,} / 1 ms", ours, 1.0, 1.0, by="value")
 
 
-for _part in (flows, signals, coroutines, machines, threads, clocks, sizes):
+for _part in (flows, signals, coroutines, requests, machines, threads, clocks, sizes):
     _part()
 
 AGAINST = [name for name in CASES if BEFORE + name in SKIPPED]

@@ -87,10 +87,13 @@ class Report(msgspec.Struct, frozen=True):
         """A table of the nodes, and one of the edges; what nobody has is left out."""
         lines = [f"{self.outcome} after {seconds(self.duration_s)}, {self.firings} firings"]
         nodes = [
-            (path, one.firings, one.silent, one.calls, one.failed, one.restarts, one.active, one.ended)
+            (path, one.firings, one.silent, one.calls, one.failed, one.retries, one.restarts, one.active, one.ended)
             for path, one in self.nodes.items()
         ]
-        lines += ["", *table(("node", "firings", "silent", "calls", "failed", "restarts", "active", "ended"), nodes)]
+        lines += [
+            "",
+            *table(("node", "firings", "silent", "calls", "failed", "retries", "restarts", "active", "ended"), nodes),
+        ]
         edges = [
             (label, one.sent, one.dropped, one.drained, one.untaken, one.grown) for label, one in self.edges.items()
         ]
