@@ -404,14 +404,14 @@ def test_calling_a_function_node_like_its_function_is_answered() -> None:
     assert blur.function(3) == 30
 
 
-def test_check_warns_of_a_type_that_cannot_be_found_by_name() -> None:
+def test_check_hints_at_a_type_that_cannot_be_found_by_name() -> None:
     @hfg.node
     def local(value: int) -> None: ...
 
     graph = hfg.Graph()
     graph.connect(graph.add(numbers(count=1)).out, graph.add(local()).value)
     (problem,) = graph.check()
-    assert (problem.severity, problem.path) == ("warning", "local")
+    assert (problem.severity, problem.path) == ("hint", "local")
 
 
 def test_type_without_process_never_fires_and_lives_by_its_slots() -> None:

@@ -42,10 +42,12 @@ def is_fed_by_events(plan: GraphPlan) -> bool:
 
 STRUCTURE: dict[str, Callable[[GraphPlan], object]] = {
     "an operator with a scheduler on an edge": lambda plan: any(
-        one.name in WITH_TIME for edge in plan.edges for one in edge.options.get("through", ())
+        one.arguments[0] in WITH_TIME for edge in plan.edges for one in edge.options.get("through", ())
     ),
     "an operator that speaks as it is connected": lambda plan: any(
-        one.name in ("start_with", "beside_a_timer") for edge in plan.edges for one in edge.options.get("through", ())
+        one.arguments[0] in ("start_with", "beside_a_timer")
+        for edge in plan.edges
+        for one in edge.options.get("through", ())
     ),
     "iteration inside of iteration": lambda plan: nodes(plan, "EachOfEach"),
     "iteration in a subgraph": lambda plan: any(

@@ -110,6 +110,7 @@ class Door:
     def __init__(self, run: Run, target: str, name: str) -> None:
         self.run = run
         self.guests: set[asyncio.Transport] = set()
+        self.closed = False
         self.name = Answer(os.getpid(), run.graph.name, target, name=name)
 
     def answer(self, line: bytes) -> Answer | Question:
@@ -123,6 +124,14 @@ class Door:
         if question.want == "tap":
             return question
         return msgspec.structs.replace(self.name, glance=self.run.glance())
+
+    async def close(self) -> None:
+        """Send everybody away, and see them gone: a loop that ends before that leaves their sockets open."""
+        self.closed = True
+        for guest in self.guests:
+            guest.abort()
+        while self.guests:
+            await asyncio.sleep(0)
 
 
 @asynccontextmanager
@@ -152,8 +161,8 @@ async def watched(run: Run, watch: bool | str) -> AsyncIterator[None]:
             file.unlink(missing_ok=True)
         if server is not None:
             server.close()
-        for guest in () if door is None else door.guests:
-            guest.abort()
+        if door is not None:
+            await door.close()
 
 
 def _listen() -> tuple[Path, socket.socket]:
@@ -205,7 +214,7 @@ class _Guest(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        if len(self._door.guests) >= _MOST_GUESTS:
+        if self._door.closed or len(self._door.guests) >= _MOST_GUESTS:
             transport.abort()
             return
         self._door.guests.add(transport)

@@ -498,7 +498,7 @@ class Region:
             self.called_off = False
             for worker in self.order:
                 worker.busy = ""
-            if self.head.placed:  # by what came in meanwhile; its turn is decided when the wave is over, as always
+            if self.head.placed and len(self.order) > 1:  # by what came in meanwhile; but it waits for the wave (F5)
                 self.head.unplace()
 
     def _go_on(self, called_off: bool) -> None:

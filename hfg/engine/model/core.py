@@ -11,7 +11,7 @@ import itertools
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Sequence
 from types import FrameType
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
 
 from hfg.engine.model.flights import Flight
 from hfg.engine.model.iteration import Iteration
@@ -33,6 +33,9 @@ class _Pending:
     def __repr__(self) -> str:
         return "PENDING"
 
+
+FOR_A_WAVE: Final = frozenset({"disturbed", "dissolved", "speaks"})
+"""Flags that end the wave under way and nothing else."""
 
 PENDING = _Pending()
 """What an executor returns for code that waits: its result comes later."""
@@ -303,6 +306,11 @@ class Core:
         self.heard: deque[tuple[Any, Token[Any]]] = deque()  # signals of which subscribers are to hear (F3)
         self.telling = False  # they are hearing
         self.drained: list[tuple[Worker, int]] = []  # modifiers of the sending under way that act behind it (T4, F12)
+
+    def ends_slice(self) -> bool:
+        """Whether a flag is up that is not for the wave alone that has ended by it: the pump is to look round."""
+        self.flags[:] = [flag for flag in self.flags if flag not in FOR_A_WAVE]
+        return bool(self.flags)
 
     def settle_counts(self) -> None:
         """Somebody is about to read how often nodes have fired: fused regions count by waves."""

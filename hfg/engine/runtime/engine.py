@@ -351,8 +351,8 @@ class Engine:
         A flag ends the slice at once: a pause, the end of the run, or the watchdog, which raises it when nodes take so
         long that the slice is over before the next look.
         """
-        flags = self.core.flags
-        until = self.core.until = self.now() + _SLICE_S
+        core, flags = self.core, self.core.flags
+        until = core.until = self.now() + _SLICE_S
         left = _SLICE_STEPS
         while True:
             if ready_groups:
@@ -364,7 +364,7 @@ class Engine:
                 self._resumed.popleft()()
             elif not ready_groups:
                 return
-            if flags:
+            if flags and core.ends_slice():
                 return
             left -= 1
             if not left:
@@ -404,7 +404,7 @@ class Engine:
                     worker.step(worker)
                 elif not ready_groups:
                     return
-                if flags:
+                if flags and core.ends_slice():
                     return
                 left -= 1
                 if left <= 0:
