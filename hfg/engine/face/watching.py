@@ -111,6 +111,7 @@ class Door:
         self.run = run
         self.guests: set[asyncio.Transport] = set()
         self.closed = False
+        self._empty = asyncio.Event()
         self.name = Answer(os.getpid(), run.graph.name, target, name=name)
 
     def answer(self, line: bytes) -> Answer | Question:
@@ -130,8 +131,14 @@ class Door:
         self.closed = True
         for guest in self.guests:
             guest.abort()
-        while self.guests:
-            await asyncio.sleep(0)
+        if self.guests:
+            await self._empty.wait()
+
+    def leave(self, guest: asyncio.Transport) -> None:
+        """One is gone."""
+        self.guests.discard(guest)
+        if self.closed and not self.guests:
+            self._empty.set()
 
 
 @asynccontextmanager
@@ -221,7 +228,7 @@ class _Guest(asyncio.Protocol):
         transport.set_write_buffer_limits(0)  # one answer at a time: whoever does not read is not heard
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._door.guests.discard(self._transport)
+        self._door.leave(self._transport)
         if self._tapping is not None:
             self._tapping.cancel()
 
