@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Coroutine
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +17,8 @@ from hfg.testing import ReferenceReport, reference_run
 from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
 from hfg.token import Marker
+from tests.semantics import meddling
+from tests.semantics.meddling import PATIENCE_S, Gate
 from tests.semantics.nodes import (
     Ear,
     Keep,
@@ -33,8 +34,6 @@ from tests.semantics.nodes import (
     scale,
     split,
 )
-
-PATIENCE_S = 20.0
 
 
 @pytest.fixture(autouse=True)
@@ -64,12 +63,7 @@ def work_group() -> hfg.Graph:
 
 def chain(graph: hfg.Graph, port: Any, *nodes: Any) -> Any:
     """Connect nodes of the thread group one behind the other, with options if need be; gives back the last output."""
-    for one in nodes:
-        node, options = one if isinstance(one, tuple) else (one, {})
-        graph.add(node, group="work", **options)
-        graph.connect(port, node.value)
-        port = getattr(node, "out", None)
-    return port
+    return meddling.chain(graph, port, *nodes, group="work")
 
 
 # --- a wave is one job ---
@@ -296,125 +290,22 @@ def test_statistics_measure_every_member_and_count_exactly(clock: Any) -> None:
 # --- who meddles with a wave under way ---
 
 
-class Gate:
-    """Lets the test look at a wave amid a call of its second member."""
-
-    def __init__(self, at: int = 3) -> None:
-        self.at = at
-        self.inside = threading.Event()
-        self.go_on = threading.Event()
-
-    def node(self) -> Any:
-        @hfg.node
-        def stops(value: int) -> int:
-            if value == self.at:
-                self.inside.set()
-                assert self.go_on.wait(PATIENCE_S)
-            return value
-
-        return stops()
-
-
-async def until_inside(gate: Gate) -> None:
-    assert await asyncio.to_thread(gate.inside.wait, PATIENCE_S)
-
-
-def on_the_real_clock(main: Coroutine[Any, Any, None]) -> None:
-    asyncio.run(main)
-
-
-def gated(gate: Gate, count: int = 6) -> tuple[hfg.Graph, Keep]:
-    graph, sink = work_group(), Keep()
-    source = graph.add(numbers(count=count))
-    out = chain(graph, source.out, forward(), gate.node(), scale(factor=10), (forward(), {"name": "last"}))
-    graph.connect(out, graph.add(sink).value)
-    return graph, sink
-
-
-@pytest.mark.rule("R3")
-def test_a_pause_ends_the_wave_behind_the_call_under_way_and_steps_go_on_from_there() -> None:
-    async def main() -> None:
-        gate = Gate()
-        graph, sink = gated(gate)
-        async with hfg.running(graph) as live:
-            await until_inside(gate)
-            live.pause()
-            gate.go_on.set()
-            await live.wait_paused()
-            assert sink.values == [10, 20]
-            assert (await live.step(graph["scale"])).moved == ("scale",)
-            assert (await live.step(graph["last"])).moved == ("last",)
-            live.resume()
-            await live.wait_finished()
-        assert sink.values == [10, 20, 30, 40, 50, 60]
-
-    on_the_real_clock(main())
-
-
-@pytest.mark.rule("P8")
-def test_a_parameter_set_amid_a_wave_holds_for_a_member_that_has_not_fired_yet() -> None:
-    async def main() -> None:
-        gate = Gate()
-        graph, sink = gated(gate)
-        async with hfg.running(graph) as live:
-            await until_inside(gate)
-            live.set(graph["scale"].ports.parameters["factor"], 100)
-            live.set(graph["scale"].ports.parameters["factor"], 1000)
-            gate.go_on.set()
-            await live.wait_finished()
-        assert sink.values == [10, 20, 3000, 4000, 5000, 6000]
-
-    on_the_real_clock(main())
-
-
-@pytest.mark.rule("F9", "F10")
-@pytest.mark.parametrize("which", ["forward", "stops", "scale", "last"])
-def test_whoever_is_disabled_amid_a_wave_does_what_it_does_amid_single_firings(which: str) -> None:
-    async def kept(fast: bool) -> tuple[list[Any], dict[str, int]]:
-        gate = Gate()
-        graph, sink = gated(gate)
-        async with hfg.running(graph, fast=fast) as live:
-            await until_inside(gate)
-            await live.trigger(graph[which].ports.slots["disable"])
-            gate.go_on.set()
-            await live.wait_quiet()
-            return sink.values, {path: node.firings for path, node in live.statistics().nodes.items()}
-
-    assert asyncio.run(kept(fast=True)) == asyncio.run(kept(fast=False))
-
-
 @pytest.mark.rule("R4")
 def test_an_edit_waits_for_one_call_of_the_wave_and_not_for_all_of_it() -> None:
     async def main() -> None:
         gate = Gate()
-        graph, sink = gated(gate)
+        graph, sink = gate.graph()
         async with hfg.running(graph) as live:
-            await until_inside(gate)
+            await gate.until_inside()
             edit = asyncio.create_task(live.edit(c.Remove("scale")))
             await asyncio.sleep(0)
             assert not edit.done()
-            gate.go_on.set()
+            gate.go_on()
             await edit
             await live.wait_finished()
         assert sink.values == [10, 20]
 
-    on_the_real_clock(main())
-
-
-@pytest.mark.rule("R5", "X3")
-def test_a_run_that_is_stopped_amid_a_wave_counts_what_has_fired() -> None:
-    async def main() -> None:
-        gate = Gate()
-        graph, sink = gated(gate)
-        async with hfg.running(graph) as live:
-            await until_inside(gate)
-            live.stop()
-            gate.go_on.set()
-        assert live.report().outcome == "stopped"
-        assert [live.report().nodes[name].firings for name in ("forward", "stops", "scale", "last")] == [3, 3, 2, 2]
-        assert sink.values == [10, 20]
-
-    on_the_real_clock(main())
+    Gate.run(main())
 
 
 @pytest.mark.rule("X3")
@@ -436,32 +327,15 @@ def test_a_member_that_does_not_come_back_is_named_and_the_others_are_torn_down(
         chain(graph, graph.add(numbers(count=6)).out, forward(), gate.node(), last)
         async with hfg.running(graph) as live:
             live._engine.settings.teardown_limit_s = 0.05
-            await until_inside(gate)
+            await gate.until_inside()
             live.stop()
 
     try:
         with pytest.raises(hfg.errors.RunError, match='"stops" failed in firing 3: its thread did not come back'):
-            on_the_real_clock(main())
+            Gate.run(main())
     finally:
-        gate.go_on.set()
+        gate.go_on()
     assert last.gone
-
-
-@pytest.mark.rule("X3")
-def test_a_run_that_is_cancelled_amid_a_wave_is_torn_down() -> None:
-    async def main() -> None:
-        gate = Gate()
-        graph, sink = gated(gate)
-        task = asyncio.create_task(hfg.run_async(graph))
-        await until_inside(gate)
-        task.cancel()
-        gate.go_on.set()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-        assert sink.values[:2] == [10, 20]
-        assert not [thread for thread in threading.enumerate() if thread.name == "hfg group work"]
-
-    on_the_real_clock(main())
 
 
 class Shy(hfg.Node):

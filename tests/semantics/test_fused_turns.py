@@ -6,7 +6,7 @@ Rules F3, F5, F10, P8, R2 to R5, X1, X3. While the wave gives way others meddle 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -15,9 +15,8 @@ import hfg
 from hfg import commands as c
 from hfg.engine.fusion.region import Region
 from hfg.engine.runtime import settings
+from tests.semantics.meddling import MEMBERS, Turns, chain
 from tests.semantics.nodes import Keep, forward, numbers, scale
-
-MEMBERS = ("forward", "lingers", "scale", "last")
 
 
 @pytest.fixture(autouse=True)
@@ -37,52 +36,6 @@ def exits(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     monkeypatch.setattr(Region, "materialise", noted)
     return found
-
-
-class Turns:
-    """Lets a test meddle with a wave whose second member gives way again and again."""
-
-    def __init__(self, at: int = 3, then: Callable[[], Any] | None = None) -> None:
-        self.at = at
-        self.inside = asyncio.Event()
-        self.over = False
-        self.then = then
-
-    def node(self) -> Any:
-        @hfg.node
-        async def lingers(value: int) -> int:
-            if value == self.at:
-                self.inside.set()
-                while not self.over:
-                    await asyncio.sleep(0)
-                if self.then is not None:
-                    await self.then()
-            return value
-
-        return lingers()
-
-
-def chain(graph: hfg.Graph, port: Any, *nodes: Any) -> Any:
-    for one in nodes:
-        node, options = one if isinstance(one, tuple) else (one, {})
-        graph.add(node, **options)
-        graph.connect(port, node.value)
-        port = getattr(node, "out", None)
-    return port
-
-
-def lingering(turns: Turns, count: int = 6, **options: Any) -> tuple[hfg.Graph, Keep]:
-    graph, sink = hfg.Graph(), Keep()
-    source = graph.add(numbers(count=count))
-    member = (turns.node(), options)
-    out = chain(graph, source.out, forward(), member, scale(factor=10), (forward(), {"name": "last"}))
-    graph.connect(out, graph.add(sink).value)
-    return graph, sink
-
-
-def in_virtual_time(main: Coroutine[Any, Any, Any]) -> Any:
-    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
-        return runner.run(main)
 
 
 @pytest.mark.rule("R2", "F5")
@@ -163,7 +116,7 @@ def test_a_head_with_a_buffer_goes_on_before_who_fills_that_though_it_has_given_
 def test_what_has_left_the_wave_is_taken_while_it_gives_way() -> None:
     async def main() -> None:
         turns = Turns(at=1)
-        graph, sink = lingering(turns)
+        graph, sink = turns.graph()
         graph.group("beside", threads=1)
         early = Keep()
         graph.connect(graph["forward.out"], graph.add(early, name="early", group="beside").value)
@@ -184,71 +137,15 @@ def test_what_has_left_the_wave_is_taken_while_it_gives_way() -> None:
 def test_code_that_waits_for_longer_behind_its_turns_goes_on_as_a_firing_like_any_other(exits: list[str]) -> None:
     async def main() -> None:
         turns = Turns(then=lambda: asyncio.sleep(1.0))
-        graph, sink = lingering(turns)
+        graph, sink = turns.graph()
         turns.over = True
         report = await hfg.run_async(graph)
         assert sink.values == [10, 20, 30, 40, 50, 60]
         assert report.duration_s == 1.0
         assert [report.nodes[name].firings for name in MEMBERS] == [7] * 4
 
-    in_virtual_time(main())
-    assert exits == ["lingers", "numbers"]
-
-
-@pytest.mark.rule("R3")
-def test_a_pause_ends_the_wave_behind_the_call_that_gives_way_and_steps_go_on_from_there() -> None:
-    async def main() -> None:
-        turns = Turns()
-        graph, sink = lingering(turns)
-        async with hfg.running(graph) as live:
-            await turns.inside.wait()
-            live.pause()
-            turns.over = True
-            await live.wait_paused()
-            assert sink.values == [10, 20]
-            assert (await live.step(graph["scale"])).moved == ("scale",)
-            assert (await live.step(graph["last"])).moved == ("last",)
-            live.resume()
-            await live.wait_finished()
-        assert sink.values == [10, 20, 30, 40, 50, 60]
-
-    in_virtual_time(main())
-
-
-@pytest.mark.rule("P8")
-def test_a_parameter_set_while_a_wave_gives_way_holds_for_a_member_that_has_not_fired_yet() -> None:
-    async def main() -> None:
-        turns = Turns()
-        graph, sink = lingering(turns)
-        async with hfg.running(graph) as live:
-            await turns.inside.wait()
-            live.set(graph["scale"].ports.parameters["factor"], 100)
-            live.set(graph["scale"].ports.parameters["factor"], 1000)
-            turns.over = True
-            await live.wait_finished()
-        assert sink.values == [10, 20, 3000, 4000, 5000, 6000]
-
-    in_virtual_time(main())
-
-
-@pytest.mark.rule("F9", "F10")
-@pytest.mark.parametrize("slot", ["disable", "activate", "reset"])
-@pytest.mark.parametrize("which", MEMBERS)
-def test_a_signal_to_a_member_of_a_wave_that_gives_way_does_what_it_does_amid_single_firings(
-    which: str, slot: str
-) -> None:
-    async def kept(fast: bool) -> tuple[list[Any], dict[str, int], tuple[str, ...]]:
-        turns = Turns()
-        graph, sink = lingering(turns)
-        async with hfg.running(graph, fast=fast) as live:
-            await turns.inside.wait()
-            await live.trigger(graph[which].ports.slots[slot])
-            turns.over = True
-            await live.wait_quiet()
-            firings = {path: node.firings for path, node in live.statistics().nodes.items()}
-            return sink.values, firings, tuple(live.active())
-
-    assert in_virtual_time(kept(fast=True)) == in_virtual_time(kept(fast=False))
+    Turns.run(main())
+    assert exits == ["stops", "numbers"]
 
 
 @pytest.mark.rule("R4")
@@ -256,7 +153,7 @@ def test_a_signal_to_a_member_of_a_wave_that_gives_way_does_what_it_does_amid_si
 def test_a_member_is_removed_while_its_wave_gives_way(which: str) -> None:
     async def main() -> None:
         turns = Turns()
-        graph, sink = lingering(turns)
+        graph, sink = turns.graph()
         async with hfg.running(graph) as live:
             await turns.inside.wait()
             edit = asyncio.create_task(live.edit(c.Remove(which)))
@@ -267,7 +164,7 @@ def test_a_member_is_removed_while_its_wave_gives_way(which: str) -> None:
         assert sink.values[:2] == [10, 20]
         assert len(sink.values) <= 3
 
-    in_virtual_time(main())
+    Turns.run(main())
 
 
 @pytest.mark.rule("X1")
@@ -281,7 +178,7 @@ def test_code_that_raises_behind_its_turn_fails_as_it_does_amid_single_firings(
 
     async def outcome(fast: bool) -> tuple[list[Any], str]:
         turns = Turns(then=fails)
-        graph, sink = lingering(turns, on_error=policy)
+        graph, sink = turns.graph(on_error=policy)
         turns.over = True
         try:
             report = await hfg.run_async(graph, fast=fast)
@@ -289,7 +186,7 @@ def test_code_that_raises_behind_its_turn_fails_as_it_does_amid_single_firings(
             return sink.values, str(problem)
         return sink.values, report.outcome
 
-    assert in_virtual_time(outcome(fast=True)) == in_virtual_time(outcome(fast=False))
+    assert Turns.run(outcome(fast=True)) == Turns.run(outcome(fast=False))
 
 
 @pytest.mark.rule("X1")
@@ -299,43 +196,12 @@ def test_the_error_behind_a_turn_names_the_member_and_its_firing() -> None:
 
     async def main() -> None:
         turns = Turns(then=fails)
-        graph, _ = lingering(turns)
+        graph, _ = turns.graph()
         turns.over = True
-        with pytest.raises(hfg.errors.RunError, match='"lingers" failed in firing 3'):
+        with pytest.raises(hfg.errors.RunError, match='"stops" failed in firing 3'):
             await hfg.run_async(graph)
 
-    in_virtual_time(main())
-
-
-@pytest.mark.rule("R5", "X3")
-def test_a_run_that_is_stopped_while_a_wave_gives_way_counts_what_has_fired() -> None:
-    async def main() -> None:
-        turns = Turns()
-        graph, sink = lingering(turns)
-        async with hfg.running(graph) as live:
-            await turns.inside.wait()
-            live.stop()
-        report = live.report()
-        assert report.outcome == "stopped"
-        assert [report.nodes[name].firings for name in MEMBERS] == [3, 3, 2, 2]
-        assert sink.values == [10, 20]
-
-    in_virtual_time(main())
-
-
-@pytest.mark.rule("X3")
-def test_a_run_that_is_cancelled_while_a_wave_gives_way_is_torn_down() -> None:
-    async def main() -> None:
-        turns = Turns()
-        graph, sink = lingering(turns)
-        task = asyncio.create_task(hfg.run_async(graph))
-        await turns.inside.wait()
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-        assert sink.values == [10, 20]
-
-    in_virtual_time(main())
+    Turns.run(main())
 
 
 @pytest.mark.rule("X3")
@@ -367,7 +233,7 @@ def test_a_member_that_gives_way_for_ever_is_named_when_the_run_is_stopped() -> 
 def test_statistics_read_while_a_wave_gives_way_change_nothing() -> None:
     async def main() -> None:
         turns = Turns()
-        graph, sink = lingering(turns)
+        graph, sink = turns.graph()
         async with hfg.running(graph) as live:
             await turns.inside.wait()
             live.statistics()
@@ -377,4 +243,4 @@ def test_statistics_read_while_a_wave_gives_way_change_nothing() -> None:
             assert [live.statistics().nodes[name].firings for name in MEMBERS] == [7] * 4
         assert sink.values == [10, 20, 30, 40, 50, 60]
 
-    in_virtual_time(main())
+    Turns.run(main())

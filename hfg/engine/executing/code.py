@@ -30,6 +30,7 @@ __all__ = ["CodeRunner", "answer", "whose_code"]
 _code_of: contextvars.ContextVar[Worker | None] = contextvars.ContextVar("hfg.code_of", default=None)
 
 Done = Callable[[Any, BaseException | None], None]
+_Outcome = tuple[Any, Exception | None]
 
 
 def whose_code() -> Worker | None:
@@ -92,19 +93,22 @@ class CodeRunner:
         if worker.group.threaded and not inspect.iscoroutinefunction(call):
             self._in_thread(worker, call, arguments, done)
             return
-        core = self.core
-        core.current = worker
-        try:
-            result = call(*arguments)
-        except Exception as error:
-            core.current = None
-            done(None, error)
-            return
-        core.current = None
+        result, error = self._call(worker, call, arguments)
         if type(result) is CoroutineType or (worker.is_async and hasattr(result, "__await__")):
             self.drive(worker, result, done)
         else:
-            done(result, None)
+            done(result, error)
+
+    def _call(self, worker: Worker, call: Callable[..., Any], arguments: tuple[Any, ...]) -> _Outcome:
+        """Call what is a node's code, or begins with it; gives what that gave back, and what it raised."""
+        self.core.current = worker  # which stays so if what is raised is no error of the node
+        try:
+            result = call(*arguments)
+        except Exception as error:
+            self.core.current = None
+            return None, error
+        self.core.current = None
+        return result, None
 
     def drive(self, worker: Worker, coroutine: Any, done: Done) -> None:
         """See `core.Code`."""
@@ -112,16 +116,9 @@ class CodeRunner:
         if carrier is None:
             carrier = self.carrier(worker)
             worker.be_carried(carrier)
-        self.core.current = worker
-        try:
-            result = carrier.start(coroutine, self.late(worker, done))
-        except Exception as error:
-            self.core.current = None
-            done(None, error)
-            return
-        self.core.current = None
+        result, error = self._call(worker, carrier.start, (coroutine, self.late(worker, done)))
         if result is not PENDING:
-            done(result, None)
+            done(result, error)
             return
         worker.set_out()
         self._limit(worker)
@@ -146,21 +143,13 @@ class CodeRunner:
         if worker.group.threaded and not inspect.iscoroutinefunction(call):
             self._beside_in_thread(flight, call, arguments, done)
             return
-        self.core.current = worker
         outside = current_flight.set(flight)
-        try:
-            result = call(*arguments)
-        except Exception as error:
-            current_flight.reset(outside)
-            self.core.current = None
-            done(None, error)
-            return
+        result, error = self._call(worker, call, arguments)
         current_flight.reset(outside)
-        self.core.current = None
         if type(result) is CoroutineType or hasattr(result, "__await__"):
             self.drive_beside(flight, result, done)
         else:
-            done(result, None)
+            done(result, error)
 
     def drive_beside(self, flight: Flight, coroutine: Any, done: Done) -> None:
         """See `core.Code`."""
@@ -168,18 +157,11 @@ class CodeRunner:
         flights: Any = worker.flights
         carrier = flights.lend() or self.carrier(worker)
         carrier.enter(current_flight.set, flight)  # what its code sends is its own
-        self.core.current = worker
-        try:
-            result = carrier.start(coroutine, self._late_beside(flight, carrier, done))
-        except Exception as error:
-            self.core.current = None
-            flights.give_back(carrier)
-            done(None, error)
-            return
-        self.core.current = None
+        late = self._late_beside(flight, carrier, done)
+        result, error = self._call(worker, carrier.start, (coroutine, late))
         if result is not PENDING:
             flights.give_back(carrier)
-            done(result, None)
+            done(result, error)
             return
         flight.work(carrier=carrier)
         limit = flight.limit_s
@@ -192,24 +174,14 @@ class CodeRunner:
         def over(result: Any, error: BaseException | None) -> None:
             if flight.carrier is carrier:
                 flight.rest()
-                flight.worker.flights.give_back(carrier)  # type: ignore[union-attr]  # it is one of its flights
-            elif carrier in self.given_up:
-                self.given_up.discard(carrier)
-                carrier.drop()  # its task has nothing to do any more
-            self._came_back_beside(flight, result, error, done)
+                flights: Any = flight.worker.flights
+                flights.give_back(carrier)
+            else:
+                self._drop(carrier)
+            self._tell(done, result, error)
             self._engine.go_on()
 
         return over
-
-    def _came_back_beside(self, flight: Flight, result: Any, error: BaseException | None, done: Done) -> None:
-        """Its code is over; behind the end of the run nobody listens to what it brings."""
-        if self.core.over:
-            self.came_back.set()
-            return
-        try:
-            done(result, error)
-        except Exception as fault:
-            self._engine.internal_fault(fault)
 
     def _beside_in_thread(
         self, flight: Flight, call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
@@ -225,7 +197,7 @@ class CodeRunner:
             group.returned(job)
             if flight.job is job:
                 flight.rest()
-            self._came_back_beside(flight, job.result, job.error, done)
+            self._tell(done, job.result, job.error)
 
         job = Job(worker, back, in_thread, arguments, done)
         flight.work(job=job)
@@ -241,13 +213,9 @@ class CodeRunner:
         """See `core.Code`."""
         carrier, job = flight.rest()
         if job is not None:
-            job.disown()
-            self._hold_no_more(job)
-            group: Any = flight.worker.group
-            group.abandon(f'"{flight.worker.path}", firing {flight.number}', job)
+            self._abandon(job, flight.worker, flight.number)
         elif carrier is not None:
-            self.given_up.add(carrier)
-            carrier.cancel()
+            self._give_up(carrier)
 
     def late(self, worker: Worker, done: Done) -> Done:
         """See `core.Code`."""
@@ -256,23 +224,42 @@ class CodeRunner:
         def over(result: Any, error: BaseException | None) -> None:
             if worker.in_flight and (worker.carrier is carrier or carrier is None):
                 worker.come_back()
-            elif carrier in self.given_up:
-                self.given_up.discard(carrier)
-                carrier.drop()  # its task has nothing to do any more
-            if outer.over:
-                self.came_back.set()
-                if not closing:
-                    return
-            try:
-                done(result, error)
-            except Exception as fault:
-                self._engine.internal_fault(fault)
-            engine.go_on()
+            else:
+                self._drop(carrier)
+            self._tell(done, result, error, closing=closing)
+            self._engine.go_on()
 
-        outer = self.core
-        engine = self._engine
         carrier = worker.carrier
         return over
+
+    def _tell(self, done: Done, result: Any, error: BaseException | None, *, closing: bool = False) -> None:
+        """Code that waited is over; behind the end of the run nobody listens but the teardown (`closing`)."""
+        if self.core.over:
+            self.came_back.set()
+            if not closing:
+                return
+        try:
+            done(result, error)
+        except Exception as fault:
+            self._engine.internal_fault(fault)
+
+    def _give_up(self, carrier: Carrier) -> None:
+        """X2: nobody listens to this code any more; it is cancelled, and its task let go when it has ended."""
+        self.given_up.add(carrier)
+        carrier.cancel()
+
+    def _drop(self, carrier: Carrier) -> None:
+        """The code that was given up has ended, so its task has nothing to do any more."""
+        if carrier in self.given_up:
+            self.given_up.discard(carrier)
+            carrier.drop()
+
+    def _abandon(self, job: Job, amid: Worker, firing: int) -> None:
+        """X2: nobody listens to this job any more, and its group goes on in another thread."""
+        job.disown()
+        self._hold_no_more(job)
+        group: Any = amid.group
+        group.abandon(f'"{amid.path}", firing {firing}', job)
 
     def execute_wave(
         self, workers: Sequence[Worker], call: Callable[..., Any], arguments: tuple[Any, ...], done: Done
@@ -385,19 +372,14 @@ class CodeRunner:
         """See `core.Code`; `amid`: whose call it is, if that is another node's of its region."""
         if not worker.in_flight:
             return
-        job = worker.job
+        job, carrier = worker.job, worker.carrier
         worker.come_back()
-        group: Any = worker.group
-        if group.threaded:
-            job.disown()
-            self._hold_no_more(job)
+        if worker.group.threaded:
             amid = amid or worker
-            group.abandon(f'"{amid.path}", firing {amid.firings}', job)
+            self._abandon(job, amid, amid.firings)
         else:
-            carrier = worker.carrier
             worker.be_carried(None)
-            self.given_up.add(carrier)
-            carrier.cancel()
+            self._give_up(carrier)
 
     async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
         """Trigger, then wait until no `wait` queue behind the node's events is full (F8)."""

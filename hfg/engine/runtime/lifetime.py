@@ -334,25 +334,22 @@ class Lifetime:
         if busy or flights:
             await self._until_back(lambda: any(worker.in_flight for worker in busy) or _any_works(flights))
         seconds = time.monotonic() - begun
-        left = [worker for worker in busy if worker.in_flight]
         late = [flight for flight in flights if flight.working]
+        return self._leave_behind([worker for worker in busy if worker.in_flight], late, seconds)
+
+    def _leave_behind(self, busy: list[Worker], late: list[Flight], seconds: float) -> dict[Worker, NodeError]:
+        """Wait no more for what does not come back; others of its thread group have their teardown in a new thread."""
+        code = self._engine.code
+        stuck: dict[Worker, str] = {}
         for flight in late:
             code.interrupt_beside(flight)
-        problems = {
-            flight.worker: NodeError(
-                flight.worker.path, f"firing {flight.number}", _did_not_end(flight.worker, seconds)
-            )
-            for flight in reversed(late)
-        }
-        stuck = []
-        for worker in left:  # others of its thread group have their teardown in a new thread
+            stuck.setdefault(flight.worker, f"firing {flight.number}")
+        for worker in busy:
             region = worker.region
             amid = region.abandon() if region is not None and region.running else worker
             code.interrupt(worker, amid=amid)
-            stuck.append(amid)
-        for worker in stuck:
-            problems[worker] = NodeError(worker.path, _doing(worker), _did_not_end(worker, seconds))
-        return problems
+            stuck[amid] = _doing(amid)
+        return {worker: NodeError(worker.path, doing, _did_not_end(worker, seconds)) for worker, doing in stuck.items()}
 
     async def _tear_down_one(self, worker: Worker) -> NodeError | None:
         engine = self._engine

@@ -72,6 +72,12 @@ def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Gro
         assert owner.scope is not None
         owner.scope.renumber(len(core.scopes))
         core.scopes.append(owner.scope)
+    _derive(core, parts)
+    core.sources.extend(worker for worker in leaves if worker.is_source)
+
+
+def _derive(core: Core, parts: Sequence[_Part]) -> None:
+    """What follows from the structure as a whole: who works, by whose leave, and which edges are live."""
     for worker in core.workers:
         if not worker.own_enabled or any(not scope.enabled for scope in worker.around):
             worker.block(DISABLED)
@@ -83,7 +89,6 @@ def build(core: Core, flat: FlatGraph, groups: Mapping[str, Group], *, loop: Gro
         worker.watch()
     for edge in core.edges:
         edge.enliven(is_live(edge))
-    core.sources.extend(worker for worker in leaves if worker.is_source)
 
 
 class _Part:
