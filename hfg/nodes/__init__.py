@@ -1,0 +1,36 @@
+"""The standard library of nodes: one family a module, written on floors 0-3 as a user would write it.
+
+    import hfg
+    from hfg.nodes import flow
+
+    graph.add(flow.delay(seconds=0.5))
+
+Nothing is imported before it is asked for, so `import hfg.nodes` is cheap; families that stand on other packages
+(OpenCV, matplotlib) say which extra is missing when they are used. `hfg nodes` lists what there is, `docs/nodes`
+describes it. `from_module` makes node types of the functions of any module.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+__all__: list[str] = []  # families are found by their names, see __getattr__
+
+
+def __getattr__(name: str) -> Any:
+    if name == "from_module":
+        return import_module(f"{__name__}.modules").from_module
+    family = f"{__name__}.{name}"
+    if not name.startswith("_"):
+        try:
+            return import_module(family)
+        except ModuleNotFoundError as error:
+            if error.name != family:  # the family is there, what it stands on is not
+                raise
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *(found.name for found in iter_modules(__path__) if found.name[0] != "_")})
