@@ -2,8 +2,9 @@
 
 Our own comparison instead of beartype's `is_subhint`, which raises on every `NDArray`, knows neither int -> float nor
 arrays with a layout, and takes bare generics for something else than open ones. Metadata of `Annotated` is taken off,
-apart from our own: `Shape` and `Pixels` say how an array is laid out. What cannot be judged is said, never guessed.
-Stands on `generics`, numpy and beartype; knows neither ports nor nodes.
+apart from our own: `Shape` and `Pixels` say how an array is laid out, `Named` what a type is called. What cannot be
+judged is said, never guessed. Stands on `generics`, numpy and beartype; knows neither ports nor nodes. `hfg.images` has
+the types of images.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import typing
 from collections import abc
 from collections.abc import Callable, Collection, Iterable, Mapping
 from itertools import islice
-from typing import Annotated, Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -28,14 +29,15 @@ from hfg import generics
 
 __all__ = [
     "Array",
-    "ColorImage",
-    "GrayImage",
-    "Image",
+    "ArrayFacts",
+    "Named",
     "Pixels",
     "Shape",
     "accepts",
+    "array_facts",
     "compatible",
     "describe",
+    "describe_value",
     "is_hint",
     "why_not",
 ]
@@ -79,19 +81,45 @@ class Shape:
 
 
 class Pixels(Shape):
-    """Metadata of an image: height x width, or height x width x channels; one channel needs no third axis."""
+    """Metadata of an image: height x width, or height x width x channels; one channel needs no third axis.
+
+    Without numbers there may be 1 to 4 channels, as in OpenCV; `Pixels(1, 3)` are one or three.
+    """
 
     __slots__ = ()
 
-    def __init__(self, channels: int | None = None) -> None:
-        super().__init__(channels)
+    def __init__(self, *channels: int) -> None:
+        super().__init__(*channels)
 
     def shapes(self) -> tuple[tuple[int | None, ...], ...]:
-        """Give every allowed shape; open channels mean 1 to 4, as in OpenCV."""
-        (channels,) = self.axes
-        counts = (1, 2, 3, 4) if channels is None else (channels,)
+        """Give every allowed shape, `None` for an axis of any length."""
+        counts = self.axes or (1, 2, 3, 4)
         flat: tuple[tuple[int | None, ...], ...] = ((None, None),) if 1 in counts else ()
         return flat + tuple((None, None, count) for count in counts)
+
+
+class Named:
+    """Metadata that says what a type is called in messages and lists; it changes nothing in what fits.
+
+    Example:
+      >>> from typing import Annotated
+      >>> describe(Annotated[npt.NDArray[np.float32], Pixels(1), Named("Depth")])
+      'Depth'
+    """
+
+    __slots__ = ("name",)
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Named) and other.name == self.name
+
+    def __hash__(self) -> int:
+        return hash((Named, self.name))
+
+    def __repr__(self) -> str:
+        return f"Named({self.name!r})"
 
 
 def _axes_meet(mine: tuple[int | None, ...], theirs: tuple[int | None, ...]) -> bool:
@@ -100,15 +128,6 @@ def _axes_meet(mine: tuple[int | None, ...], theirs: tuple[int | None, ...]) -> 
 
 Array: TypeAlias = npt.NDArray[Any]
 """A numpy array of any shape and dtype."""
-
-Image: TypeAlias = Annotated[npt.NDArray[Any], Pixels()]
-"""An image as OpenCV makes it: height x width, with or without an axis of 1 to 4 channels, of any dtype."""
-
-GrayImage: TypeAlias = Annotated[npt.NDArray[Any], Pixels(1)]
-"""An image of one channel."""
-
-ColorImage: TypeAlias = Annotated[npt.NDArray[Any], Pixels(3)]
-"""An image of three channels."""
 
 _NONE: Final = type(None)
 _OPEN_DTYPES: Final = frozenset(
@@ -130,6 +149,22 @@ _TOWER: Final[dict[type, tuple[type, ...]]] = {float: (int, bool), complex: (int
 """What a number type takes besides itself (PEP 484)."""
 
 _CALLABLE: Final[Any] = abc.Callable
+
+_NUMBERS: Final = (
+    np.bool_,
+    np.uint8,
+    np.int8,
+    np.uint16,
+    np.int16,
+    np.uint32,
+    np.int32,
+    np.uint64,
+    np.int64,
+    np.float16,
+    np.float32,
+    np.float64,
+)
+"""What an array of an open dtype is taken to hold by those who make values."""
 
 _LOOKED_AT: Final = 1000
 """How many items of a container are checked; the first ones, for the same value must always get the same answer."""
@@ -476,6 +511,44 @@ def _bearable(value: Any, hint: Any) -> bool:
         return True  # what cannot be judged was refused where it was connected; here it is let through
 
 
+class ArrayFacts(NamedTuple):
+    """What is known of the arrays of a type, for those who make or describe them.
+
+    Attributes:
+      dtypes: scalar classes that an array may hold; of an open dtype the usual numbers.
+      shapes: the allowed shapes, `None` for an axis of any length; empty if any shape will do.
+    """
+
+    dtypes: tuple[type[np.generic], ...]
+    shapes: tuple[tuple[int | None, ...], ...]
+
+
+def array_facts(hint: Any) -> ArrayFacts | None:
+    """Give dtypes and shapes of an array type; None if the hint is none.
+
+    Example:
+      >>> array_facts(Annotated[npt.NDArray[np.uint8 | np.float32], Pixels(1)])
+      ArrayFacts(dtypes=(<class 'numpy.uint8'>, <class 'numpy.float32'>), shapes=((None, None), (None, None, 1)))
+    """
+    hint, layouts = _open(hint)
+    dtype = _dtype_of(hint)
+    if dtype is None:
+        return None
+    allowed = typing.get_args(dtype) if _is_union(dtype) else (np.generic if dtype is Any else dtype,)
+    concrete = [one for one in allowed if one not in _OPEN_DTYPES]
+    opened = tuple(one for one in allowed if one in _OPEN_DTYPES)
+    dtypes = (*concrete, *(one for one in _NUMBERS if opened and issubclass(one, opened) and one not in concrete))
+    shapes = layouts[0].shapes() if layouts else ()
+    return ArrayFacts(dtypes, tuple(one for one in shapes if all(Shape(*one).meets(other) for other in layouts[1:])))
+
+
+def describe_value(value: Any) -> str:
+    """Say what a value is, in few words: "int: 3", "an array of float64, 480 x 640"."""
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype}, {' x '.join(map(str, value.shape)) or 'without axes'}"
+    return f"{describe(type(value))}: {value!r:.80}"
+
+
 @functools.lru_cache(maxsize=4096)
 def _describe(hint: Any) -> str:
     return _words(hint)
@@ -497,9 +570,9 @@ def describe(hint: Any) -> str:
 
 
 def _words(hint: Any) -> str:
-    for word, alias in (("Image", Image), ("GrayImage", GrayImage), ("ColorImage", ColorImage)):
-        if hint == alias:
-            return word
+    name = next((item.name for item in getattr(hint, "__metadata__", ()) if isinstance(item, Named)), None)
+    if name is not None:
+        return name
     if hint is None or hint is _NONE:
         return "None"
     if _is_union(hint):

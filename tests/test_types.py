@@ -44,17 +44,19 @@ from typing_extensions import TypeAliasType
 import hfg.types
 from hfg.types import (
     Array,
-    ColorImage,
-    GrayImage,
-    Image,
     Pixels,
     Shape,
     accepts,
+    array_facts,
     compatible,
     describe,
+    describe_value,
     why_not,
 )
 
+Image = Annotated[Array, Pixels()]
+GrayImage = Annotated[Array, Pixels(1)]
+ColorImage = Annotated[Array, Pixels(3), hfg.types.Named("ColorImage")]
 Value = TypeVar("Value")
 Number = TypeVar("Number", int, float)
 Meters = NewType("Meters", float)
@@ -476,7 +478,7 @@ def test_the_same_value_always_gets_the_same_answer() -> None:
         (None, "None"),
         (int | None, "int | None"),
         (list[int], "list[int]"),
-        (Image, "Image"),
+        (Image, "Array"),
         (ColorImage, "ColorImage"),
         (Array, "Array"),
         (Bytes, "Array[uint8]"),
@@ -487,6 +489,48 @@ def test_the_same_value_always_gets_the_same_answer() -> None:
 )
 def test_types_are_described_as_a_user_would_write_them(hint: Any, words: str) -> None:
     assert describe(hint) == words
+
+
+def test_a_name_changes_nothing_in_what_fits() -> None:
+    assert compatible(ColorImage, Annotated[Array, Pixels(3)])
+    assert compatible(Annotated[Array, Pixels(3), hfg.types.Named("Photograph")], ColorImage)
+    assert hfg.types.Named("a") == hfg.types.Named("a") != hfg.types.Named("b")
+    assert len({hfg.types.Named("a"), hfg.types.Named("a"), hfg.types.Named("b")}) == 2
+
+
+@pytest.mark.parametrize(
+    ("hint", "dtypes", "shapes"),
+    [
+        (Bytes, {np.uint8}, ()),
+        (Points, {np.float64}, ((None, 3),)),
+        (
+            Annotated[npt.NDArray[np.uint8 | np.int16], Pixels(1, 3)],
+            {np.uint8, np.int16},
+            ((None, None), (None, None, 1), (None, None, 3)),
+        ),
+        (npt.NDArray[np.floating[Any]], {np.float16, np.float32, np.float64}, ()),
+        (Annotated[Annotated[Bytes, Pixels()], Pixels(3)], {np.uint8}, ((None, None, 3),)),
+    ],
+    ids=lambda item: str(item)[:30],
+)
+def test_dtypes_and_shapes_of_an_array_type_can_be_asked_for(hint: Any, dtypes: Any, shapes: Any) -> None:
+    facts = array_facts(hint)
+    assert facts is not None
+    assert set(facts.dtypes) == dtypes
+    assert facts.shapes == shapes
+
+
+def test_an_open_dtype_holds_the_usual_numbers_and_a_number_is_no_array() -> None:
+    facts = array_facts(Array)
+    assert facts is not None
+    assert {np.uint8, np.int32, np.float64} <= set(facts.dtypes)
+    assert array_facts(int) is None
+
+
+def test_an_array_is_described_by_dtype_and_shape_and_not_by_its_numbers() -> None:
+    assert describe_value(np.zeros((480, 640))) == "an array of float64, 480 x 640"
+    assert describe_value(np.zeros(())) == "an array of float64, without axes"
+    assert describe_value("abc") == "str: 'abc'"
 
 
 def test_layouts_compare_by_value() -> None:

@@ -22,7 +22,7 @@ from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node, Place
 from hfg.testing.reference.waiting import hand_turned_loop
 from hfg.token import Token
-from hfg.types import accepts, describe
+from hfg.types import accepts, describe, describe_value
 
 __all__ = ["Firing", "Sent", "fire"]
 
@@ -339,8 +339,7 @@ class _Firing:
         plain = _plain(value)
         if self.debug and plain is not None and not accepts(plain, hint):
             raise TypeError(
-                f'{kind} "{self.type.name}.{name}" is declared {describe(hint)}, got {describe(type(plain))}: '
-                f"{plain!r:.80}"
+                f'{kind} "{self.type.name}.{name}" is declared {describe(hint)}, got {describe_value(plain)}'
             )
 
 

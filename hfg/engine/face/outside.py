@@ -21,7 +21,7 @@ from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.plan import prepare_slot
 from hfg.errors import NotRunning, UsageError
 from hfg.token import END, NO_MESSAGE, Marker, Token
-from hfg.types import accepts, describe
+from hfg.types import accepts, describe, describe_value
 
 __all__ = ["Feed", "collect", "need_sendable", "read", "signal", "until"]
 
@@ -104,8 +104,7 @@ class Feed(Generic[T]):
     def _check_type(self, value: object) -> None:
         if value is not None and not isinstance(value, Token | Marker) and not accepts(value, self._hint):
             raise TypeError(
-                f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got '
-                f"{describe(type(value))}: {value!r:.80}"
+                f'graph input "{self._worker.port_name}" expects {describe(self._hint)}, got {describe_value(value)}'
             )
 
     def _check_not_ended(self) -> None:

@@ -24,7 +24,7 @@ from hfg.errors import EndOfStream, UsageError
 from hfg.ports.edges import AnyEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringKind, FiringOutcome, FiringStarted, TokenTaken
-from hfg.types import accepts, describe
+from hfg.types import accepts, describe, describe_value
 
 __all__ = [
     "arguments_of",
@@ -417,8 +417,7 @@ def _check_values(worker: Worker, written: list[Any] | None) -> None:
             continue
         if not accepts(entry[0], spec.type):
             raise TypeError(
-                f'output "{worker.path}.{name}" is declared {describe(spec.type)}, got '
-                f"{describe(type(entry[0]))}: {entry[0]!r:.80}"
+                f'output "{worker.path}.{name}" is declared {describe(spec.type)}, got {describe_value(entry[0])}'
             )
         sharing.need_unwritten(worker, name, entry[0])
 

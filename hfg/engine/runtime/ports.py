@@ -19,7 +19,7 @@ from hfg.engine.runtime import plan, relays
 from hfg.ports.automatic import is_automatic_event
 from hfg.ports.events import EventPort
 from hfg.token import Token
-from hfg.types import accepts, describe
+from hfg.types import accepts, describe, describe_value
 
 __all__ = ["bind", "bind_automatic", "bind_event", "bind_start", "release_ports"]
 
@@ -89,9 +89,7 @@ def _checked(
     def checked(value: Any, activity: int | None, stamp: float | None) -> Any:
         plain = value.value if type(value) is Token else value
         if plain is not None and not accepts(plain, port.type):
-            raise TypeError(
-                f'event "{port.path}" is declared {describe(port.type)}, got {describe(type(plain))}: {plain!r:.80}'
-            )
+            raise TypeError(f'event "{port.path}" is declared {describe(port.type)}, got {describe_value(plain)}')
         if host.on_loop():  # from a thread values are looked at when they are on their edges
             need_unwritten(worker, port.name, value)
         return emit(value, activity, stamp)

@@ -1,0 +1,137 @@
+"""Types of images: how many channels they have and what a pixel holds, checked where edges are drawn and on values.
+
+Images are arrays as OpenCV has them: height x width, or height x width x channels, colours in the order blue, green,
+red. A wrong kind of pixel is more than untidy: some functions of OpenCV end the whole process for it. So nodes that
+work on images name the kind that they take. Stands on `types`; knows neither OpenCV nor nodes.
+
+Example:
+  >>> from hfg.types import why_not
+  >>> print(why_not(Depth, Gray))
+  an array of float32 is no array of uint8
+  >>> print(wrong_image(np.zeros((480, 640)), Gray))
+  expected Gray (an array of uint8, height x width), found an array of float64, 480 x 640
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from hfg.types import Named, Pixels, Shape, accepts, array_facts, describe, describe_value
+
+__all__ = [
+    "AnyImage",
+    "Color",
+    "ColorAlpha",
+    "Depth",
+    "DepthMillimetres",
+    "Disparity",
+    "FloatImage",
+    "FlowField",
+    "Gray",
+    "Image",
+    "Labels",
+    "Mask",
+    "Matrix",
+    "Points",
+    "Rows",
+    "describe_arrays",
+    "wrong_image",
+]
+
+
+class Rows(Shape):
+    """Metadata of a list of points: one row for each, or, as OpenCV gives them, one row of one column for each.
+
+    Example:
+      >>> Rows(2).accepts((7, 2)), Rows(2).accepts((7, 1, 2)), Rows(2).accepts((7, 3))
+      (True, True, False)
+    """
+
+    __slots__ = ()
+
+    def __init__(self, *numbers: int) -> None:
+        super().__init__(*numbers)
+
+    def shapes(self) -> tuple[tuple[int | None, ...], ...]:
+        """Give every allowed shape, `None` for an axis of any length."""
+        return tuple(shape for count in self.axes for shape in ((None, count), (None, 1, count)))
+
+
+AnyImage: TypeAlias = Annotated[npt.NDArray[Any], Pixels(), Named("AnyImage")]
+"""An image of any kind of pixel, with 1 to 4 channels."""
+
+Image: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(), Named("Image")]
+"""An image of 8 bits, 0 to 255, with 1 to 4 channels: what cameras and files give."""
+
+Gray: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(1), Named("Gray")]
+"""An image of 8 bits and one channel."""
+
+Color: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(3), Named("Color")]
+"""An image of 8 bits and three channels: blue, green, red, unless its maker says otherwise."""
+
+ColorAlpha: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(4), Named("ColorAlpha")]
+"""An image of 8 bits and four channels: blue, green, red and how opaque it is."""
+
+Mask: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(1), Named("Mask")]
+"""Which pixels count: 0 is out, anything else is in, and 255 what is written for it. Any `Gray` image will do."""
+
+FloatImage: TypeAlias = Annotated[npt.NDArray[np.float32], Pixels(), Named("FloatImage")]
+"""An image of real numbers with 1 to 4 channels; where a range is meant it is 0 to 1."""
+
+Depth: TypeAlias = Annotated[npt.NDArray[np.float32], Pixels(1), Named("Depth")]
+"""How far away each pixel is, in metres; 0 or NaN where nobody knows."""
+
+DepthMillimetres: TypeAlias = Annotated[npt.NDArray[np.uint16], Pixels(1), Named("DepthMillimetres")]
+"""How far away each pixel is, in millimetres, as depth cameras give it; 0 where nobody knows."""
+
+Disparity: TypeAlias = Annotated[npt.NDArray[np.int16], Pixels(1), Named("Disparity")]
+"""How far each pixel moves from the left picture to the right one, in sixteenths of a pixel, as OpenCV gives it."""
+
+Labels: TypeAlias = Annotated[npt.NDArray[np.int32], Pixels(1), Named("Labels")]
+"""The number of the region that each pixel belongs to."""
+
+FlowField: TypeAlias = Annotated[npt.NDArray[np.float32], Pixels(2), Named("FlowField")]
+"""How far each pixel moves, in pixels: to the right, and down."""
+
+Points: TypeAlias = Annotated[npt.NDArray[np.int32 | np.float32], Rows(2), Named("Points")]
+"""Points of the plane, x and y in pixels: a contour, corners, a polygon."""
+
+Matrix: TypeAlias = Annotated[npt.NDArray[np.float32 | np.float64], Shape(None, None), Named("Matrix")]
+"""A matrix of real numbers."""
+
+_LETTERS: Final = {2: "height x width", 3: "height x width x {}"}
+
+
+def wrong_image(value: Any, hint: Any) -> str | None:
+    """Say what an array type expects and what was found instead, or None if the value fits."""
+    if accepts(value, hint):
+        return None
+    return f"expected {describe(hint)} ({describe_arrays(hint)}), found {describe_value(value)}"
+
+
+def describe_arrays(hint: Any) -> str:
+    """Say which arrays are of a type: dtypes and shapes in words.
+
+    Example:
+      >>> print(describe_arrays(Points))
+      an array of int32 or float32, any x 2, any x 1 x 2
+    """
+    facts = array_facts(hint)
+    if facts is None:
+        return describe(hint)
+    dtypes = " or ".join(np.dtype(one).name for one in facts.dtypes) if len(facts.dtypes) < 9 else "numbers"
+    return ", ".join(filter(None, [f"an array of {dtypes}", _shapes_in_words(hint, facts.shapes)]))
+
+
+def _shapes_in_words(hint: Any, shapes: tuple[tuple[int | None, ...], ...]) -> str:
+    if any(isinstance(item, Pixels) for item in getattr(hint, "__metadata__", ())):
+        counts = sorted({shape[2] for shape in shapes if len(shape) == 3 and shape[2] is not None})
+        if counts == [1]:
+            return _LETTERS[2]
+        channels = f"{counts[0]} to {counts[-1]}" if len(counts) > 2 else " or ".join(map(str, counts))
+        long = _LETTERS[3].format(channels)
+        return f"{_LETTERS[2]}, or {long}" if 1 in counts else long
+    return ", ".join(" x ".join("any" if axis is None else str(axis) for axis in shape) for shape in shapes)
