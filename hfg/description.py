@@ -156,11 +156,25 @@ class NodeType:
     def _places(self) -> list[tuple[str, str]]:
         """Where it may be.
 
-        Under its own name, else under the name that its module gave it (`smooth = hfg.node(cv2.medianBlur)`).
+        Under its own name in a package around its module that lists it in `__all__`, so that a module which became too
+        long can be parted and files still find its types; else in its module; else under the name that its module gave
+        it (`smooth = hfg.node(cv2.medianBlur)`).
         """
-        places = [(self.module, self.qualname)]
+        around = [package for package in _packages_around(self.module) if self.qualname in _listed_by(package)]
+        places = [(place, self.qualname) for place in (*around, self.module)]
         names = vars(sys.modules.get(self.module, object)).items()
         return places + [(self.module, name) for name, value in list(names) if value is self.origin]
+
+
+def _packages_around(module: str) -> list[str]:
+    """Give the packages in which a module lies, the outermost first."""
+    parts = module.split(".")
+    return [".".join(parts[:count]) for count in range(1, len(parts))]
+
+
+def _listed_by(package: str) -> Any:
+    listed = vars(sys.modules.get(package, object)).get("__all__", ())
+    return listed if isinstance(listed, list | tuple) else ()
 
 
 def look_up(module: str, qualname: str) -> Any:

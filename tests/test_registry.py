@@ -38,6 +38,27 @@ def test_a_module_is_imported_when_a_type_of_it_is_asked_for(tmp_path: Path, mon
     del sys.modules["robot_parts"]
 
 
+def test_a_type_has_the_name_of_the_package_that_lists_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So a module can be parted, and files written before still find its types."""
+    package = tmp_path / "robot_family"
+    package.mkdir()
+    (package / "__init__.py").write_text(
+        "from robot_family.arms import Arm, Leg, raised\n__all__ = ['Arm', 'raised']\n"
+    )
+    (package / "arms.py").write_text(
+        "import hfg\nclass Arm(hfg.Node):\n    moved = hfg.Event()\nclass Leg(hfg.Node):\n    moved = hfg.Event()\n"
+        "@hfg.node\ndef raised(by: int) -> int:\n    return by + 1\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    for name, where in (("Arm", "robot_family"), ("raised", "robot_family"), ("Leg", "robot_family.arms")):
+        kind = registry.find(f"robot_family.arms:{name}")
+        assert registry.reference_of(kind) == f"{where}:{name}"
+        assert registry.find(f"{where}:{name}") is kind
+    sys.modules["robot_family"].Arm = object  # type: ignore[attr-defined]
+    assert registry.reference_of(registry.find("robot_family.arms:Arm")) == "robot_family.arms:Arm"
+    del sys.modules["robot_family"], sys.modules["robot_family.arms"]
+
+
 @pytest.mark.parametrize(
     ("reference", "message"),
     [
