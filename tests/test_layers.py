@@ -55,7 +55,12 @@ FLOORS = {
 }
 FIRST_FLOOR_THAT_WAITS = 5
 SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and what a node type is
-SAME_FLOOR_PAIRS = {("hfg.cli", "hfg.studio"), ("hfg.__main__", "hfg.cli"), ("hfg.testing", "hfg")}
+SAME_FLOOR_PAIRS = {
+    ("hfg.cli", "hfg.studio"),
+    ("hfg.__main__", "hfg.cli"),
+    ("hfg.testing", "hfg"),
+    ("hfg.files", "hfg.catalogue"),  # which packages a graph file may name
+}
 # The wings of a floor, in the same way: a module imports what lies in its own wing or in a lower one.
 WINGS = {
     "hfg.graph": {
@@ -236,7 +241,7 @@ def test_the_oracle_shares_no_code_with_the_accused(module: str) -> None:
 
 
 def test_the_table_names_only_what_exists_or_is_planned() -> None:
-    planned = {"hfg.transport", "hfg.files", "hfg.recording", "hfg.catalogue", "hfg.studio"}
+    planned = {"hfg.transport", "hfg.files", "hfg.recording", "hfg.studio"}
     missing = {name for name in (*FLOORS, *WINGS["hfg.graph"], *WINGS["hfg.engine"]) if name not in HFG} - planned
     assert not missing, f"FLOORS names modules that are gone: {sorted(missing)}"
 

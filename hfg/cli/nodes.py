@@ -1,136 +1,226 @@
-"""`hfg nodes [MODULE]`: lists node types, with what goes in and out.
+"""`hfg nodes [WHAT]`: shows the catalogue of node types: a list by category, or a page for one type.
 
-Stands on the node types' floor, `target` and `show`.
+Stands on the catalogue, `target` and `show`; what there is and what it is, the catalogue knows.
 """
 
 from __future__ import annotations
 
-import inspect
+import difflib
+import shutil
 import sys
-from collections.abc import Iterable, Iterator
-from importlib.metadata import entry_points
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
-from types import ModuleType
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+from hfg import catalogue
+from hfg.catalogue import Catalogue, ParameterDescription, TypeDescription
 from hfg.cli import show
-from hfg.cli.target import load_module
+from hfg.cli.target import import_from_here, load_module
 from hfg.errors import TargetError
-from hfg.functions import FunctionNode, NodeFunction
-from hfg.graph import Subgraph
-from hfg.nodetype import Node, NodeType
-from hfg.types import describe
 
 __all__ = ["nodes"]
 
-_BASES = (Node, Subgraph, FunctionNode)
 _LIBRARY = "hfg.nodes"
+_WIDEST_NAME = 30
+_NARROWEST = 40
+_WIDEST = 120  # longer lines are hard to read
 
 
 def nodes(
-    module: Annotated[str | None, typer.Argument(help="module or file.py; without it, all that is installed")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Write the node types as JSON.")] = False,
+    what: Annotated[
+        str | None,
+        typer.Argument(help="a module, a file.py, a family of the library, or one node type; without it, all there is"),
+    ] = None,
+    search: Annotated[
+        str | None, typer.Option("--search", "-s", help="Only those that speak of all these words, nearest first.")
+    ] = None,
+    category: Annotated[str | None, typer.Option("--category", "-c", help="Only those of this category.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write all that is known of them as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
-    """List the node types of a module, or of the standard library and what other packages have installed."""
+    """List node types, of a module or of all that is installed; of one type show its ports, parameters and text."""
     show.set_debug(debug)
-    found = [kind for loaded in _modules(module) for kind in _node_types(loaded)]
+    found, is_one = _meant(what)
+    for problem in found.problems:
+        show.sentence(problem)
+    types = list(found.types)
+    if category is not None:
+        types = _of_category(types, category)
+    if search is not None:
+        types = catalogue.search(types, search)
     if json:
-        show.json([_described(kind) for kind in found])
-    elif found:
-        rows = [
-            (
-                _named(kind),
-                _ports(kind.inputs, kind.slots),
-                _ports(kind.outputs, kind.events),
-                _ports(kind.parameters),
-                _summary(kind),
-            )
-            for kind in found
-        ]
-        show.table("", ("node type", "inputs, slots()", "outputs, events()", "parameters", "what it does"), rows)
-    elif module is None:
+        show.json(types)
+    elif is_one and types:
+        sys.stdout.write("\n\n".join("\n".join(_page(one)) for one in types) + "\n")
+    elif types:
+        sys.stdout.write("\n".join(_list(types, by_category=search is None)) + "\n")
+    elif search is not None:
+        sys.stdout.write(f'no node type speaks of "{search}"\n')
+    elif what is None:
         sys.stdout.write("no node types are installed; name a module or a file: hfg nodes robot.py\n")
     else:
-        sys.stdout.write(f"no node types in {module}\n")
+        sys.stdout.write(f"no node types in {what}\n")
     return 0
 
 
-def _modules(named: str | None) -> Iterator[ModuleType]:
-    """What is named, else all that is installed; what fails of that is told and left out."""
-    if named is not None:
-        yield load_module(named)
+# --- what is meant ---
+
+
+def _meant(what: str | None) -> tuple[Catalogue, bool]:
+    """Give the types that are meant, and whether somebody asks for a type of that name."""
+    if what is None:
+        return catalogue.installed(), False
+    place, colon, name = what.rpartition(":")
+    if colon and not ("/" in name or "\\" in name):
+        return _only_named(_in(place), what, name), True
+    import_from_here()
+    if what.endswith(".py") or "/" in what or "\\" in what or _is_family(what) or _is_module(what):
+        return _in(what), False
+    found = catalogue.installed()
+    try:
+        return _only_named(found, what, what), True
+    except TargetError:
+        if _is_module(what, also_pythons=True):
+            return _in(what), False
+        raise
+
+
+def _in(place: str) -> Catalogue:
+    return catalogue.types_of(load_module(f"{_LIBRARY}.{place}" if _is_family(place) else place))
+
+
+def _is_family(name: str) -> bool:
+    return name.isidentifier() and not name.startswith("_") and find_spec(f"{_LIBRARY}.{name}") is not None
+
+
+def _is_module(name: str, *, also_pythons: bool = False) -> bool:
+    """Whether a module of this name can be imported; one of Python's own is not what is meant at first."""
+    if not also_pythons and name.partition(".")[0] in sys.stdlib_module_names:
+        return False
+    try:
+        return find_spec(name) is not None
+    except (ImportError, ValueError):  # no such package around it, or no name of a module at all
+        return False
+
+
+def _only_named(found: Catalogue, what: str, name: str) -> Catalogue:
+    """Keep the types of that name.
+
+    Raises:
+      TargetError: there is none; it names the nearest.
+    """
+    types = catalogue.named(found.types, name)
+    if not types:
+        for problem in found.problems:
+            show.sentence(problem)
+        known = {spelling for one in found.types for spelling in (one.title, one.name)}
+        near = difflib.get_close_matches(name.rpartition(".")[2], sorted(known), n=3)
+        hint = f"; is {' or '.join(near)} meant?" if near else "; hfg nodes lists what there is"
+        raise TargetError(f'there is no module, family or node type "{what}" here or installed{hint}')
+    return Catalogue(tuple(types))
+
+
+def _of_category(types: Sequence[TypeDescription], category: str) -> list[TypeDescription]:
+    found = catalogue.categories(types)
+    wanted = next((name for name in found if name.lower() == category.lower()), None)
+    if wanted is None:
+        there_are = ", ".join(found) or "none"
+        raise TargetError(f'there is no category "{category}"; there are {there_are}')
+    return found[wanted]
+
+
+# --- a list ---
+
+
+def _width() -> int:
+    columns = shutil.get_terminal_size((_WIDEST, 24)).columns
+    return max(_NARROWEST, min(columns, _WIDEST) if sys.stdout.isatty() else _WIDEST)
+
+
+def _list(types: Iterable[TypeDescription], *, by_category: bool) -> Iterator[str]:
+    """Show a line for each type; what was searched for is in the order of how near it is."""
+    if not by_category:
+        yield from _rows([(one.reference, one.summary) for one in types], "")
         return
-    for place in _installed():
-        try:
-            yield load_module(place)
-        except TargetError as error:
-            show.sentence(str(error))
+    groups = catalogue.categories(types)
+    rows = {name: [(_title(name, one), one.summary) for one in group] for name, group in groups.items()}
+    for index, (name, group) in enumerate(rows.items()):
+        if index:
+            yield ""
+        yield f"{name} ({len(group)})"
+        yield from _rows(group, "  ")
 
 
-def _installed() -> Iterator[str]:
-    """The standard library, and modules that other distributions name in the entry-point group `hfg.nodes`."""
-    if find_spec(_LIBRARY) is not None:
-        yield _LIBRARY
-    for entry in sorted(entry_points(group=_LIBRARY), key=lambda entry: entry.name):
-        yield entry.module
+def _title(category: str, described: TypeDescription) -> str:
+    """Name a type in the list of its category; what is not of the library by its reference."""
+    in_family = described.module == f"{_LIBRARY}.{category}" or described.module.startswith(f"{_LIBRARY}.{category}.")
+    return described.title if in_family else described.reference
 
 
-def _node_types(module: ModuleType) -> Iterator[NodeType]:
-    """The types that a module, or a package and what lies in it, declares; each once, in order."""
-    seen: list[NodeType] = []
-    for name, value in vars(module).items():
-        is_type = isinstance(value, NodeFunction) or (
-            inspect.isclass(value) and issubclass(value, Node) and value not in _BASES
-        )
-        if name.startswith("_") or not is_type:
-            continue
-        kind: NodeType = value._type
-        if f"{kind.module}.".startswith(f"{module.__name__}.") and all(kind is not other for other in seen):
-            seen.append(kind)
-            yield kind
+def _rows(rows: Sequence[tuple[str, str]], indent: str) -> Iterator[str]:
+    width = _width()
+    names = min(max(len(name) for name, _ in rows), max(_WIDEST_NAME, width // 2))
+    for name, text in rows:
+        line = f"{indent}{name:{names}}  {text}".rstrip()
+        yield line if len(line) <= width else f"{line[: width - 3]}..."
 
 
-def _named(kind: NodeType) -> str:
-    return kind.reference or f"{kind.module}:{kind.qualname}"
+# --- a page ---
 
 
-def _summary(kind: NodeType) -> str:
-    return kind.doc.partition("\n")[0]
+def _page(described: TypeDescription) -> Iterator[str]:
+    width = _width()
+    kind = "subgraph" if described.subgraph else "source" if described.source else "node"
+    yield f"{described.reference}  ({kind}, {described.category})"
+    yield from textwrap.wrap(described.summary, width)
+    for paragraph in described.text.split("\n\n"):
+        if paragraph.strip():
+            yield ""
+            yield from _paragraph(paragraph, width)
+    kinds: dict[str, list[tuple[str, str]]] = {}
+    for what, port in described.ports():
+        name = f"{port.name}[...]" if port.vector else port.name
+        typed = f"{name}: {port.type}" if port.type else name
+        if port.optional:
+            typed += f" = {port.default!r}" if port.default is not None else " (optional)"
+        kinds.setdefault(f"{what}s", []).append((typed, port.doc))
+    if described.parameters:
+        kinds["parameters"] = [(_typed(one), _said(one)) for one in described.parameters]
+    if described.errors:
+        kinds["errors"] = [(error.name, error.when) for error in described.errors]
+    for what, entries in kinds.items():
+        yield ""
+        yield what
+        yield from _entries(entries, width)
+    if described.apex:
+        yield ""
+        yield f"CS::APEX: {', '.join(described.apex)}"
 
 
-def _ports(*groups: Iterable[str]) -> str:
-    synchronous, *asynchronous = groups
-    return ", ".join([*synchronous, *(f"{name}()" for group in asynchronous for name in group)])
+def _paragraph(paragraph: str, width: int) -> Iterator[str]:
+    """Fold a paragraph; one with indented lines, such as a list or code, is left as it stands."""
+    lines = paragraph.splitlines()
+    if any(line.startswith((" ", "-", "*", ">>>")) for line in lines):
+        yield from lines
+    else:
+        yield from textwrap.wrap(" ".join(lines), width)
 
 
-def _described(kind: NodeType) -> dict[str, Any]:
-    """What a program may want to know of a type; types as text."""
-    return {
-        "reference": _named(kind),
-        "name": kind.name,
-        "doc": kind.doc,
-        "source": kind.is_source,
-        "subgraph": kind.is_subgraph,
-        "inputs": [
-            {"name": one.name, "type": describe(one.type), "optional": one.optional} for one in kind.inputs.values()
-        ],
-        "outputs": [{"name": one.name, "type": describe(one.type)} for one in kind.outputs.values()],
-        "events": [{"name": one.name, "type": describe(one.type)} for one in kind.events.values()],
-        "slots": [
-            {"name": one.name, "type": describe(one.type), "while_active": one.while_active}
-            for one in kind.slots.values()
-        ],
-        "parameters": [
-            {
-                "name": one.name,
-                "type": describe(one.type),
-                "default": one.default,
-                "unit": one.unit,
-                "limits": [repr(limit) for limit in one.limits],
-            }
-            for one in kind.parameters.values()
-        ],
-    }
+def _typed(parameter: ParameterDescription) -> str:
+    if parameter.trigger:
+        return f"{parameter.name} (trigger)"
+    return f"{parameter.name}: {parameter.type}" + ("" if parameter.required else f" = {parameter.default!r}")
+
+
+def _said(parameter: ParameterDescription) -> str:
+    facts = [*parameter.limits_in_words(), *([f"in {parameter.unit}"] if parameter.unit else [])]
+    return " ".join(filter(None, [parameter.doc, f"({', '.join(facts)})" if facts else ""]))
+
+
+def _entries(entries: Iterable[tuple[str, str]], width: int) -> Iterator[str]:
+    for name, text in entries:
+        yield f"  {name}"
+        yield from textwrap.wrap(text, width, initial_indent="      ", subsequent_indent="      ")

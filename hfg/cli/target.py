@@ -21,7 +21,7 @@ from hfg.functions import NodeFunction
 from hfg.graph import Graph
 from hfg.nodetype import Node
 
-__all__ = ["load_graph", "load_module"]
+__all__ = ["import_from_here", "load_graph", "load_module"]
 
 
 def load_graph(target: str, given: Sequence[str] = ()) -> Graph:
@@ -75,7 +75,7 @@ def load_module(place: str) -> ModuleType:
         raise TargetError(f"{place} is no Python file: name one that ends in .py, or a module that builds the graph")
     if place.startswith("."):
         raise TargetError(f'"{place}" is no module; name one from here on, as in package.module, or a file')
-    _import_from(Path.cwd())
+    import_from_here()
     try:
         return importlib.import_module(place)
     except ModuleNotFoundError as error:
@@ -122,6 +122,11 @@ def _load_file(file: Path) -> ModuleType:
             raise
         raise TargetError(f"{file.name} failed: {in_words(error)}") from error
     return module
+
+
+def import_from_here() -> None:
+    """Let what lies in the working directory be imported."""
+    _import_from(Path.cwd())
 
 
 def _import_from(folder: Path) -> None:

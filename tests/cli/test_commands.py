@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from hfg.cli import main, nodes
-from tests.cli.conftest import Command, Shown
+from hfg.cli import main
+from tests.cli.conftest import Command
 
 GRAPH = '''
 """A graph for tests of the command line."""
@@ -361,33 +361,6 @@ def test_a_reader_that_has_gone_ends_the_command_quietly(hfg: Command) -> None:
         process.stdout.close()
         assert process.stderr.read() == ""
     assert process.returncode == 1
-
-
-def test_nodes_of_a_file(hfg: Command) -> None:
-    shown = hfg("nodes", "halves.py")
-    assert shown.code == 0
-    assert "halves:numbers" in shown.out
-    kinds = {kind["name"]: kind for kind in json.loads(hfg("nodes", "halves.py", "--json").out)}
-    assert kinds["numbers"]["source"]
-    assert [port["name"] for port in kinds["half"]["inputs"]] == ["number"]
-    assert kinds["half"]["parameters"][0]["default"] == 2
-
-
-def test_nodes_without_a_module_say_what_is_installed_or_what_to_write(
-    hfg: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(nodes, "_installed", lambda: iter(()))
-    assert hfg("nodes") == Shown(0, "no node types are installed; name a module or a file: hfg nodes robot.py\n", "")
-    monkeypatch.setattr(nodes, "_installed", lambda: iter(("nowhere", "halves")))
-    shown = hfg("nodes")
-    assert shown.code == 0
-    assert "halves:numbers" in shown.out
-    assert shown.err == 'hfg: there is no module "nowhere" here or installed\n'
-
-
-def test_nodes_of_a_module_without_any_say_so(hfg: Command) -> None:
-    Path("empty.py").write_text("", encoding="utf-8")
-    assert hfg("nodes", "empty.py") == Shown(0, "no node types in empty.py\n", "")
 
 
 @pytest.mark.parametrize("arguments", [("--help",), ("run", "--help"), ("check", "--help"), ("nodes", "--help"), ()])

@@ -1,0 +1,286 @@
+"""A node type in words and plain data: what a list, a page, an editor or another program wants to know of it.
+
+Stands on node types and `documentation`.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+
+import annotated_types
+import msgspec
+
+from hfg.catalogue.documentation import Documentation, read_documentation
+from hfg.description import NodeType
+from hfg.functions import NodeFunction
+from hfg.nodetype import Node
+from hfg.ports.parameters import REQUIRED, ParameterSpec
+from hfg.types import describe
+
+__all__ = [
+    "ErrorDescription",
+    "ParameterDescription",
+    "PortDescription",
+    "TypeDescription",
+    "describe_type",
+    "undocumented",
+]
+
+
+_LIMITS: Final = {
+    "gt": "> {}",
+    "ge": ">= {}",
+    "lt": "< {}",
+    "le": "<= {}",
+    "multiple_of": "a multiple of {}",
+    "min_length": "at least {} items",
+    "max_length": "at most {} items",
+    "predicate": "{}",
+}
+
+
+class PortDescription(msgspec.Struct, frozen=True):
+    """A port of a node type.
+
+    Attributes:
+      type: its type hint as text; "" for an event or a slot without a value.
+      doc: what it means, with its unit and range.
+      optional: the node fires without it.
+      default: what it is then.
+      while_active: a slot that listens only while its node is active.
+      vector: it stands for several ports of this kind, "values[0]", "values[1]" ...; the parameter of its name says how
+        many.
+    """
+
+    name: str
+    type: str
+    doc: str
+    optional: bool = False
+    default: Any = None
+    while_active: bool = False
+    vector: bool = False
+
+
+class ParameterDescription(msgspec.Struct, frozen=True):
+    """A parameter of a node type.
+
+    Attributes:
+      required: it has no default, so it is given when a node is made.
+      limits: by name: "gt", "ge", "lt", "le", "multiple_of", "min_length", "max_length", "predicate".
+      choices: the only allowed values, or None.
+      trigger: no value, but a slot and an event.
+      size: how many ports a vector of this name has.
+    """
+
+    name: str
+    type: str
+    doc: str
+    default: Any = None
+    required: bool = False
+    limits: dict[str, Any] = {}  # a struct copies it for each
+    choices: tuple[Any, ...] | None = None
+    unit: str | None = None
+    trigger: bool = False
+    size: bool = False
+
+    def limits_in_words(self) -> list[str]:
+        """Say what its values must be: ">= 0", "one of 3, 5, 7"."""
+        said = [_LIMITS[name].format(limit) for name, limit in self.limits.items()]
+        if self.choices is not None:
+            said.append(f"one of {', '.join(map(repr, self.choices))}")
+        return said
+
+
+class ErrorDescription(msgspec.Struct, frozen=True):
+    """What a firing may raise as part of its contract."""
+
+    name: str
+    when: str
+
+
+class TypeDescription(msgspec.Struct, frozen=True):
+    """A node type.
+
+    Attributes:
+      reference: "module:name", as graph files have it.
+      name: in snake case, the default name of its nodes.
+      title: the name by which it is used in code.
+      category: its family in the standard library; else what its docstring or its module says, or the package.
+      summary: one line.
+      text: how it behaves, in whole.
+      doc: the docstring as it stands.
+      source: it fires without inputs.
+      subgraph: it is made of other nodes.
+      errors: what a firing may raise as part of its contract.
+      apex: names of the CS::APEX nodes that it stands for.
+    """
+
+    reference: str
+    name: str
+    title: str
+    module: str
+    category: str
+    summary: str
+    text: str
+    doc: str
+    source: bool = False
+    subgraph: bool = False
+    inputs: tuple[PortDescription, ...] = ()
+    outputs: tuple[PortDescription, ...] = ()
+    events: tuple[PortDescription, ...] = ()
+    slots: tuple[PortDescription, ...] = ()
+    parameters: tuple[ParameterDescription, ...] = ()
+    errors: tuple[ErrorDescription, ...] = ()
+    apex: tuple[str, ...] = ()
+
+    def ports(self) -> Iterator[tuple[str, PortDescription]]:
+        """Give every port with its kind, in the order in which people read them."""
+        for kind, ports in (
+            ("input", self.inputs),
+            ("output", self.outputs),
+            ("event", self.events),
+            ("slot", self.slots),
+        ):
+            for port in ports:
+                yield kind, port
+
+
+def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any]) -> TypeDescription:
+    """Describe a node type.
+
+    Example:
+      >>> import hfg
+      >>> @hfg.node
+      ... def half(number: float) -> float:
+      ...     '''Halve a number.
+      ...
+      ...     Args:
+      ...       number: any.
+      ...       out: half of it.
+      ...     '''
+      ...     return number / 2
+      >>> described = describe_type(half)
+      >>> described.summary, described.inputs[0].type, described.outputs[0].doc
+      ('Halve a number.', 'float', 'half of it.')
+    """
+    kind = of if isinstance(of, NodeType) else of._type
+    read = read_documentation(kind.doc)
+    reference = kind.reference or f"{kind.module}:{kind.qualname}"
+    module, _, title = reference.partition(":")
+    return TypeDescription(
+        reference=reference,
+        name=kind.name,
+        title=title,
+        module=module,
+        category=read.category or _category(kind.module),
+        summary=read.summary,
+        text=read.text,
+        doc=kind.doc,
+        source=kind.is_source,
+        subgraph=kind.is_subgraph,
+        inputs=tuple(_ports(kind.inputs.values(), kind, read)),
+        outputs=tuple(_ports(kind.outputs.values(), kind, read)),
+        events=tuple(_ports(kind.events.values(), kind, read)),
+        slots=tuple(_ports(kind.slots.values(), kind, read)),
+        parameters=tuple(_parameter(spec, kind, read) for spec in kind.parameters.values()),
+        errors=tuple(ErrorDescription(name, when) for name, when in read.errors),
+        apex=read.apex,
+    )
+
+
+def undocumented(described: TypeDescription) -> list[str]:
+    """Say what the docstring of a type leaves out: its first line, a port, a parameter; nothing is fine."""
+    where = described.reference
+    found = [] if described.summary else [f"{where} has no docstring: say in one line what it does"]
+    if described.summary and not described.summary.endswith((".", "!", "?")):
+        found.append(f'{where}: the first line of its docstring, "{described.summary}", is no whole sentence')
+    places = [(kind, port.name, port.doc) for kind, port in described.ports()]
+    places += [("parameter", one.name, one.doc) for one in described.parameters]
+    section = "Args" if described.title[:1].islower() else "Attributes"
+    found += [
+        f'{where}: nothing is said of its {kind} "{name}"; add an entry to {section}: in its docstring'
+        for kind, name, doc in places
+        if not doc
+    ]
+    return found
+
+
+def _category(module: str) -> str:
+    said = getattr(sys.modules.get(module), "__category__", None)
+    if isinstance(said, str) and said:
+        return said
+    parts = module.split(".")
+    return parts[2] if parts[:2] == ["hfg", "nodes"] and len(parts) > 2 else parts[0]
+
+
+def _ports(specs: Iterable[Any], kind: NodeType, read: Documentation) -> Iterator[PortDescription]:
+    seen: set[str] = set()
+    for spec in specs:
+        name, bracket, _ = spec.name.partition("[")
+        if name in seen:
+            continue
+        seen.add(name)
+        optional = getattr(spec, "optional", False)
+        carries = spec.type is not None and (kind.is_subgraph or getattr(spec, "takes_value", True))
+        yield PortDescription(
+            name,
+            describe(spec.type) if carries else "",
+            _said_of_port(name, kind, read),
+            optional,
+            spec.default if optional else None,
+            getattr(spec, "while_active", False),
+            bool(bracket),
+        )
+
+
+def _said_of_port(name: str, kind: NodeType, read: Documentation) -> str:
+    """Take what the docstring has; of the only output what it returns, of a slot the first line of its handler."""
+    said = read.entries.get(name)
+    if not said and name in kind.outputs and len(kind.outputs) == 1:
+        # of a function the first line says what it gives
+        said = read.result or (read.summary if kind.is_function and name == "out" else "")
+    if not said and name in kind.slots:
+        handler = getattr(kind.declared.get(name), "handler", None)
+        said = (inspect.getdoc(handler) or "").partition("\n")[0]
+    return said or ""
+
+
+def _parameter(spec: ParameterSpec, kind: NodeType, read: Documentation) -> ParameterDescription:
+    required = spec.default is REQUIRED
+    return ParameterDescription(
+        name=spec.name,
+        type="" if spec.trigger else describe(spec.type),
+        doc=read.entries.get(spec.name, ""),
+        default=None if required or spec.trigger else spec.default,
+        required=required,
+        limits=dict(_limit(limit) for limit in spec.limits),
+        choices=spec.choices,
+        unit=spec.unit,
+        trigger=spec.trigger,
+        size=spec.size,
+    )
+
+
+def _limit(limit: Any) -> tuple[str, Any]:
+    """Name a constraint of annotated-types and give its bound."""
+    match limit:
+        case annotated_types.Gt(bound):
+            return "gt", bound
+        case annotated_types.Ge(bound):
+            return "ge", bound
+        case annotated_types.Lt(bound):
+            return "lt", bound
+        case annotated_types.Le(bound):
+            return "le", bound
+        case annotated_types.MultipleOf(bound):
+            return "multiple_of", bound
+        case annotated_types.MinLen(bound):
+            return "min_length", bound
+        case annotated_types.MaxLen(bound):
+            return "max_length", bound
+        case annotated_types.Predicate(function):
+            return "predicate", getattr(function, "__name__", str(function)).replace("_", " ").strip()
+    return "predicate", str(limit)

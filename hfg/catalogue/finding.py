@@ -1,0 +1,180 @@
+"""Imports the places and lists the node types in them; what is broken is told in a sentence and stops nobody.
+
+A module offers the node types that it declares under public names. One that makes its types when they are asked for, or
+wants to offer others than those, has a function `__node_types__()` that gives them. Packages are walked; modules whose
+names begin with an underscore, and tests, are not. Stands on `offers` and `describing`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+from hfg.catalogue.describing import TypeDescription, describe_type
+from hfg.catalogue.offers import Offer, offers
+from hfg.description import NodeType
+from hfg.errors import in_words
+from hfg.functions import FunctionNode, NodeFunction
+from hfg.graph import Subgraph
+from hfg.nodetype import Node
+
+__all__ = ["Catalogue", "installed", "types_of"]
+
+_BASES: Final = (Node, Subgraph, FunctionNode)
+_TESTS: Final = ("test", "tests", "conftest")
+
+
+@dataclass(frozen=True, slots=True)
+class Catalogue:
+    """Node types that were found.
+
+    Attributes:
+      types: each once, in the order of their places.
+      problems: a sentence for each place that is broken.
+    """
+
+    types: tuple[TypeDescription, ...] = ()
+    problems: tuple[str, ...] = ()
+
+
+def installed(of: Iterable[Offer] | None = None) -> Catalogue:
+    """List what the standard library and all installed distributions offer; this imports them.
+
+    Args:
+      of: other places than those.
+    """
+    search = _Search()
+    for offer in offers() if of is None else of:
+        search.offer(offer)
+    return search.catalogue()
+
+
+def types_of(module: ModuleType | str) -> Catalogue:
+    """List the node types of a module, or of a package and the modules in it.
+
+    Args:
+      module: if it is a name, it is imported; if that fails the catalogue is empty and says why.
+    """
+    search = _Search()
+    if isinstance(module, str):
+        search.offer(Offer(module))
+    else:
+        search.module(module)
+    return search.catalogue()
+
+
+class _Search:
+    """Goes from offer to offer; a type that several offer is listed where it is found first."""
+
+    def __init__(self) -> None:
+        self.found: list[TypeDescription] = []
+        self.problems: list[str] = []
+        self._seen: set[int] = set()
+
+    def catalogue(self) -> Catalogue:
+        return Catalogue(tuple(self.found), tuple(self.problems))
+
+    def offer(self, offer: Offer) -> None:
+        module = self._attempt(offer.module, offer.origin, lambda: importlib.import_module(offer.module))
+        if module is None:
+            return
+        if not offer.name:
+            self.module(module)
+            return
+        value: Any = module
+        for part in offer.name.split("."):
+            value = getattr(value, part, None)
+        kind = _type_in(value)
+        if kind is not None:
+            self._add([kind])
+        elif isinstance(value, ModuleType):
+            self.module(value)
+        else:
+            said = "has no such name" if value is None else "is no node type and no module"
+            self.problems.append(f"{offer.origin} names {offer.module}:{offer.name}, which {said}: mend its value")
+
+    def module(self, module: ModuleType) -> None:
+        """List the types of a module, then those of the modules in it."""
+        offered = getattr(module, "__node_types__", None)
+        kinds = self._attempt(module.__name__, "", lambda: list(_offered(offered) if offered else _declared(module)))
+        self._add(kinds or [])
+        for name in _submodules(module):
+            inner = self._attempt(name, "", lambda name=name: importlib.import_module(name))  # type: ignore[misc]
+            if inner is not None:
+                self.module(inner)
+
+    def _add(self, kinds: Iterable[NodeType]) -> None:
+        for kind in kinds:
+            if id(kind.origin) not in self._seen:
+                self._seen.add(id(kind.origin))
+                self.found.append(describe_type(kind))
+
+    def _attempt(self, name: str, origin: str, action: Callable[[], Any]) -> Any:
+        """Run code of somebody's; None and a sentence if it fails, whatever it raises."""
+        try:
+            return action()
+        except Exception as error:
+            self.problems.append(_sentence(name, origin, error))
+        except SystemExit:
+            told = f"{name}{_by(origin)} left the program as it was imported"
+            self.problems.append(f'{told}; put what it runs under if __name__ == "__main__":')
+        return None
+
+
+def _sentence(name: str, origin: str, error: Exception) -> str:
+    if isinstance(error, ModuleNotFoundError) and error.name is not None:
+        if f"{name}.".startswith(f"{error.name}."):
+            return f'there is no module "{name}"{_by(origin).rstrip(",")}: is it installed, and spelled like that?'
+        return f'{name}{_by(origin)} needs the module "{error.name}", which is not installed'
+    where = next(
+        (f" ({Path(one.filename).name}:{one.lineno})" for one in reversed(traceback.extract_tb(error.__traceback__))),
+        "",
+    )
+    return f"{name}{_by(origin)} cannot be imported: {' '.join(in_words(error).split())}{where}"
+
+
+def _by(origin: str) -> str:
+    return f", which {origin} names," if origin else ""
+
+
+def _offered(offered: Callable[[], Iterable[Any]]) -> Iterator[NodeType]:
+    for value in offered():
+        kind = _type_in(value)
+        if kind is None:
+            raise TypeError(f"__node_types__() gives {value!r:.80}, which is no node type")
+        yield kind
+
+
+def _declared(module: ModuleType) -> Iterator[NodeType]:
+    """Give the types that a module, or a package and what lies in it, declares, in order."""
+    for name, value in list(vars(module).items()):
+        kind = None if name.startswith("_") else _type_in(value)
+        if kind is not None and f"{kind.module}.".startswith(f"{module.__name__}."):
+            yield kind
+
+
+def _type_in(value: Any) -> NodeType | None:
+    """Give the type of a node function or a class of nodes; None for all else."""
+    if isinstance(value, NodeFunction) or (
+        inspect.isclass(value) and issubclass(value, Node) and value not in _BASES and not inspect.isabstract(value)
+    ):
+        kind: NodeType = value._type
+        return kind
+    return None
+
+
+def _submodules(package: ModuleType) -> list[str]:
+    """Name the modules in a package, one level deep."""
+    path = getattr(package, "__path__", ())
+    return [
+        f"{package.__name__}.{one.name}"
+        for one in sorted(pkgutil.iter_modules(path), key=lambda one: one.name)
+        if not one.name.startswith(("_", "test_")) and one.name not in _TESTS
+    ]
