@@ -1,0 +1,380 @@
+"""Values that are set by hand, and change while the graph runs: as sources, and given out at a signal.
+
+Stands on nodetype and ports.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from annotated_types import Predicate
+
+from hfg.functions import node
+from hfg.nodetype import Node
+from hfg.ports import Event, Output, Parameter, State, slot
+from hfg.ports.events import EventPort
+from hfg.types import Shape
+
+__all__ = [
+    "BoolOnTrigger",
+    "ColourOnTrigger",
+    "ConstantBool",
+    "ConstantColour",
+    "ConstantFloat",
+    "ConstantInt",
+    "ConstantMatrix",
+    "ConstantText",
+    "ConstantVector",
+    "FloatOnTrigger",
+    "IntOnTrigger",
+    "MatrixOnTrigger",
+    "TextOnTrigger",
+    "VectorOnTrigger",
+    "replace_by",
+]
+
+Colour: TypeAlias = tuple[int, int, int]
+VectorArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None)]
+MatrixArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None, None)]
+Rows: TypeAlias = Sequence[Sequence[float]]
+
+
+def is_colour(value: Colour) -> bool:
+    """Say whether all parts are from 0 to 255."""
+    return all(0 <= part <= 255 for part in value)
+
+
+def has_floats(value: Any) -> bool:
+    """Say whether numpy can make an array of it: no rows of different length, no numbers that are too large."""
+    try:
+        np.asarray(value, dtype=np.float64)
+    except (ValueError, OverflowError):
+        return False
+    return True
+
+
+def as_array(values: Any, axes: int) -> Any:
+    """Make an array of numbers; an empty one has as many axes as others."""
+    array = np.asarray(values, dtype=np.float64)
+    return array if array.ndim == axes else array.reshape((0,) * axes)
+
+
+class _Constant(Node):
+    """Gives its value again and again; `told` is what `changed` told of last, in a list, since it may be anything."""
+
+    told = State(factory=list[Any])
+
+    def _give(self, value: Any, changed: EventPort[Any]) -> Any:
+        if self.told and self.told[0] is not value and self.told[0] != value:  # a NaN differs from itself
+            changed.trigger(self._made(value))
+        self.told = [value]
+        return self._made(value)
+
+    def _made(self, value: Any) -> Any:
+        return value
+
+
+class ConstantBool(_Constant):
+    """Give a truth value that is set by hand; a source without end.
+
+    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
+    that. A new value is given from the next firing on.
+
+    Attributes:
+      value: what is given.
+      out: the value.
+      changed: the new value, as it is given for the first time.
+    """
+
+    value = Parameter(False)
+    out = Output(bool)
+    changed = Event(bool)
+
+    def process(self) -> bool:
+        """Give the value."""
+        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+
+
+class ConstantInt(_Constant):
+    """Give a whole number that is set by hand; a source without end.
+
+    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
+    that. A new value is given from the next firing on.
+
+    Attributes:
+      value: what is given.
+      out: the value.
+      changed: the new value, as it is given for the first time.
+
+    CS::APEX: IntInput.
+    """
+
+    value = Parameter(0)
+    out = Output(int)
+    changed = Event(int)
+
+    def process(self) -> int:
+        """Give the value."""
+        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+
+
+class ConstantFloat(_Constant):
+    """Give a number that is set by hand; a source without end.
+
+    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
+    that. A new value is given from the next firing on.
+
+    Attributes:
+      value: what is given.
+      out: the value.
+      changed: the new value, as it is given for the first time.
+
+    CS::APEX: DoubleInput.
+    """
+
+    value = Parameter(0.0)
+    out = Output(float)
+    changed = Event(float)
+
+    def process(self) -> float:
+        """Give the value."""
+        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+
+
+class ConstantText(_Constant):
+    """Give a text that is set by hand; a source without end.
+
+    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
+    that. A new value is given from the next firing on.
+
+    Attributes:
+      value: what is given.
+      out: the value.
+      changed: the new value, as it is given for the first time.
+
+    CS::APEX: TextInput.
+    """
+
+    value = Parameter("")
+    out = Output(str)
+    changed = Event(str)
+
+    def process(self) -> str:
+        """Give the value."""
+        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+
+
+class ConstantVector(_Constant):
+    """Give a vector that is set by hand, as an array; a source without end.
+
+    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
+    that. A new value is given from the next firing on.
+
+    Attributes:
+      value: what is given, any number of numbers.
+      out: the value, an array of float64 with one axis.
+      changed: the new value, as it is given for the first time.
+
+    CS::APEX: VectorInput.
+    """
+
+    value = Parameter[Sequence[float]]((0.0, 0.0, 0.0), Predicate(has_floats), type=Sequence[float])
+    out = Output(VectorArray)
+    changed = Event(VectorArray)
+
+    def process(self) -> VectorArray:
+        """Give the value."""
+        return self._give(tuple(self.value), self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+
+    def _made(self, value: Any) -> VectorArray:
+        return as_array(value, 1)  # type: ignore[no-any-return]  # numpy says Any
+
+
+class ConstantMatrix(_Constant):
+    """Give a matrix that is set by hand, as an array; a source without end.
+
+    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
+    that. A new value is given from the next firing on.
+
+    Attributes:
+      value: what is given, row by row, all rows of one length.
+      out: the value, an array of float64, rows x columns.
+      changed: the new value, as it is given for the first time.
+
+    CS::APEX: MatrixInput.
+    """
+
+    value = Parameter[Rows](((1.0, 0.0), (0.0, 1.0)), Predicate(has_floats), type=Rows)
+    out = Output(MatrixArray)
+    changed = Event(MatrixArray)
+
+    def process(self) -> MatrixArray:
+        """Give the value."""
+        return self._give(tuple(map(tuple, self.value)), self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+
+    def _made(self, value: Any) -> MatrixArray:
+        return as_array(value, 2)  # type: ignore[no-any-return]  # numpy says Any
+
+
+class ConstantColour(_Constant):
+    """Give a colour that is set by hand; a source without end.
+
+    It gives it as often as its consumers and `max_rate_hz` allow. Joined with a stream it is a value for each token of
+    that. A new value is given from the next firing on.
+
+    Attributes:
+      value: what is given: red, green and blue, 0 to 255 each.
+      out: the value.
+      changed: the new value, as it is given for the first time.
+    """
+
+    value = Parameter((255, 255, 255), Predicate(is_colour), type=Colour)
+    out = Output(Colour)
+    changed = Event(Colour)
+
+    def process(self) -> Colour:
+        """Give the value."""
+        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+
+
+# --- given out at a signal ---
+
+
+class BoolOnTrigger(Node):
+    """Give a truth value at each signal.
+
+    Attributes:
+      value: what is given.
+      trigger: any token makes it given.
+      given: the value.
+    """
+
+    value = Parameter(False)
+    given = Event(bool)
+
+    @slot
+    def trigger(self) -> None:
+        """Give the value."""
+        self.given.trigger(self.value)
+
+
+class IntOnTrigger(Node):
+    """Give a whole number at each signal.
+
+    Attributes:
+      value: what is given.
+      trigger: any token makes it given.
+      given: the value.
+    """
+
+    value = Parameter(0)
+    given = Event(int)
+
+    @slot
+    def trigger(self) -> None:
+        """Give the value."""
+        self.given.trigger(self.value)
+
+
+class FloatOnTrigger(Node):
+    """Give a number at each signal.
+
+    Attributes:
+      value: what is given.
+      trigger: any token makes it given.
+      given: the value.
+    """
+
+    value = Parameter(0.0)
+    given = Event(float)
+
+    @slot
+    def trigger(self) -> None:
+        """Give the value."""
+        self.given.trigger(self.value)
+
+
+class TextOnTrigger(Node):
+    """Give a text at each signal.
+
+    Attributes:
+      value: what is given.
+      trigger: any token makes it given.
+      given: the value.
+    """
+
+    value = Parameter("")
+    given = Event(str)
+
+    @slot
+    def trigger(self) -> None:
+        """Give the value."""
+        self.given.trigger(self.value)
+
+
+class VectorOnTrigger(Node):
+    """Give a vector at each signal, as an array.
+
+    Attributes:
+      value: what is given, any number of numbers.
+      trigger: any token makes it given.
+      given: the value, an array of float64 with one axis.
+    """
+
+    value = Parameter[Sequence[float]]((0.0, 0.0, 0.0), Predicate(has_floats), type=Sequence[float])
+    given = Event(VectorArray)
+
+    @slot
+    def trigger(self) -> None:
+        """Give the value."""
+        self.given.trigger(as_array(self.value, 1))
+
+
+class MatrixOnTrigger(Node):
+    """Give a matrix at each signal, as an array.
+
+    Attributes:
+      value: what is given, row by row, all rows of one length.
+      trigger: any token makes it given.
+      given: the value, an array of float64, rows x columns.
+    """
+
+    value = Parameter[Rows](((1.0, 0.0), (0.0, 1.0)), Predicate(has_floats), type=Rows)
+    given = Event(MatrixArray)
+
+    @slot
+    def trigger(self) -> None:
+        """Give the value."""
+        self.given.trigger(as_array(self.value, 2))
+
+
+class ColourOnTrigger(Node):
+    """Give a colour at each signal.
+
+    Attributes:
+      value: what is given: red, green and blue, 0 to 255 each.
+      trigger: any token makes it given.
+      given: the value.
+    """
+
+    value = Parameter((255, 255, 255), Predicate(is_colour), type=Colour)
+    given = Event(Colour)
+
+    @slot
+    def trigger(self) -> None:
+        """Give the value."""
+        self.given.trigger(self.value)
+
+
+@node
+def replace_by(value: object, *, by: Any = 0) -> Any:
+    """Give the same value for each token, whatever came: a constant in step with a stream.
+
+    Args:
+      value: anything; silence stays silence.
+      by: what is given instead, of any type; None makes the stream silent.
+    """
+    return by
