@@ -1,0 +1,64 @@
+"""The ways that values take: passed on, chosen, kept, joined, collected, and brought from one rate to another.
+
+    passing     one in, one out: relay, the first ones, those that differ, a value as an event, the end as an event
+    routing     several ways: merge, mux, demux, switch, gate, split
+    joining     what belongs together: by step, by stamp, the newest of each; sample and hold
+    keeping     values that are kept and given again: latch, buffer, cache, a cell that nodes share
+    collecting  several values as one: counters, the last ones, windows
+
+All of them pass on values, never token objects (rule A4), so activity goes through them by active edges alone, as it
+does through any node. `docs/howto/library.md` shows how to choose, and which nodes of CS::APEX they stand for.
+"""
+
+from hfg.nodes.flow.collecting import Accumulate, Count, CountItems, Recent, TimeWindow, Window
+from hfg.nodes.flow.joining import CombineLatest, Join, JoinByStamp, SampleAndHold, Synchronizer
+from hfg.nodes.flow.keeping import HoldableBuffer, Latch, TriggeredLatch
+from hfg.nodes.flow.passing import (
+    AtEnd,
+    Different,
+    Distinct,
+    EveryNth,
+    MarkerDetector,
+    MessageEvent,
+    ProcessSignal,
+    Skip,
+    Take,
+    TakeWhile,
+    relay,
+)
+from hfg.nodes.flow.routing import Demux, Gate, Merge, Mux, Rejoin, Split, switch
+
+__all__ = [
+    "Accumulate",
+    "AtEnd",
+    "CombineLatest",
+    "Count",
+    "CountItems",
+    "Demux",
+    "Different",
+    "Distinct",
+    "EveryNth",
+    "Gate",
+    "HoldableBuffer",
+    "Join",
+    "JoinByStamp",
+    "Latch",
+    "MarkerDetector",
+    "Merge",
+    "MessageEvent",
+    "Mux",
+    "ProcessSignal",
+    "Recent",
+    "Rejoin",
+    "SampleAndHold",
+    "Skip",
+    "Split",
+    "Synchronizer",
+    "Take",
+    "TakeWhile",
+    "TimeWindow",
+    "TriggeredLatch",
+    "Window",
+    "relay",
+    "switch",
+]
