@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 from annotated_types import Interval
 
 from hfg.functions import node
+from hfg.nodes._equality import same
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Inputs, Output, Parameter, Slots, State, slot
 
@@ -234,15 +235,6 @@ def equal(a: object, b: object) -> bool:
       b: the second one.
     """
     return same(a, b)
-
-
-def same(a: Any, b: Any) -> bool:
-    """Say whether two values are equal, also where `==` gives an array or raises."""
-    try:
-        answer = a == b
-        return bool(answer.all() and a.shape == b.shape) if hasattr(answer, "all") else bool(answer)
-    except Exception:  # two values that do not know each other are two values
-        return False
 
 
 @node
