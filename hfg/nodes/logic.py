@@ -55,7 +55,7 @@ def logical_and(*values: bool) -> bool:
     Args:
       values: any number of truth values.
 
-    CS::APEX: boolean::AND.
+    CS::APEX: csapex::boolean::AND.
     """
     return all(values)
 
@@ -93,7 +93,7 @@ def logical_nand(*values: bool) -> bool:
     Args:
       values: any number of truth values.
 
-    CS::APEX: boolean::NAND.
+    CS::APEX: csapex::boolean::NAND.
     """
     return not all(values)
 
@@ -143,7 +143,7 @@ def boolean(
       operation: "and", "or", "xor" (they differ), "nand", "nor", "xnor" (they are the same), or "implies" (b is true
         wherever a is).
 
-    CS::APEX: BinaryBoolean.
+    CS::APEX: csapex::BinaryBoolean.
     """
     return _BOOLEAN[operation](a, b)
 
@@ -219,7 +219,7 @@ def compare(
     Raises:
       OverflowError: with a tolerance, one is a whole number too large for a float and the other a float.
 
-    CS::APEX: CompareInteger.
+    CS::APEX: csapex::CompareInteger.
     """
     return _compare(a, b, operation, tolerance)
 
@@ -248,7 +248,7 @@ def threshold(value: float, *, threshold: float = 0.5) -> bool:
       value: a number.
       threshold: in the unit of the value.
 
-    CS::APEX: Threshold.
+    CS::APEX: csapex::Threshold.
     """
     return value > threshold
 
@@ -330,7 +330,7 @@ class BooleanTrigger(Node):
       true: triggered by each true value.
       false: triggered by each false value.
 
-    CS::APEX: BooleanTrigger, RosMessageBool2Event.
+    CS::APEX: csapex::BooleanTrigger, csapex::RosMessageBool2Event.
     """
 
     value = Input(bool)
@@ -351,7 +351,7 @@ class TriggerIfEqual(Node):
       equal: the value, if it is equal.
       unequal: the value, if it is not.
 
-    CS::APEX: TiggerIfIntEqual.
+    CS::APEX: csapex::TiggerIfIntEqual.
     """
 
     value = Input(object)
@@ -376,7 +376,7 @@ class Edges(Node):
       falling: a true value was followed by a false one.
       changed: the new value, with both.
 
-    CS::APEX: RosMessageBool2Event.
+    CS::APEX: csapex::RosMessageBool2Event.
     """
 
     value = Input(bool)
@@ -403,7 +403,7 @@ class Changed(Node):
       first: whether the first value counts as a change.
       changed: the new value.
 
-    CS::APEX: RosMessageInt2Event.
+    CS::APEX: csapex::RosMessageInt2Event.
     """
 
     value = Input(object)
@@ -463,7 +463,7 @@ class Toggle(Node):
       turn_off: gives false from now on.
       changed: the new value.
 
-    CS::APEX: boolean::Toggle.
+    CS::APEX: csapex::boolean::Toggle.
     """
 
     signal = Output(bool)
@@ -560,7 +560,7 @@ class EventAnd(Node):
       all: all of them have happened.
       forget: starts anew.
 
-    CS::APEX: EventAND.
+    CS::APEX: csapex::EventAND.
     """
 
     all = Event(None)

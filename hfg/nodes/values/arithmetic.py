@@ -79,7 +79,7 @@ def multiply(a: float, b: float) -> float:
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: MultiplyValues.
+    CS::APEX: csapex::MultiplyValues.
     """
     return a * b
 
@@ -199,7 +199,7 @@ def sum_of(*values: float) -> float:
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: Sum.
+    CS::APEX: csapex::Sum.
     """
     return sum(values)
 
@@ -216,7 +216,7 @@ def product_of(*values: float) -> float:
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: MultiplyValues.
+    CS::APEX: csapex::MultiplyValues.
     """
     return math.prod(values)
 
@@ -270,7 +270,7 @@ def negate(value: float) -> float:
     Args:
       value: a number.
 
-    CS::APEX: NegateNumber.
+    CS::APEX: csapex::NegateNumber.
     """
     return -value
 
@@ -286,7 +286,7 @@ def invert(value: float) -> float:
       ZeroDivisionError: it is 0.
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: InvertValues.
+    CS::APEX: csapex::InvertValues.
     """
     return 1 / value
 
@@ -324,7 +324,7 @@ def radians_of(angle: float) -> float:
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: DegToRad.
+    CS::APEX: csapex::DegToRad.
     """
     return math.radians(angle)
 

@@ -109,7 +109,7 @@ class ConstantInt(_Constant):
       out: the value.
       changed: the new value, as it is given for the first time.
 
-    CS::APEX: IntInput.
+    CS::APEX: csapex::IntInput.
     """
 
     value = Parameter(0)
@@ -132,7 +132,7 @@ class ConstantFloat(_Constant):
       out: the value.
       changed: the new value, as it is given for the first time.
 
-    CS::APEX: DoubleInput.
+    CS::APEX: csapex::DoubleInput.
     """
 
     value = Parameter(0.0)
@@ -155,7 +155,7 @@ class ConstantText(_Constant):
       out: the value.
       changed: the new value, as it is given for the first time.
 
-    CS::APEX: TextInput.
+    CS::APEX: csapex::TextInput.
     """
 
     value = Parameter("")
@@ -178,7 +178,7 @@ class ConstantVector(_Constant):
       out: the value, an array of float64 with one axis.
       changed: the new value, as it is given for the first time.
 
-    CS::APEX: VectorInput.
+    CS::APEX: csapex::VectorInput.
     """
 
     value = Parameter[Sequence[float]]((0.0, 0.0, 0.0), Predicate(has_floats), type=Sequence[float])
@@ -204,7 +204,7 @@ class ConstantMatrix(_Constant):
       out: the value, an array of float64, rows x columns.
       changed: the new value, as it is given for the first time.
 
-    CS::APEX: MatrixInput.
+    CS::APEX: csapex::MatrixInput.
     """
 
     value = Parameter[Rows](((1.0, 0.0), (0.0, 1.0)), Predicate(has_floats), type=Rows)

@@ -56,7 +56,7 @@ class IntRange(Node):
       closed: whether `stop` belongs to the range.
       out: the numbers.
 
-    CS::APEX: IntRangeGenerator.
+    CS::APEX: csapex::IntRangeGenerator.
     """
 
     out = Output(int)
@@ -88,7 +88,7 @@ class FloatRange(Node):
       closed: whether `stop` belongs to the range.
       out: the numbers.
 
-    CS::APEX: DoubleRangeGenerator.
+    CS::APEX: csapex::DoubleRangeGenerator.
     """
 
     out = Output(float)

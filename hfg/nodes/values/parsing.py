@@ -44,7 +44,7 @@ class ParseInt(Node):
       number: what it says.
       invalid: a text that is no whole number.
 
-    CS::APEX: StringToInt, TextConvert.
+    CS::APEX: csapex::StringToInt, csapex::TextConvert.
     """
 
     text = Input(str)
@@ -226,7 +226,7 @@ def to_float(value: float) -> float:
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: DurationConvertion.
+    CS::APEX: csapex::DurationConvertion.
     """
     return float(value)
 

@@ -50,7 +50,7 @@ class Statistics(Node):
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: Statistics.
+    CS::APEX: csapex::Statistics.
     """
 
     value = Input(float)

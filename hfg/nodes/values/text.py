@@ -114,7 +114,7 @@ def replace_text(text: str, *, needle: Annotated[str, MinLen(1)] = " ", replacem
       needle: what is replaced.
       replacement: what takes its place.
 
-    CS::APEX: ReplaceString.
+    CS::APEX: csapex::ReplaceString.
     """
     return text.replace(needle, replacement)
 
@@ -283,8 +283,12 @@ def search_text(text: str, *, pattern: Annotated[str, Predicate(is_a_pattern)] =
 
     Args:
       text: any text.
-      pattern: of Python's `re`; one with nested repetitions may take very long. `found` is what it describes, `groups`
-        what each of its groups does, `names` the same of groups with names; a group that took no part gives "".
+      pattern: of Python's `re`; one with nested repetitions may take very long.
+
+    Returns:
+      found: what the pattern describes.
+      groups: what each of its groups describes; "" of a group that took no part.
+      names: the same by name, of groups that have names.
     """
     match = re.search(pattern, text)
     return None if match is None else Found(match[0], list(match.groups("")), match.groupdict(""))
@@ -311,7 +315,7 @@ class TextCompare(Node):
       equal: the first text, if they are equal.
       different: the first text, if they are not.
 
-    CS::APEX: TextCompare.
+    CS::APEX: csapex::TextCompare.
     """
 
     a = Input(str)
@@ -407,7 +411,7 @@ def format_text(*values: object, format: str) -> str:  # noqa: A002 - the word o
     Raises:
       ValueError: the format wants a value that is not there, or one cannot be written so.
 
-    CS::APEX: GenericTextCombiner.
+    CS::APEX: csapex::GenericTextCombiner.
     """
     return format_safely(format, values, {})
 

@@ -40,7 +40,7 @@ def norm(vector: Vector, *, order: Literal["euclidean", "manhattan", "maximum"] 
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: NormOfGenericVectorMessage.
+    CS::APEX: csapex::NormOfGenericVectorMessage.
     """
     array = np.abs(_array(vector))
     if not len(array):
@@ -63,7 +63,7 @@ def scale_vector(vector: Vector, *, factor: float = 1.0) -> VectorArray:
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: ScaleGenericVectorMessage.
+    CS::APEX: csapex::ScaleGenericVectorMessage.
     """
     with np.errstate(all="ignore"):
         return _array(vector) * float(factor)
@@ -147,10 +147,14 @@ def extremum(values: Vector, *, which: Literal["maximum", "minimum"] = "maximum"
       values: any number of numbers.
       which: "maximum" or "minimum".
 
+    Returns:
+      extremum: the number.
+      index: its place, from 0.
+
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: GenericVectorMessageGetExtremum.
+    CS::APEX: csapex::GenericVectorMessageGetExtremum.
     """
     array = _array(values)
     if np.isnan(array).all():
@@ -194,7 +198,7 @@ class AddNoiseToVector(Node):
     Raises:
       OverflowError: a whole number is too large for a float.
 
-    CS::APEX: ParameterVectorAddNoise.
+    CS::APEX: csapex::ParameterVectorAddNoise.
     """
 
     vector = Input(Vector)
