@@ -9,7 +9,7 @@ Which floor stands on which; imports go down only, and asyncio begins on floor 5
     3  graph
     2  nodetype, functions  <-  declaration  <-  vectors, signature  <-  hints, description     registry
     1  ports                                       transport
-    0  errors   problem   token   types   images   generics   clock   trace   starting
+    0  errors   problem   token   types   values   limits   images   generics   clock   trace   starting
 
 A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
 """
@@ -29,10 +29,12 @@ from hfg.nodetype import Node
 from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
 from hfg.registry import reference_of
 from hfg.token import END, NO_MESSAGE, Token
+from hfg.values import Colour, Span
 
 __all__ = [
     "END",
     "NO_MESSAGE",
+    "Colour",
     "EndOfStream",
     "Event",
     "Events",
@@ -48,6 +50,7 @@ __all__ = [
     "Report",
     "Run",
     "Slots",
+    "Span",
     "State",
     "StateMachine",
     "Statistics",

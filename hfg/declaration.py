@@ -19,8 +19,9 @@ from hfg.ports.base import Relaying
 from hfg.ports.events import Event
 from hfg.ports.inputs import Input
 from hfg.ports.outputs import Output
-from hfg.ports.parameters import REQUIRED, Parameter, ParameterSpec
+from hfg.ports.parameters import Parameter
 from hfg.ports.slots import UNSET, Slot
+from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.ports.states import State
 from hfg.ports.vectors import Events, Inputs, Outputs, Slots, Vector, VectorSpec
 from hfg.signature import Signature, read_signature
@@ -86,7 +87,7 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
     _wrap_overridden_slots(cls, base)
     declared = _declared(cls, base, where)
     vectors = vector_specs(declared, where)
-    parameters = {name: parameter.spec() for name, parameter in _of(declared, Parameter).items()}
+    parameters = {name: parameter.spec(where) for name, parameter in _of(declared, Parameter).items()}
     parameters.update(size_parameters(vectors))
     inputs = {name: _input_spec(name, d) for name, d in _declared_as(declared, Input, Inputs)}
     outputs = {name: OutputSpec(name, d.type) for name, d in _declared_as(declared, Output, Outputs)}
@@ -357,6 +358,12 @@ def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED)
         _check_type(one.name, one.type, where)
     for spec in kind.parameters.values():
         _check_default(spec, where)
+        _check_conditions(spec, kind.parameters, where)
+        if spec.read_only and kind.is_subgraph:
+            raise DeclarationError(
+                f'{where}: parameter "{spec.name}" is read-only, but a subgraph has no code of its own to set it; make '
+                "it an output, and connect to that the parameter of the node inside that is set"
+            )
 
 
 def _check_type(name: str, hint: Any, where: str) -> None:
@@ -381,6 +388,23 @@ def _check_default(spec: ParameterSpec, where: str) -> None:
         )
 
 
+def _check_conditions(spec: ParameterSpec, parameters: Mapping[str, ParameterSpec], where: str) -> None:
+    """Refuse to show a parameter by what can never be."""
+    for condition in spec.shown_if:
+        other = parameters.get(condition.parameter)
+        if other is None or other.trigger:
+            there = ", ".join(f'"{name}"' for name, one in parameters.items() if not one.trigger and one is not spec)
+            raise DeclarationError(
+                f'{where}: parameter "{spec.name}" is shown by "{condition.parameter}", which is no parameter with a '
+                f"value; the others are {there or 'none'}"
+            )
+        wrong = next((wrong for value in condition.values if (wrong := other.check(value))), None)
+        if wrong is not None:
+            raise DeclarationError(
+                f'{where}: parameter "{spec.name}" is shown if "{other.name}" is what that can never be: it {wrong}'
+            )
+
+
 def install_ports(cls: type, kind: NodeType, base: type) -> None:
     """Make ports that were read from a function attributes of the class, as if they had been declared there."""
     for name in kind.shared:
@@ -392,7 +416,7 @@ def install_ports(cls: type, kind: NodeType, base: type) -> None:
     for spec in kind.parameters.values():
         if spec.size:
             continue
-        made.append(Parameter(spec.default, *spec.limits, unit=spec.unit, choices=spec.choices, type=spec.type))
+        made.append(Parameter.of(spec))
         names.append(spec.name)
     for name, declaration in zip(names, made, strict=True):
         if name in kind.declared or name in kind.shared:
@@ -408,5 +432,6 @@ def install_ports(cls: type, kind: NodeType, base: type) -> None:
                 f"{taken.__name__}; rename one of them"
             )
         declaration.name = name
-        declaration.inferred = True
+        if not isinstance(declaration, Parameter):
+            declaration.inferred = True
         setattr(cls, name, declaration)

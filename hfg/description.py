@@ -6,17 +6,18 @@ the class. Stands on ports; knows neither `Node` nor graphs.
 
 from __future__ import annotations
 
-import copy
+import functools
 import sys
-from collections.abc import Callable, Mapping, MutableMapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import msgspec
 
-from hfg.ports.parameters import REQUIRED, ParameterSpec
+from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.ports.states import State
 from hfg.ports.vectors import VectorSpec, element
+from hfg.values import own_copy
 
 __all__ = [
     "EventSpec",
@@ -28,6 +29,7 @@ __all__ = [
     "SlotSpec",
     "look_up",
     "parameter_values",
+    "read_only_refusal",
     "unknown_parameter",
 ]
 
@@ -132,6 +134,13 @@ class NodeType:
         """Whether its code is given the parameters as it begins and sees no later value: a generator function."""
         return self.is_function and self.process_kind in ("generator", "async generator")
 
+    def help_of(self, name: str) -> str | None:
+        """Say what a port or parameter means: what its declaration says, else its entry in the docstring."""
+        spec = self.parameters.get(name)
+        if spec is not None and spec.help is not None:
+            return spec.help
+        return _documented(self.doc).get(name)
+
     def spread(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Give values by input, where those of a vector may be a list under its name."""
         found: dict[str, Any] = {}
@@ -177,6 +186,19 @@ def _listed_by(package: str) -> Any:
     return listed if isinstance(listed, list | tuple) else ()
 
 
+@functools.lru_cache(maxsize=256)
+def _documented(doc: str) -> Mapping[str, str]:
+    """Give what a docstring says of each argument and attribute; nothing where it cannot be read."""
+    from docstring_parser import ParseError  # when somebody asks, for not every run does
+    from docstring_parser.google import GoogleParser
+
+    try:
+        found = GoogleParser().parse(doc).params
+    except ParseError:
+        return {}
+    return {one.arg_name: " ".join(one.description.split()) for one in found if one.description}
+
+
 def look_up(module: str, qualname: str) -> Any:
     """Find a name in a module that is already imported; None if there is no such name."""
     found: Any = sys.modules.get(module)
@@ -196,18 +218,19 @@ def parameter_values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
     for name, spec in type_.parameters.items():
         if spec.trigger:
             continue
+        if name in given and spec.read_only:
+            raise ValueError(read_only_refusal(f"{type_.name}.{name}"))
         if name in given:
-            value = given[name]
-            wrong = spec.check(value)
+            wrong = spec.check(given[name])
             if wrong is not None:
                 raise ValueError(f'parameter "{type_.name}.{name}" {wrong}')
+            value = own_copy(given[name])
         elif spec.default is REQUIRED:
             raise TypeError(
                 f'{type_.name} needs a value for its parameter "{name}": write {type_.qualname}({name}=...)'
             )
         else:
-            # A list as default must not be shared by all nodes.
-            value = copy.copy(spec.default) if isinstance(spec.default, MutableMapping | list | set) else spec.default
+            value = own_copy(spec.default)  # a list as default must not be shared by all nodes
         values[name] = value
     unknown = [name for name in given if name not in values]
     if unknown:
@@ -215,8 +238,17 @@ def parameter_values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
     return values
 
 
+def read_only_refusal(path: str) -> str:
+    """Say why nobody but its node sets a parameter that is read-only (rule P8)."""
+    name = path.rpartition(".")[2]
+    return (
+        f'parameter "{path}" is read-only: its node alone sets it; read node.{name}, or connect '
+        f'node.ports.parameters["{name}"] to an input'
+    )
+
+
 def unknown_parameter(type_: NodeType, name: str) -> str:
     """Say that a type has no such parameter, and which it has."""
-    known = ", ".join(f'"{known}"' for known, spec in type_.parameters.items() if not spec.trigger) or "none"
+    known = ", ".join(f'"{known}"' for known, spec in type_.parameters.items() if spec.is_given) or "none"
     hint = "; inputs are connected, not given here" if name in type_.inputs else ""
     return f'{type_.name} has no parameter "{name}"; its parameters are {known}{hint}'

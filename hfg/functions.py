@@ -24,7 +24,8 @@ from hfg.errors import DeclarationError
 from hfg.hints import MISSING, function_name, hints_of_class, output_type
 from hfg.nodetype import Node
 from hfg.ports.outputs import OutputPort
-from hfg.ports.parameters import Parameter, ParameterSpec
+from hfg.ports.parameters import Parameter
+from hfg.ports.specs import ParameterSpec
 from hfg.ports.vectors import Inputs, Outputs, Vector
 from hfg.signature import CallPlan, Signature, read_signature
 from hfg.types import describe
@@ -310,9 +311,7 @@ def _read(
         return signature
 
     def complete(spec: ParameterSpec) -> ParameterSpec:
-        return (
-            spec if spec.name not in declared else msgspec.structs.replace(declared[spec.name].spec(), name=spec.name)
-        )
+        return spec if spec.name not in declared else declared[spec.name].spec(where, spec.name, type=spec.type)
 
     return dataclasses.replace(signature, parameters=tuple(complete(spec) for spec in signature.parameters))
 

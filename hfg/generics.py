@@ -112,7 +112,8 @@ def tuple_items(source: Any) -> tuple[Any, ...] | None:
         # A bare `tuple` has no origin; `tuple[()]` has one, and no arguments either.
         return UNKNOWN if source is tuple or source is typing.Tuple else typing.get_args(source)  # noqa: UP006
     if hasattr(cls, "_fields") and tuple in cls.__bases__:
-        return _fields(cls)
+        known = dict(zip(getattr(cls, "__parameters__", ()), typing.get_args(source), strict=False))
+        return tuple(known.get(one, one) for one in _fields(cls))
     for base in cls.__dict__.get("__orig_bases__", cls.__bases__):
         if class_of(base) is not None:
             return tuple_items(base)

@@ -8,7 +8,6 @@ graphs nor who runs it.
 
 from __future__ import annotations
 
-import copy
 import difflib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 import msgspec
 
 from hfg.declaration import declare
-from hfg.description import NodeType, parameter_values, unknown_parameter
+from hfg.description import NodeType, parameter_values, read_only_refusal, unknown_parameter
 from hfg.errors import DeclarationError, EngineInternalError, Failure, UsageError
 from hfg.logs import Log, Logger, node_log
 from hfg.ports.automatic import (
@@ -36,6 +35,7 @@ from hfg.ports.parameters import ParameterPort
 from hfg.ports.slots import SlotPort
 from hfg.ports.views import Ports
 from hfg.token import Token
+from hfg.values import own_copy
 from hfg.vectors import Vectors
 
 __all__ = ["NoSuchAttribute", "Node", "NodeType", "Place"]
@@ -381,11 +381,16 @@ class Node:
                 values += part
         return values
 
-    def _set_parameter(self, name: str, value: Any) -> None:
+    def _set_parameter(self, name: str, value: Any, *, own: bool = False) -> None:
         """Change a parameter; the value stays if it is refused.
 
+        Args:
+          name: of the parameter.
+          value: the node keeps a copy of a list, a set, a dict or an array.
+          own: the node's code says so, which alone sets what is read-only.
+
         Raises:
-          ValueError: the value breaks the limits.
+          ValueError: the value breaks the limits, or the parameter is not for others to set.
         """
         spec = self._type.parameters.get(name)
         if spec is None or spec.trigger:
@@ -395,10 +400,12 @@ class Node:
                 f'"{_name(self)}.{name}" is a vector of {self._parameters[name]} ports, and a node keeps its ports: '
                 f"make another, {self._type.qualname}({name}={value!r}), or replace it by an edit"
             )
+        if spec.read_only and not own:
+            raise ValueError(read_only_refusal(f"{_name(self)}.{name}"))
         wrong = spec.check(value)
         if wrong is not None:
             raise ValueError(f'parameter "{_name(self)}.{name}" {wrong}')
-        self._parameters[name] = value
+        self._parameters[name] = own_copy(value)
 
     def _reset_states(self) -> None:
         """Begin a run: state afresh, and nothing left of what an earlier run wrote on the node.
@@ -420,10 +427,14 @@ class Node:
                 del own[name]
         for name, state in states.items():
             own[name] = state.fresh()
+        for name, spec in self._type.parameters.items():
+            if spec.read_only:
+                self._parameters[name] = own_copy(spec.default)
 
     def _copy(self) -> Node:
         """Make a node of the same type and parameters that is in no graph."""
-        return type(self)(**copy.copy(self._parameters))
+        specs = self._type.parameters
+        return type(self)(**{name: value for name, value in self._parameters.items() if specs[name].is_given})
 
     def _free_source(self) -> Source[Any]:
         """Find the only port that sends.
@@ -480,7 +491,7 @@ def _name(node: Node) -> str:
 
 
 def _positional(type_: NodeType) -> str:
-    example = next((f"{name}=..." for name, spec in type_.parameters.items() if not spec.trigger), "")
+    example = next((f"{name}=..." for name, spec in type_.parameters.items() if spec.is_given), "")
     if type_.is_function:
         return f"{type_.qualname}(...) makes a node; the function itself is {type_.qualname}.function"
     return f"{type_.qualname}({example}) takes its parameters by keyword only; values for inputs come from connections"

@@ -11,14 +11,14 @@ import typing
 from collections import abc
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final
-
-import annotated_types
+from typing import Any, Final
 
 from hfg.description import InputSpec, ProcessKind
 from hfg.errors import DeclarationError
 from hfg.hints import MISSING, function_name, hints_of, is_iterator, kind_of, result_of, split_token
-from hfg.ports.parameters import REQUIRED, ParameterSpec, limits_of
+from hfg.ports.kinds import type_of_default
+from hfg.ports.parameters import spec_of
+from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.types import describe
 
 __all__ = ["CallPlan", "Signature", "read_signature"]
@@ -303,24 +303,14 @@ class _Reader:
                 raise DeclarationError(
                     f'{self.where}: parameter "{argument.name}" has no type; write `{argument.name}: float = 1.0`'
                 )
-            hint = type(default)
-        return self._parameter_spec(argument.name, default, hint)
+            hint = type_of_default(default)
+        return spec_of(argument.name, default, hint, self.where)
 
     def _given_parameter(self, name: str, hint: Any) -> ParameterSpec:
         default = self.given_parameters[name]
         if hint is MISSING:
-            hint = Any if default is None else type(default)
-        return self._parameter_spec(name, default, hint)
-
-    def _parameter_spec(self, name: str, default: Any, hint: Any) -> ParameterSpec:
-        metadata = getattr(hint, "__metadata__", ()) if typing.get_origin(hint) is Annotated else ()
-        limits = limits_of(metadata)
-        units = [item.unit for item in metadata if isinstance(item, annotated_types.Unit)]
-        if limits or units:
-            hint = typing.get_args(hint)[0]
-        if default is None and hint is not Any:
-            hint = typing.Union[hint, None]  # noqa: UP007 - some hints know no |
-        return ParameterSpec(name, hint, default, limits, units[0] if units else None)
+            hint = type_of_default(default)
+        return spec_of(name, default, hint, self.where)
 
     def _unreadable(self) -> Signature:
         """A function of a C library: only what inputs= and parameters= say is known."""

@@ -35,6 +35,7 @@ __all__ = [
     "Shape",
     "accepts",
     "array_facts",
+    "bare_type",
     "compatible",
     "describe",
     "describe_value",
@@ -438,6 +439,11 @@ def _open(hint: Any) -> tuple[Any, tuple[Shape, ...]]:
             hint = typing.Union[constraints] if constraints else hint.__bound__ or Any  # noqa: UP007 - known at run time
         else:
             return hint, layouts
+
+
+def bare_type(hint: Any) -> Any:
+    """Take aliases, type variables and the metadata of `Annotated` off a type hint."""
+    return _open(hint)[0]
 
 
 _QUALIFIERS: Final = (Annotated, typing.ClassVar, typing.Final, typing.Required, typing.NotRequired)

@@ -15,8 +15,8 @@ import msgspec
 
 from hfg.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
 from hfg.errors import DeclarationError
-from hfg.ports.parameters import REQUIRED, ParameterSpec
 from hfg.ports.slots import Slot
+from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.ports.vectors import Slots, Vector, VectorSpec, element
 from hfg.types import is_hint
 

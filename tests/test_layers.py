@@ -24,6 +24,8 @@ FLOORS = {
     "hfg.problem": 0,
     "hfg.token": 0,
     "hfg.types": 0,
+    "hfg.values": 0,
+    "hfg.limits": 0,
     "hfg.clock": 0,
     "hfg.frames": 0,
     "hfg.logs": 0,

@@ -17,7 +17,7 @@ from hfg.catalogue.documentation import Documentation, read_documentation
 from hfg.description import NodeType
 from hfg.functions import NodeFunction
 from hfg.nodetype import Node
-from hfg.ports.parameters import REQUIRED, ParameterSpec
+from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.types import describe
 
 __all__ = [
@@ -68,11 +68,20 @@ class ParameterDescription(msgspec.Struct, frozen=True):
     """A parameter of a node type.
 
     Attributes:
+      kind: what an editor shows for it: "float", "choice", "path" ...
       required: it has no default, so it is given when a node is made.
       limits: by name: "gt", "ge", "lt", "le", "multiple_of", "min_length", "max_length", "predicate".
       choices: the only allowed values, or None.
       trigger: no value, but a slot and an event.
       size: how many ports a vector of this name has.
+      labels: what to call the choices, one each, or none.
+      step: by how much an editor moves the value.
+      group: what it is shown with.
+      shown_if: when it is shown, in words.
+      read_only: set by the node and shown to users.
+      pattern: which names of files fit.
+      directory: the path is that of a directory.
+      save: the path is one to write to.
     """
 
     name: str
@@ -85,11 +94,20 @@ class ParameterDescription(msgspec.Struct, frozen=True):
     unit: str | None = None
     trigger: bool = False
     size: bool = False
+    kind: str = "any"
+    labels: tuple[str, ...] = ()
+    step: float | None = None
+    group: str | None = None
+    shown_if: tuple[str, ...] = ()
+    read_only: bool = False
+    pattern: str | None = None
+    directory: bool = False
+    save: bool = False
 
     def limits_in_words(self) -> list[str]:
         """Say what its values must be: ">= 0", "one of 3, 5, 7"."""
         said = [_LIMITS[name].format(limit) for name, limit in self.limits.items()]
-        if self.choices is not None:
+        if self.choices is not None and not self.type.startswith("Literal"):  # which says it already
             said.append(f"one of {', '.join(map(repr, self.choices))}")
         return said
 
@@ -253,7 +271,7 @@ def _parameter(spec: ParameterSpec, kind: NodeType, read: Documentation) -> Para
     return ParameterDescription(
         name=spec.name,
         type="" if spec.trigger else describe(spec.type),
-        doc=read.entries.get(spec.name, ""),
+        doc=spec.help or read.entries.get(spec.name, ""),
         default=None if required or spec.trigger else spec.default,
         required=required,
         limits=dict(_limit(limit) for limit in spec.limits),
@@ -261,6 +279,15 @@ def _parameter(spec: ParameterSpec, kind: NodeType, read: Documentation) -> Para
         unit=spec.unit,
         trigger=spec.trigger,
         size=spec.size,
+        kind=spec.kind,
+        labels=spec.labels,
+        step=spec.step,
+        group=spec.group,
+        shown_if=tuple(condition.in_words() for condition in spec.shown_if),
+        read_only=spec.read_only,
+        pattern=spec.pattern,
+        directory=spec.directory,
+        save=spec.save,
     )
 
 

@@ -1,6 +1,7 @@
 """The ends of edges: declarations for class bodies, and the bound ports of one node.
 
 inputs  outputs  events  slots  parameters  states     one file for each kind: declaration and bound port
+specs  kinds  conditions                                what is known of a parameter: files and editors read it
 automatic                                               the ports of rule A9
 vectors                                                 several of one kind, as many as a node is made with
 relays                                                  the inner sides of a subgraph's ports
@@ -14,9 +15,10 @@ from hfg.ports.base import Port, Relaying, Source, Target
 from hfg.ports.events import Event, EventPort
 from hfg.ports.inputs import Input, InputPort
 from hfg.ports.outputs import Output, OutputPort
-from hfg.ports.parameters import Parameter, ParameterPort, ParameterSpec
+from hfg.ports.parameters import Parameter, ParameterPort
 from hfg.ports.relays import InnerSource, InnerTarget
 from hfg.ports.slots import Slot, SlotPort, slot
+from hfg.ports.specs import ParameterSpec
 from hfg.ports.states import State
 from hfg.ports.vectors import Events, Inputs, Outputs, PortVector, Slots
 

@@ -1,122 +1,29 @@
 """Parameters: values set when a node is made and by tokens (rule P8), within limits.
 
-Stands on `base`, `types` and annotated-types.
+Stands on `base`, `specs`, `kinds` and `conditions`, and on limits and types.
 """
 
 from __future__ import annotations
 
+import typing
 from collections.abc import Collection, Mapping
-from typing import Any, ClassVar, Final, Generic, Self, TypeVar, cast, overload
+from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar, cast, overload
 
 import annotated_types
-import msgspec
 from typing_extensions import TypeForm
 
 from hfg.errors import DeclarationError, UsageError
+from hfg.limits import kept_metadata, limits_of, limits_within, step_within
 from hfg.ports.base import Kind, Owner, Port, Relaying, Source, Target
-from hfg.types import accepts, describe
+from hfg.ports.conditions import ShownIf, conditions_of
+from hfg.ports.kinds import choices_of, type_of_default, without_none
+from hfg.ports.specs import REQUIRED, ParameterSpec, Required
+from hfg.types import accepts
+from hfg.values import own_copy
 
-__all__ = ["REQUIRED", "Parameter", "ParameterPort", "ParameterSpec", "limits_of"]
+__all__ = ["Parameter", "ParameterPort", "spec_of"]
 
 T = TypeVar("T")
-
-
-class _Required:
-    """Stands in for the default of a parameter that has none."""
-
-    def __repr__(self) -> str:
-        return "REQUIRED"
-
-
-REQUIRED: Final = _Required()
-
-
-class ParameterSpec(msgspec.Struct, frozen=True):
-    """What is known of a parameter: files, the studio and the runner read it.
-
-    Attributes:
-      limits: annotated-types constraints, opened: `Interval` as `Ge`, `Le` ...
-      unit: for people, "m/s".
-      choices: the only allowed values, or None.
-      trigger: no value, but a slot and an event of this name (§3.1 of the paper).
-      size: how many ports a vector of this name has: said when a node is made, and no port itself.
-    """
-
-    name: str
-    type: Any
-    default: Any
-    limits: tuple[Any, ...] = ()
-    unit: str | None = None
-    choices: tuple[Any, ...] | None = None
-    trigger: bool = False
-    size: bool = False
-
-    @property
-    def is_port(self) -> bool:
-        """Whether it has a value that can be set and seen while a node lives (rule P8)."""
-        return not (self.trigger or self.size)
-
-    def check(self, value: Any) -> str | None:
-        """Say what is wrong with a value ("must be <= 1, got 3"), or None."""
-        if not accepts(value, self.type):
-            return f"must be of type {describe(self.type)}, got {value!r}"
-        if self.choices is not None and value not in self.choices:
-            return f"must be one of {', '.join(map(repr, self.choices))}, got {value!r}"
-        for limit in self.limits:
-            try:
-                wrong = _breaks(limit, value)
-            except Exception as error:
-                return f"cannot be compared with {limit!r} ({type(error).__name__}: {error}), got {value!r}"
-            if wrong:
-                return f"{wrong}, got {value!r}"
-        return None
-
-
-def _breaks(limit: Any, value: Any) -> str | None:
-    """Say which limit a value breaks."""
-    match limit:
-        case annotated_types.Gt(gt):
-            return None if value > gt else f"must be > {gt!r}"
-        case annotated_types.Ge(ge):
-            return None if value >= ge else f"must be >= {ge!r}"
-        case annotated_types.Lt(lt):
-            return None if value < lt else f"must be < {lt!r}"
-        case annotated_types.Le(le):
-            return None if value <= le else f"must be <= {le!r}"
-        case annotated_types.MultipleOf(step):
-            return None if value % step == 0 else f"must be a multiple of {step!r}"
-        case annotated_types.MinLen(length):
-            return None if len(value) >= length else f"must have at least {length} items"
-        case annotated_types.MaxLen(length):
-            return None if len(value) <= length else f"must have at most {length} items"
-        case annotated_types.Predicate(func):
-            return None if func(value) else f"must satisfy {getattr(func, '__name__', func)}"
-    return None
-
-
-_LIMITS = (
-    annotated_types.Gt,
-    annotated_types.Ge,
-    annotated_types.Lt,
-    annotated_types.Le,
-    annotated_types.MultipleOf,
-    annotated_types.MinLen,
-    annotated_types.MaxLen,
-    annotated_types.Predicate,
-)
-
-
-def limits_of(metadata: Collection[Any]) -> tuple[Any, ...]:
-    """Open groups such as `Interval` and keep what is a limit; other metadata is somebody else's."""
-    limits: list[Any] = []
-    for item in metadata:
-        if isinstance(item, annotated_types.GroupedMetadata):
-            limits.extend(limits_of(list(item)))
-        elif isinstance(item, slice):  # the short form of Len
-            limits.extend(limits_of([annotated_types.Len(item.start or 0, item.stop)]))
-        elif isinstance(item, _LIMITS):
-            limits.append(item)
-    return tuple(limits)
 
 
 class ParameterPort(Port, Source[T], Target[T]):
@@ -132,13 +39,13 @@ class ParameterPort(Port, Source[T], Target[T]):
 
     @property
     def value(self) -> T:
-        """What the node works with now; setting it checks the limits.
+        """What the node works with now, a list as a copy; setting it checks the limits.
 
         Raises:
-          ValueError: on setting, a limit is broken; the value stays.
+          ValueError: on setting, a limit is broken, or only the node sets it; the value stays.
         """
-        parameters: Mapping[str, T] = self.node._parameters
-        return parameters[self.name]
+        value: T = own_copy(self.node._parameters[self.name])
+        return value
 
     @value.setter
     def value(self, value: T) -> None:
@@ -148,11 +55,26 @@ class ParameterPort(Port, Source[T], Target[T]):
 class Parameter(Generic[T]):
     """Declare a parameter in a class body; `self.tolerance` is then its value (on a subgraph, its port).
 
+    In the annotation of a keyword-only argument, `Annotated[float, Ge(0), hfg.Parameter(unit="m")]`, it says the same
+    of a function's parameter; the default stands behind the `=`.
+
     Args:
-      default: its value unless the node is made with another.
-      limits: annotated-types constraints: `Interval(ge=0, le=1)`, `Len(1, 9)`, `Predicate(str.isidentifier)` ...
+      default: its value unless the node is made with another; without one it must be given.
+      limits: annotated-types constraints: `Interval(ge=0, le=1)`, `Len(1, 9)`, `Predicate(str.isidentifier)` ...; those
+        on numbers hold for every element of a list, pair, vector or matrix.
       unit: for people.
-      choices: the only allowed values.
+      choices: the only allowed values, or a mapping from what to call them to the values; where the type is a set or a
+        list, what it may hold. A `Literal` or an enum says that by itself.
+      step: by how much an editor moves the value; no limit (`MultipleOf` is one).
+      group: what editors show it with: "filter", or "filter/details".
+      help: what it means; without it, what the docstring of the node type says of it.
+      shown_if: editors show it only if another parameter of the node is on, `shown_if="masked"`, or has a value, one of
+        a list, or keeps a limit: `shown_if={"mode": ["a", "b"], "count": Gt(3)}`.
+      read_only: the node's own code sets it, `self.done = 0.5`, and users see it; an output and no input. A number with
+        both limits is shown as progress. Every run begins with the default.
+      pattern: which names of files fit: "*.png *.jpg".
+      directory: the path is that of a directory.
+      save: the path is one to write to, not to read.
       type: any type hint; without it the default's type.
       trigger: no value, but a slot and an event of this name: a call of the slot triggers the event.
     """
@@ -166,7 +88,15 @@ class Parameter(Generic[T]):
         /,
         *limits: Any,
         unit: str | None = None,
-        choices: Collection[object] | None = None,
+        choices: Collection[object] | Mapping[str, object] | None = None,
+        step: float | None = None,
+        group: str | None = None,
+        help: str | None = None,
+        shown_if: ShownIf | None = None,
+        read_only: bool = False,
+        pattern: str | None = None,
+        directory: bool = False,
+        save: bool = False,
         trigger: bool = False,
     ) -> None: ...
     @overload
@@ -176,45 +106,164 @@ class Parameter(Generic[T]):
         /,
         *limits: Any,
         unit: str | None = None,
-        choices: Collection[object] | None = None,
+        choices: Collection[object] | Mapping[str, object] | None = None,
+        step: float | None = None,
+        group: str | None = None,
+        help: str | None = None,
+        shown_if: ShownIf | None = None,
+        read_only: bool = False,
+        pattern: str | None = None,
+        directory: bool = False,
+        save: bool = False,
         type: TypeForm[T],
         trigger: bool = False,
     ) -> None: ...
     @overload
-    def __init__(self: Parameter[None], /, *, trigger: bool) -> None: ...
     def __init__(
         self,
-        default: Any = None,
+        /,
+        *,
+        unit: str | None = None,
+        choices: Collection[object] | Mapping[str, object] | None = None,
+        step: float | None = None,
+        group: str | None = None,
+        help: str | None = None,
+        shown_if: ShownIf | None = None,
+        pattern: str | None = None,
+        directory: bool = False,
+        save: bool = False,
+        type: TypeForm[T],
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Parameter[None], /, *, trigger: bool, group: str | None = None, help: str | None = None
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Parameter[Any],
+        /,
+        *,
+        unit: str | None = None,
+        choices: Collection[object] | Mapping[str, object] | None = None,
+        step: float | None = None,
+        group: str | None = None,
+        help: str | None = None,
+        shown_if: ShownIf | None = None,
+        pattern: str | None = None,
+        directory: bool = False,
+        save: bool = False,
+    ) -> None: ...
+    def __init__(
+        self,
+        default: Any = REQUIRED,
         /,
         *limits: Any,
         unit: str | None = None,
-        choices: Collection[Any] | None = None,
+        choices: Collection[Any] | Mapping[str, Any] | None = None,
+        step: float | None = None,
+        group: str | None = None,
+        help: str | None = None,  # noqa: A002
+        shown_if: ShownIf | None = None,
+        read_only: bool = False,
+        pattern: str | None = None,
+        directory: bool = False,
+        save: bool = False,
         type: Any = None,  # noqa: A002
         trigger: bool = False,
     ) -> None:
-        unknown = [limit for limit in limits if not limits_of([limit])]
+        unknown = [limit for limit in (default, *limits)[1:] if not limits_of([limit])]
         if unknown:
             raise DeclarationError(
                 f"{unknown[0]!r} is no limit for a parameter: use those of annotated_types, such as Interval(ge=0, "
                 "le=1)"
             )
-        if type is None and default is not None:
-            type = default.__class__  # noqa: A001
-        self.inferred = False  # read from a function, not written in a class body
+        if not isinstance(default, Required) and limits_of([default]) and not isinstance(default, slice):
+            raise DeclarationError(
+                f"{default!r} is a limit, where the default of a parameter should be; write hfg.Parameter(0.5, "
+                f"{default!r}), or beside hfg.Parameter in Annotated[float, {default!r}, hfg.Parameter(...)]"
+            )
+        if trigger and default is REQUIRED:
+            default = None
+        self.inferred: ParameterSpec | None = None  # of one read from a function, not written in a class body
         self.default = default
-        self.limits = limits_of(limits)
+        self.limits = limits
         self.unit = unit
-        self.choices = None if choices is None else tuple(choices)
-        self.type: Any = Any if type is None and not trigger else type
+        self.choices = choices
+        self.step = step
+        self.group = group
+        self.help = help
+        self.shown_if = shown_if
+        self.read_only = read_only
+        self.pattern = pattern
+        self.directory = directory
+        self.save = save
+        self.type: Any = type
         self.trigger = trigger
         self.name = ""
+
+    @classmethod
+    def of(cls, spec: ParameterSpec) -> Parameter[Any]:
+        """Make the declaration of a parameter that was read from a function."""
+        made: Parameter[Any] = cls(spec.default, type=spec.type)
+        made.inferred, made.name, made.trigger = spec, spec.name, spec.trigger
+        return made
 
     def __set_name__(self, owner: object, name: str) -> None:
         self.name = self.name or name
 
-    def spec(self) -> ParameterSpec:
-        """Give the declaration as plain data."""
-        return ParameterSpec(self.name, self.type, self.default, self.limits, self.unit, self.choices, self.trigger)
+    def spec(
+        self,
+        where: str = "",
+        name: str | None = None,
+        *,
+        default: Any = REQUIRED,
+        type: Any = None,  # noqa: A002
+    ) -> ParameterSpec:
+        """Give the declaration as plain data.
+
+        Args:
+          where: names the node type in messages.
+          name: that of the parameter, where the declaration has none.
+          default: for one that stands in an annotation, what stands behind the `=`.
+          type: the same, the annotated type.
+
+        Raises:
+          DeclarationError: it contradicts itself.
+        """
+        if self.inferred is not None:
+            return self.inferred
+        name = name or self.name
+        where = f'{where}{": " if where else ""}parameter "{name}"'
+        hint = self.type if self.type is not None else type
+        default = self.default if self.default is not REQUIRED else default
+        if hint is None and not self.trigger:
+            hint = type_of_default(None if default is REQUIRED else default)
+        hint = _opened(hint)
+        metadata = getattr(hint, "__metadata__", ()) if typing.get_origin(hint) is Annotated else ()
+        units = [item.unit for item in metadata if isinstance(item, annotated_types.Unit)]
+        bare = None if hint is None else kept_metadata(hint)
+        limits = (*limits_of(metadata), *limits_of(self.limits), *limits_within(bare))
+        choices, labels = _choices(self.choices, bare, where)
+        spec = ParameterSpec(
+            name=name,
+            type=bare,
+            default=default,
+            limits=limits,
+            unit=self.unit if self.unit is not None else units[0] if units else None,
+            choices=choices,
+            trigger=self.trigger,
+            labels=labels,
+            step=self.step if self.step is not None else step_within(limits),
+            group=self.group,
+            help=self.help,
+            shown_if=conditions_of(self.shown_if, where),
+            read_only=self.read_only,
+            pattern=self.pattern,
+            directory=self.directory,
+            save=self.save,
+        )
+        _refuse_contradictions(spec, self.step, where)
+        return spec
 
     @overload
     def __get__(self, node: None, owner: Any) -> Self: ...
@@ -234,7 +283,99 @@ class Parameter(Generic[T]):
         return node._parameters[self.name]
 
     def __set__(self, node: Any, value: T) -> None:
-        node._set_parameter(self.name, value)
+        node._set_parameter(self.name, value, own=True)
 
     def __repr__(self) -> str:
         return f"<Parameter {self.name}>"
+
+
+def spec_of(name: str, default: Any, hint: Any, where: str) -> ParameterSpec:
+    """Describe the parameter that a keyword-only argument is.
+
+    Raises:
+      DeclarationError: its annotation contradicts itself.
+    """
+    hint = _opened(hint)
+    metadata = getattr(hint, "__metadata__", ()) if typing.get_origin(hint) is Annotated else ()
+    said = [item for item in metadata if isinstance(item, Parameter)]
+    wrong = None
+    if len(said) > 1:
+        wrong = "has two of hfg.Parameter in its annotation; say all in one"
+    elif said and (said[0].default is not REQUIRED or said[0].type is not None):
+        wrong = "says its default or type in hfg.Parameter; write Annotated[float, hfg.Parameter(...)] = 0.5"
+    elif said and said[0].read_only:
+        wrong = "is read-only, but a function cannot set it; make the node type a class"
+    if wrong is not None:
+        raise DeclarationError(f'{where}: parameter "{name}" {wrong}')
+    if default is None and hint is not Any:
+        hint = _or_none(hint)
+    return (said[0] if said else Parameter()).spec(where, name, default=default, type=hint)
+
+
+def _opened(hint: Any) -> Any:
+    """Let what `Annotated[float, Ge(0)] | None` says hold for the whole; None keeps every limit."""
+    bare = without_none(hint)
+    if bare is hint or typing.get_origin(bare) is not Annotated or not accepts(None, hint):
+        return hint
+    opened: Any = typing.Union[typing.get_args(bare)[0], None]  # noqa: UP007 - some hints know no |
+    for item in bare.__metadata__:
+        opened = Annotated[opened, item]
+    return opened
+
+
+def _or_none(hint: Any) -> Any:
+    """Let None be a value, too; what is said of the type stays."""
+    if accepts(None, hint):
+        return hint
+    bare = typing.get_args(hint)[0] if typing.get_origin(hint) is Annotated else hint
+    widened: Any = typing.Union[bare, None]  # noqa: UP007 - some hints know no |
+    for item in getattr(hint, "__metadata__", ()) if bare is not hint else ():
+        widened = Annotated[widened, item]
+    return widened
+
+
+def _choices(said: Any, hint: Any, where: str) -> tuple[tuple[Any, ...] | None, tuple[str, ...]]:
+    """Give what may be chosen, and how it is called."""
+    if said is None:
+        known = None if hint is None else choices_of(hint)
+        return (None, ()) if known is None else (tuple(known.values()), tuple(known))
+    if isinstance(said, str) or not isinstance(said, Collection) or not said:
+        raise DeclarationError(
+            f'{where}: choices are several values, got {said!r:.80}; write choices=("fast", "good"), or '
+            'choices={"Fast": 1, "Good": 2} to call them something'
+        )
+    if isinstance(said, Mapping):
+        return tuple(said.values()), tuple(map(str, said))
+    return tuple(said), ()
+
+
+def _refuse_contradictions(spec: ParameterSpec, step: Any, where: str) -> None:
+    """Refuse what a parameter of its kind cannot be.
+
+    Raises:
+      DeclarationError: with the remedy.
+    """
+    wrong = None
+    if spec.trigger and (spec.read_only or spec.choices or spec.limits or step is not None):
+        wrong = "is a trigger and has no value, so nothing can be said of that; leave it out"
+    elif spec.read_only and spec.default is REQUIRED:
+        wrong = "is read-only and has no default to begin with; write hfg.Parameter(0.0, read_only=True)"
+    elif step is not None and (not isinstance(step, int | float) or isinstance(step, bool) or not step > 0):
+        wrong = f"has a step of {step!r}; a step is a number above 0"
+    elif step is not None and spec.kind not in ("int", "float", "interval", "vector", "matrix", "list", "progress"):
+        wrong = f"has a step, but is of the kind {spec.kind}; leave step= out"
+    elif spec.says_path and spec.kind != "path":
+        wrong = f"is of the kind {spec.kind}, but pattern=, directory= and save= are for paths; give it type=Path"
+    elif spec.pattern is not None and (
+        spec.directory or not isinstance(cast(object, spec.pattern), str) or not spec.pattern.split()
+    ):
+        wrong = f'has the pattern {spec.pattern!r}; names of files have one, as in pattern="*.png *.jpg"'
+    elif any(condition.parameter == spec.name for condition in spec.shown_if):
+        wrong = "is shown by its own value, so that it could hide for ever; name another parameter"
+    else:
+        said: dict[str, Any] = {"unit": spec.unit, "group": spec.group, "help": spec.help}
+        odd = next((word for word, one in said.items() if one is not None and not isinstance(one, str)), None)
+        if odd is not None:
+            wrong = f'has {odd}={said[odd]!r}; write a text, as in {odd}="..."'
+    if wrong is not None:
+        raise DeclarationError(f"{where} {wrong}")

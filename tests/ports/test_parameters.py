@@ -11,7 +11,8 @@ import pytest
 
 import hfg
 from hfg.errors import DeclarationError
-from hfg.ports.parameters import ParameterSpec, limits_of
+from hfg.limits import limits_of
+from hfg.ports.specs import ParameterSpec
 
 
 class Filter(hfg.Node):

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from hfg.description import read_only_refusal
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, Worker
 from hfg.engine.rules import lifecycle
 from hfg.errors import NotRunning, UsageError
@@ -17,6 +18,7 @@ from hfg.graph.structure.subgraph import inside
 from hfg.nodetype import Node
 from hfg.ports import ParameterPort
 from hfg.trace import ParameterSet
+from hfg.values import own_copy
 
 if TYPE_CHECKING:
     from hfg.engine.runtime.engine import Engine
@@ -34,7 +36,10 @@ def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
     if engine.core.over:
         raise NotRunning(f'the run is over: write node.ports.parameters["{port.name}"].value = ... for the next one')
     reached = list(stands_for(port))
+    value = own_copy(value)  # of now: it may be set a while later
     for one in reached:
+        if one.spec.read_only:
+            raise ValueError(read_only_refusal(one.path))
         wrong = one.spec.check(value)
         if wrong is not None:
             raise ValueError(f'parameter "{one.path}" {wrong}')
@@ -53,7 +58,7 @@ def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
 def _write(worker: Worker, node: Node, name: str, value: Any) -> None:
     """Let the node work with the value from now on."""
     core = worker.core
-    node._parameters[name] = value
+    node._parameters[name] = own_copy(value)
     if core.trace is not None:
         core.trace(ParameterSet(core.now(), worker.path, name, value))
 

@@ -10,6 +10,7 @@ from hfg.graph.structure.level import Level
 from hfg.graph.structure.options import NodeOptions
 from hfg.graph.structure.subgraph import inside, is_box
 from hfg.nodetype import Node, Place
+from hfg.values import own_copy
 
 __all__ = ["close_box", "leave", "open_box", "place", "set_options", "settle", "write_parameter"]
 
@@ -57,4 +58,4 @@ def close_box(node: Node) -> None:
 
 def write_parameter(node: Node, name: str, value: object) -> None:
     """Give a parameter a value that it had, or that was checked; no other parameter follows."""
-    node._parameters[name] = value
+    node._parameters[name] = own_copy(value)

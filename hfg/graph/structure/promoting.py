@@ -63,6 +63,11 @@ def refuse_standing(outer: ParameterPort[Any], inner: ParameterPort[Any]) -> Non
     Raises:
       GraphError: the types do not fit, or the present value is out of the inner one's limits.
     """
+    if inner.spec.read_only:
+        raise GraphError(
+            f'"{outer.path}" cannot stand for "{inner.path}", which its node alone sets; connect that to an output of '
+            "the subgraph"
+        )
     reason = why_not(outer.type, inner.type)
     if reason is not None:
         raise GraphError(

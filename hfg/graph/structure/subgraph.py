@@ -76,12 +76,12 @@ class Subgraph(Node, Relaying):
         """The same for floors that ask `hasattr` first: before it is built, the attribute is not there."""
         return self._level.face
 
-    def _set_parameter(self, name: str, value: object) -> None:
+    def _set_parameter(self, name: str, value: object, *, own: bool = False) -> None:
         """Set it and every parameter inside that it stands for; all of them, or none if one refuses."""
         level = inside(self)
         standing_for = () if level is None else level.promotions.of(name)
         before = self._parameters.get(name)
-        super()._set_parameter(name, value)
+        super()._set_parameter(name, value, own=own)
         done = []
         try:
             for port in standing_for:

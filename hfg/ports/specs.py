@@ -1,0 +1,194 @@
+"""What is known of a parameter, as data, and what it says to a value.
+
+Stands on `kinds`, `conditions`, and on limits, types and values; knows no port.
+"""
+
+from __future__ import annotations
+
+import os
+import typing
+from collections.abc import Collection, Mapping
+from fnmatch import fnmatch
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+
+from hfg.limits import breaks, numbers_within
+from hfg.ports.conditions import Condition
+from hfg.ports.kinds import ParameterKind, kind_of_type, shape_of
+from hfg.types import accepts, bare_type, describe, describe_value
+from hfg.values import Colour, Span, same
+
+__all__ = ["REQUIRED", "ParameterSpec", "Required"]
+
+
+class Required:
+    """Stands in for the default of a parameter that has none."""
+
+    def __repr__(self) -> str:
+        return "REQUIRED"
+
+
+REQUIRED: Final = Required()
+
+
+class ParameterSpec(msgspec.Struct, frozen=True):
+    """What is known of a parameter: files, the studio, the command line and the runner read it.
+
+    Attributes:
+      limits: annotated-types constraints, opened: `Interval` as `Ge`, `Le` ...; those on numbers for each element.
+      unit: for people, "m/s".
+      choices: the only allowed values, or None; of the kind "choices", the only allowed members.
+      trigger: no value, but a slot and an event of this name (§3.1 of the paper).
+      size: how many ports a vector of this name has: said when a node is made, and no port itself.
+      labels: what to call the choices, one each, or none.
+      step: by how much an editor moves the value; no limit.
+      group: what it is shown with, "filter" or "filter/details".
+      help: what it means, where the declaration says so; else the docstring may (`NodeType.help_of`).
+      shown_if: it is shown where all of these hold; hidden or not, it has its value.
+      read_only: set by the node's own code and shown to users: progress, a text; an output and no input (rule P8).
+      pattern: which names of files fit, "*.png *.jpg".
+      directory: the path is that of a directory.
+      save: the path is one to write to.
+    """
+
+    name: str
+    type: Any
+    default: Any
+    limits: tuple[Any, ...] = ()
+    unit: str | None = None
+    choices: tuple[Any, ...] | None = None
+    trigger: bool = False
+    size: bool = False
+    labels: tuple[str, ...] = ()
+    step: float | None = None
+    group: str | None = None
+    help: str | None = None
+    shown_if: tuple[Condition, ...] = ()
+    read_only: bool = False
+    pattern: str | None = None
+    directory: bool = False
+    save: bool = False
+
+    @property
+    def kind(self) -> ParameterKind:
+        """What an editor shows for it."""
+        if self.trigger:
+            return "trigger"
+        if self.read_only:
+            return "progress" if None not in numbers_within(self.limits) else "output text"
+        kind = kind_of_type(self.type, self.choices is not None)
+        return "path" if kind == "text" and self.says_path else kind
+
+    @property
+    def says_path(self) -> bool:
+        """Whether its declaration speaks of a path, whatever its type."""
+        return self.pattern is not None or self.directory or self.save
+
+    @property
+    def minimum(self) -> Any:
+        """The smallest number, allowed or just not (`limits` tell); None for no end."""
+        return numbers_within(self.limits)[0]
+
+    @property
+    def maximum(self) -> Any:
+        """The largest number, allowed or just not (`limits` tell); None for no end."""
+        return numbers_within(self.limits)[1]
+
+    @property
+    def shape(self) -> tuple[int | None, ...] | None:
+        """The shape of a vector or matrix, None for an axis of any length."""
+        return shape_of(self.type)
+
+    @property
+    def is_port(self) -> bool:
+        """Whether it has a value that can be seen while a node lives, and set unless it is read-only (rule P8)."""
+        return not (self.trigger or self.size)
+
+    @property
+    def is_given(self) -> bool:
+        """Whether users give it a value, and files keep that."""
+        return not (self.trigger or self.read_only)
+
+    def label(self, value: Any) -> str:
+        """Give what to call a value among the choices."""
+        for number, one in enumerate(self.choices or ()):
+            if number < len(self.labels) and same(one, value):
+                return self.labels[number]
+        return value if isinstance(value, str) else repr(value)
+
+    def is_shown(self, values: Mapping[str, Any]) -> bool:
+        """Say whether an editor shows it, where the node's parameters have these values."""
+        return all(one.holds(values[one.parameter]) for one in self.shown_if if one.parameter in values)
+
+    def check(self, value: Any) -> str | None:
+        """Say what is wrong with a value ("must be <= 1, got 3"), or None."""
+        if not accepts(value, self.type):
+            return f"must be {self._asked()}, got {_shown(value)}"
+        if value is None:
+            return self._check_choice(value) if self.choices is not None and not accepts(None, self.type) else None
+        if self.choices is not None:
+            wrong = self._check_choice(value)
+            if wrong is not None:
+                return wrong
+        if isinstance(value, Span) and not value.low <= value.high:
+            return f"must have low <= high, got {_shown(value)}"
+        for limit in self.limits:
+            wrong = breaks(limit, value)
+            if wrong is not None:
+                return f"{wrong}, got {_shown(value)}"
+        if isinstance(value, Colour) and not all(type(part) is int and 0 <= part <= 255 for part in value):
+            return f"must have red, green and blue from 0 to 255, got {value!r}"
+        return self._check_name(value) if self.pattern is not None else None
+
+    def _asked(self) -> str:
+        bare = bare_type(self.type)
+        if bare is Colour:
+            return 'a colour, as in hfg.Colour(255, 128, 0) or hfg.Colour.of("#ff8000")'
+        if self.kind == "interval":
+            return f"hfg.Span(low, high) of {describe((*typing.get_args(bare), Any)[0])}"
+        shape = self.shape
+        said = f"of type {describe(self.type)}"
+        return said if shape is None or typing.get_origin(bare) is tuple else f"{said} and shape {_shape(shape)}"
+
+    def _check_choice(self, value: Any) -> str | None:
+        several = self.kind == "choices" and isinstance(value, Collection)
+        for one in value if several else (value,):
+            if not any(_is_choice(one, known) for known in self.choices or ()):
+                return f"must {'hold only' if several else 'be one of'} {self._allowed()}, got {_shown(one)}"
+        return None
+
+    def _allowed(self) -> str:
+        """The choices, with what they are called where that is more than themselves."""
+        named = zip(self.choices or (), self.labels or self.choices or (), strict=True)
+        return ", ".join(repr(one) if _speaks(one, label) else f"{one!r} ({label})" for one, label in named)
+
+    def _check_name(self, value: Any) -> str | None:
+        name = os.fspath(value).replace("\\", "/").rpartition("/")[2]
+        patterns = str(self.pattern).split()
+        if any(fnmatch(name.lower(), one.lower()) for one in patterns):
+            return None
+        return f"must be the name of a file like {' or '.join(patterns)}, got {str(value)!r}"
+
+
+def _is_choice(value: Any, known: Any) -> bool:
+    numbers = isinstance(value, int | float) and isinstance(known, int | float)
+    return bool(value == known) if numbers else same(value, known)
+
+
+def _speaks(value: Any, label: Any) -> bool:
+    """Whether a value needs no label, for it is called so, or has a name itself."""
+    return str(label) == str(value) or not isinstance(value, bool | int | float | str) or hasattr(value, "name")
+
+
+def _shown(value: Any) -> str:
+    """A value on one line, not longer than a message may be."""
+    if isinstance(value, np.ndarray):
+        return describe_value(value)
+    told = " ".join(repr(value).split())
+    return told if len(told) <= 120 else told[:119] + "…"
+
+
+def _shape(shape: tuple[int | None, ...]) -> str:
+    return "x".join("any" if axis is None else str(axis) for axis in shape)

@@ -1,0 +1,153 @@
+"""Values that parameters have and Python has no type for, and what any value may be asked: equal? whose own?
+
+`Colour` and `Span` are plain tuples to whoever receives them. Stands on numpy; knows neither types nor ports.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Mapping, Set
+from typing import Any, Final, Generic, NamedTuple, TypeVar
+
+import msgspec
+import numpy as np
+
+__all__ = ["Colour", "Span", "own_copy", "same"]
+
+T = TypeVar("T")
+
+_HEX: Final = re.compile(r"#([0-9a-fA-F]{6}|[0-9a-fA-F]{3})")
+
+
+class Colour(NamedTuple):
+    """A colour: red, green and blue, 0 to 255 each.
+
+    Example:
+      >>> Colour.of("#ff8000")
+      Colour(red=255, green=128, blue=0)
+      >>> Colour(255, 128, 0).bgr  # as OpenCV wants it
+      (0, 128, 255)
+    """
+
+    red: int
+    green: int
+    blue: int
+
+    @classmethod
+    def of(cls, text: str) -> Colour:
+        """Read "#rrggbb", or "#rgb" for short.
+
+        Raises:
+          ValueError: the text is neither.
+        """
+        found = _HEX.fullmatch(text.strip())
+        if found is None:
+            raise ValueError(f'{text!r:.80} is no colour; write "#rrggbb", as in "#ff8000"')
+        digits = found[1] if len(found[1]) == 6 else "".join(2 * digit for digit in found[1])
+        return cls(*bytes.fromhex(digits))
+
+    @property
+    def hex(self) -> str:
+        """It as "#rrggbb"."""
+        return f"#{self.red:02x}{self.green:02x}{self.blue:02x}"
+
+    @property
+    def bgr(self) -> tuple[int, int, int]:
+        """Blue, green and red, the order of OpenCV."""
+        return (self.blue, self.green, self.red)
+
+
+class Span(NamedTuple, Generic[T]):
+    """An interval of numbers, low <= high; as a parameter, limits hold for both ends.
+
+    Example:
+      >>> band = Span(0.2, 0.8)
+      >>> 0.5 in band, band.low
+      (True, 0.2)
+    """
+
+    low: T
+    high: T
+
+    def __contains__(self, value: Any) -> bool:
+        """Say whether a number lies between the two, or is one of them."""
+        return bool(self.low <= value <= self.high)
+
+
+_ATOMS: Final = frozenset({bool, int, str, bytes, type(None), complex})
+_CONTAINERS: Final = frozenset({list, tuple, dict, set, frozenset})
+
+
+def same(one: Any, other: Any) -> bool:
+    """Say whether two values are equal, in type too; arrays by dtype, shape and elements, and nan equals nan.
+
+    What cannot be compared is the same only as itself.
+    """
+    if one is other:
+        return True
+    if isinstance(one, np.generic):
+        one = one.item()
+    if isinstance(other, np.generic):
+        other = other.item()
+    kind = type(one)
+    if kind is not type(other):
+        return False
+    if kind is float:
+        return bool(one == other) or (math.isnan(one) and math.isnan(other))
+    if kind in _ATOMS:
+        return bool(one == other)
+    try:
+        if isinstance(one, np.ndarray):
+            equal = one.dtype == other.dtype and one.shape == other.shape
+            return equal and np.array_equal(one, other, equal_nan=one.dtype.kind in "fc")
+        if isinstance(one, list | tuple):
+            return len(one) == len(other) and all(map(same, one, other))
+        if isinstance(one, Mapping):
+            return len(one) == len(other) and all(key in other and same(one[key], other[key]) for key in one)
+        if not isinstance(one, Set) and bool(one == other):
+            return True
+        parts = _fields(one)
+        if parts is not None:  # an array in a dataclass, which itself cannot say whether it is equal
+            return all(same(getattr(one, name), getattr(other, name)) for name in parts)
+        return bool(one == other)
+    except Exception:  # values of users raise what they like
+        return False
+
+
+def _fields(value: Any) -> tuple[str, ...] | None:
+    """The fields that say what a value is; None of what has none, or does not compare by them."""
+    if isinstance(value, msgspec.Struct):
+        return value.__struct_fields__ if value.__struct_config__.eq else None
+    if dataclasses.is_dataclass(value):
+        parameters: Any = getattr(type(value), "__dataclass_params__", None)
+        if parameters is not None and parameters.eq:
+            return tuple(item.name for item in dataclasses.fields(value) if item.compare)
+    return None
+
+
+def own_copy(value: Any) -> Any:
+    """Give a value that nobody else can change: containers are copied, and arrays, which are read-only from then on.
+
+    Other objects are what they are.
+    """
+    kind = type(value)
+    if kind in _ATOMS or kind is float:
+        return value
+    if isinstance(value, np.ndarray):
+        if not value.flags.writeable and value.flags.owndata:
+            return value
+        value = value.copy()
+        value.flags.writeable = False
+        return value
+    if kind not in _CONTAINERS:
+        return value
+    if kind is dict:
+        return {key: own_copy(one) for key, one in value.items()}
+    if kind is tuple:
+        parts = tuple(map(own_copy, value))
+        return value if all(a is b for a, b in zip(parts, value, strict=True)) else parts
+    if kind is list:
+        return list(map(own_copy, value))
+    return kind(value)
