@@ -8,6 +8,7 @@
     ├── MachineError          what is no state machine, as a description or a graph; `problems` holds all that is wrong
     ├── UsageError            a call at the wrong moment (a port outside a run, a second run, ...)
     │   └── NotRunning        the run that the call needs has not begun or is over
+    ├── EncodingError         a value that is no data, or data that is no value of the type it should be
     ├── TargetError           a TARGET of the command line that cannot be found or imported
     ├── RunError              a run that did not end well
     │   ├── NodeError         a node's own code failed; `__cause__` is its exception (rule X1)
@@ -37,6 +38,7 @@ __all__ = [
     "CheckFailed",
     "ConnectionError",
     "DeclarationError",
+    "EncodingError",
     "EndOfStream",
     "EngineInternalError",
     "Failure",
@@ -115,6 +117,10 @@ class UsageError(HfgError):
 
 class NotRunning(UsageError):
     """The call needs a run that has begun and is not over."""
+
+
+class EncodingError(HfgError, ValueError):
+    """A value that cannot be stored as plain data, or data that is no value of the type it should be."""
 
 
 class TargetError(HfgError):

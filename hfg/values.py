@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 import msgspec
@@ -96,6 +96,8 @@ def same(one: Any, other: Any) -> bool:
         return False
     if kind is float:
         return bool(one == other) or (math.isnan(one) and math.isnan(other))
+    if kind is complex:
+        return same(one.real, other.real) and same(one.imag, other.imag)
     if kind in _ATOMS:
         return bool(one == other)
     try:
@@ -106,10 +108,8 @@ def same(one: Any, other: Any) -> bool:
             return len(one) == len(other) and all(map(same, one, other))
         if isinstance(one, Mapping):
             return len(one) == len(other) and all(key in other and same(one[key], other[key]) for key in one)
-        if not isinstance(one, Set) and bool(one == other):
-            return True
         parts = _fields(one)
-        if parts is not None:  # an array in a dataclass, which itself cannot say whether it is equal
+        if parts is not None:  # one with an array in it cannot say itself whether it is equal
             return all(same(getattr(one, name), getattr(other, name)) for name in parts)
         return bool(one == other)
     except Exception:  # values of users raise what they like

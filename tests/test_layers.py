@@ -25,6 +25,7 @@ FLOORS = {
     "hfg.token": 0,
     "hfg.types": 0,
     "hfg.values": 0,
+    "hfg.encoding": 0,
     "hfg.limits": 0,
     "hfg.clock": 0,
     "hfg.frames": 0,

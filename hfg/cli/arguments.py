@@ -5,15 +5,13 @@ Stands on the types; runs nothing.
 
 from __future__ import annotations
 
-import ast
 import inspect
 import typing
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import msgspec
-
-from hfg.errors import TargetError
+from hfg.encoding import read_text
+from hfg.errors import EncodingError, TargetError
 from hfg.types import accepts, describe
 
 __all__ = ["builder_arguments"]
@@ -68,20 +66,12 @@ def _there_are(known: dict[str, inspect.Parameter], hints: dict[str, Any]) -> st
 
 
 def _value(where: str, name: str, text: str, hint: Any) -> Any:
-    """Read a text as a value of a type: as a Python literal, else as what converts, else as the text itself."""
     try:
-        literal = ast.literal_eval(text.strip())
-    except (ValueError, SyntaxError, MemoryError, RecursionError):
-        literal = text
-    for candidate in (text, literal) if hint is str else (literal, text):
-        if accepts(candidate, hint):
-            return candidate
-        try:
-            converted = msgspec.convert(candidate, hint, strict=False)
-        except Exception:  # types of users raise what they like
-            converted = _made(hint, candidate)
-        if converted is not None and accepts(converted, hint):
-            return converted
+        return read_text(text, hint, where=f'{where}: argument "{name}"')
+    except EncodingError:
+        made = _made(hint, text)
+        if made is not None and accepts(made, hint):
+            return made
     raise TargetError(f'{where}: argument "{name}" must be of type {describe(hint)}, got {text!r:.80}')
 
 

@@ -1,4 +1,4 @@
-"""`--param path=value`: finds the parameter, reads the value as a Python literal and sets it.
+"""`--param path=value`: finds the parameter, reads the value by its declared type and sets it.
 
 Stands on the graph floor.
 """
@@ -9,8 +9,9 @@ import ast
 from collections.abc import Iterable
 from typing import Any
 
-from hfg.errors import GraphError, TargetError
+from hfg.errors import EncodingError, GraphError, TargetError
 from hfg.graph import Graph
+from hfg.ports import ParameterPort
 
 __all__ = ["set_parameters"]
 
@@ -48,14 +49,24 @@ def _node(graph: Graph, path: str) -> Any:
     return found
 
 
-def _set(port: Any, path: str, text: str) -> None:
+def _set(port: ParameterPort[Any], path: str, text: str) -> None:
     try:
-        value = ast.literal_eval(text.strip())
-    except (ValueError, SyntaxError, MemoryError, RecursionError):
-        value = text
+        value = port.spec.read_text(text)
+    except EncodingError as error:
+        wrong = port.spec.check(_literal(text))
+        raise TargetError(str(error) if wrong is None else f'parameter "{path}" {wrong}') from None
     complaint = port.spec.check(value)
-    if complaint is not None and port.spec.check(text) is None:
-        value, complaint = text, None  # "3" for a parameter that is a text
     if complaint is not None:
         raise TargetError(f'parameter "{path}" {complaint}')
-    port.value = value
+    try:
+        port.value = value
+    except ValueError as error:  # only its node sets it, or one inside a subgraph refuses
+        raise TargetError(str(error)) from error
+
+
+def _literal(text: str) -> Any:
+    """What the text looks like, for a message."""
+    try:
+        return ast.literal_eval(text.strip())
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        return text

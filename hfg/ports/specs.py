@@ -14,6 +14,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from hfg import encoding
 from hfg.limits import breaks, numbers_within
 from hfg.ports.conditions import Condition
 from hfg.ports.kinds import ParameterKind, kind_of_type, shape_of
@@ -121,6 +122,50 @@ class ParameterSpec(msgspec.Struct, frozen=True):
     def is_shown(self, values: Mapping[str, Any]) -> bool:
         """Say whether an editor shows it, where the node's parameters have these values."""
         return all(one.holds(values[one.parameter]) for one in self.shown_if if one.parameter in values)
+
+    def encode(self, value: Any) -> Any:
+        """Give a value as plain data, as files and commands hold it: a choice by what it is called, if it is.
+
+        Raises:
+          EncodingError: it is no data.
+        """
+        if self.labels and self.kind == "choice":
+            label = self.label(value)
+            if same(self._labelled(label), (value,)):
+                return label
+        return encoding.encode(value, self.type)
+
+    def decode(self, data: Any, find: encoding.Find | None = None) -> Any:
+        """Give the value that plain data stands for; limits are not looked at, `check` does that.
+
+        Args:
+          data: as `encode` gave it, or a person wrote it.
+          find: as `hfg.encoding.decode` has it.
+
+        Raises:
+          EncodingError: it stands for none of the parameter's type.
+        """
+        chosen = self._labelled(data)
+        if chosen:
+            return chosen[0]
+        return encoding.decode(data, self.type, where=f'parameter "{self.name}"', find=find)
+
+    def read_text(self, text: str, find: encoding.Find | None = None) -> Any:
+        """Give the value that somebody means who writes a text for it, as on the command line.
+
+        Raises:
+          EncodingError: it is none of the parameter's type.
+        """
+        chosen = self._labelled(text)
+        if chosen:
+            return chosen[0]
+        return encoding.read_text(text, self.type, where=f'parameter "{self.name}"', find=find)
+
+    def _labelled(self, data: Any) -> tuple[Any, ...]:
+        """Give the choice that is called so; nothing for what is a choice itself, or none."""
+        if type(data) is not str or self.kind != "choice" or any(same(data, one) for one in self.choices or ()):
+            return ()
+        return next(((one,) for label, one in zip(self.labels, self.choices or (), strict=False) if label == data), ())
 
     def check(self, value: Any) -> str | None:
         """Say what is wrong with a value ("must be <= 1, got 3"), or None."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import msgspec
 
 from hfg import registry
-from hfg.errors import GraphError, HfgError
+from hfg.encoding import decode, has_tag
+from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing.commands import Replace
 from hfg.nodetype import Node
 from hfg.ports import ParameterSpec
@@ -37,24 +39,24 @@ def made(reference: str, parameters: dict[str, Any], path: str) -> Node:
 
 
 def as_meant(value: object, hint: object) -> object:
-    """What came over a wire may have lost its type: a list stands for a tuple, a text for an enum's member."""
-    return _converted(value, hint, lambda one: accepts(one, hint))
+    """What came over a wire or from a file may stand for a value: a list for a tuple, a text for a path."""
+    return _meant(value, partial(decode, hint=hint), lambda one: accepts(one, hint))
 
 
 def fitting(spec: ParameterSpec, value: object) -> object:
     """The same for a value of a parameter, which may have limits."""
-    return _converted(value, spec.type, lambda one: spec.check(one) is None)
+    return _meant(value, spec.decode, lambda one: spec.check(one) is None)
 
 
-def _converted(value: object, hint: Any, fits: Callable[[object], bool]) -> object:  # noqa: ANN401 - any type
+def _meant(value: object, decoded: Callable[[object], object], fits: Callable[[object], bool]) -> object:
     """A value as one of the type; what cannot be one is left as it is, for whoever checks it."""
-    if fits(value):
+    if not has_tag(value) and fits(value):
         return value
     try:
-        converted = msgspec.convert(value, hint)
-    except Exception:  # types of users raise what they like
+        found = decoded(value)
+    except EncodingError:
         return value
-    return converted if fits(converted) else value
+    return found if fits(found) else value
 
 
 def kept(old: Node, command: Replace) -> dict[str, Any]:
@@ -69,7 +71,8 @@ def kept(old: Node, command: Replace) -> dict[str, Any]:
         raise GraphError(f'node "{command.path}": {error}') from error
     values = {}
     for name, value in old._parameters.items():
-        if name not in specs or specs[name].trigger or name in command.parameters:
+        both = name in specs and specs[name].is_given and old._type.parameters[name].is_given
+        if not both or name in command.parameters:
             continue
         values[name] = _as_now(specs[name], value)
         problem = specs[name].check(values[name])

@@ -53,6 +53,7 @@ from hfg.graph.structure.promoting import refuse_standing, stands_for
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
 from hfg.ports import ParameterPort, Port
+from hfg.values import same
 
 __all__ = ["perform"]
 
@@ -415,7 +416,7 @@ class _Hand:
         """Let other options hold of an edge, if they are others."""
         options = edge_options(lambda: f'"{edge.label}"', msgspec.structs.asdict(edge.options) | said)
         refuse(around, edge.source, edge.target, options)
-        if options != edge.options:
+        if not same(options, edge.options):
             self.do(EdgeSwap(around, edge, Edge(edge.source, edge.target, options)))
 
     def _operators(self, command: c.Connect | c.SetEdge) -> tuple[Any, ...]:
@@ -428,7 +429,15 @@ class _Hand:
                     f"{where}: a command says operators by name, got {one!r}; "
                     'write commands.Operator("reactivex.operators:debounce", (0.2,))'
                 )
-        return tuple(find_operator(one.type, one.arguments, one.parameters, where) for one in command.through)
+        return tuple(
+            find_operator(
+                one.type,
+                tuple(as_meant(value, Any) for value in one.arguments),
+                {name: as_meant(value, Any) for name, value in one.parameters.items()},
+                where,
+            )
+            for one in command.through
+        )
 
     def _edge(self, source_path: str, target_path: str) -> tuple[Level, Edge]:
         source, target = source_at(self.root, source_path), target_at(self.root, target_path)

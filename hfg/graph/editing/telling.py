@@ -6,20 +6,24 @@ themselves, and so that what is told is seen to be true. Stands on `performing`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from hfg.errors import GraphError, HfgError
+from hfg.encoding import encode
+from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing import commands as c
 from hfg.graph.editing.enclosing import Enclosed
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.type_texts import text_of_type
-from hfg.graph.structure.edge import Edge, is_feed
+from hfg.graph.structure.edge import Edge, is_feed, type_of
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.operators import NamedOperator
 from hfg.graph.structure.options import EdgeOptions, NodeOptions
 from hfg.graph.structure.subgraph import Subgraph, inside, is_box
 from hfg.graph.structure.whole import Whole
 from hfg.nodetype import Node
+from hfg.values import same
 
 __all__ = ["as_commands"]
 
@@ -88,7 +92,7 @@ class _Telling:
                 inner, inner_made = inside(node), inside(made.nodes[name])
                 if inner is None or inner_made is None:
                     continue
-                if _same(_shape(inner), _shape(inner_made)):
+                if same(_shape(inner), _shape(inner_made)):
                     self._tell_values(node, inner, inner_made)
                     continue
                 self._clear(node, inner_made)
@@ -116,18 +120,19 @@ class _Telling:
         Raises:
           GraphError: something else is different, too.
         """
-        same = _walk(made)
+        there = _walk(made)
         for path, one in _walk(inner).items():
-            other = same[path]
+            other = there[path]
             for name, value in one._parameters.items():
-                if one._type.parameters[name].is_port and not _same(other._parameters[name], value):
-                    self.say(c.SetParameter(f"{path}.{name}", value))
+                spec = one._type.parameters[name]
+                if spec.is_port and spec.is_given and not same(other._parameters[name], value):
+                    self.say(c.SetParameter(f"{path}.{name}", _data(spec.encode, value)))
             if one._options.enabled != other._options.enabled:
                 self.say(c.Enable(path) if one._options.enabled else c.Disable(path))
             if one._options.group != other._options.group:
                 self.say(c.Move(path, one._options.group))
         for path, one in _walk(inner).items():
-            if one._options != same[path]._options or not _same(one._parameters, same[path]._parameters):
+            if one._options != there[path]._options or not same(_given(one), _given(there[path])):
                 raise self._not_as_built(node)
 
     def _clear(self, node: Node, made: Level) -> None:
@@ -187,7 +192,24 @@ def _text(hint: object, where: str) -> str:
 def _parameters(node: Node) -> dict[str, Any]:
     """The values that are not what the type gives by itself."""
     specs = node._type.parameters
-    return {name: value for name, value in node._parameters.items() if not _same(specs[name].default, value)}
+    return {
+        name: _data(specs[name].encode, value)
+        for name, value in node._parameters.items()
+        if specs[name].is_given and not same(specs[name].default, value)
+    }
+
+
+def _data(encoded: Callable[[Any], Any], value: object) -> object:
+    """Plain data, so that the command can be written down; what is none is said as it is, for this process alone."""
+    try:
+        return encoded(value)
+    except EncodingError:
+        return value
+
+
+def _given(node: Node) -> dict[str, Any]:
+    """What users gave its parameters."""
+    return {name: value for name, value in node._parameters.items() if node._type.parameters[name].is_given}
 
 
 def _others(said: Any, plain: Any) -> dict[str, Any]:  # noqa: ANN401 - options of nodes or of edges
@@ -203,6 +225,8 @@ def _connected(edge: Edge) -> c.Connect:
     said = _others(edge.options, _PLAIN_EDGE)
     if edge.overflow == "latest":
         del said["capacity"]  # it is 1 by that
+    if "initial" in said:
+        said["initial"] = tuple(_data(partial(encode, hint=type_of(edge.target)), one) for one in edge.options.initial)
     if edge.options.through:
         said["through"] = tuple(_operator(edge, one) for one in edge.options.through)
     return c.Connect(edge.source.path, edge.target.path, **said)
@@ -216,20 +240,11 @@ def _operator(edge: Edge, operator: object) -> c.Operator:
             "make it by a function at the top of a module with @hfg.operator, or by one of reactivex, as in "
             "hfg.operator(ops.debounce)(0.2)"
         )
-    return c.Operator(reference, operator.arguments, operator.parameters)
+    arguments = tuple(_data(encode, one) for one in operator.arguments)
+    return c.Operator(reference, arguments, {name: _data(encode, one) for name, one in operator.parameters.items()})
 
 
 # --- what is the same ---
-
-
-def _same(one: object, other: object) -> bool:
-    """Whether two values are equal; arrays and others that do not say it count as the same if they are the same."""
-    if one is other:
-        return True
-    try:
-        return bool(one == other)
-    except Exception:  # values of users raise what they like
-        return False
 
 
 def _walk(level: Level) -> dict[str, Node]:

@@ -1,0 +1,621 @@
+"""Any value as plain data, what YAML and JSON hold, and back by its declared type.
+
+What the type tells is not written: an enum is its name, a path its text, a colour "#rrggbb", an array a nested list, a
+set a sorted list, a dataclass or struct its fields, a function or class "module:name". Where the type does not tell,
+`Any` or a union, the data does: `{"$type": "path", "value": "a.png"}`. What was encoded is decoded as the same value,
+or not encoded at all. Stands on types and values; knows no parameter, and runs no code but that of the modules that are
+named, which `find` imports or refuses to.
+"""
+
+from __future__ import annotations
+
+import ast
+import base64
+import binascii
+import dataclasses
+import datetime
+import decimal
+import enum
+import importlib
+import math
+import os
+import sys
+import types
+import typing
+import uuid
+from collections import abc
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path, PurePath
+from typing import Any, Final, Literal
+
+import msgspec
+import numpy as np
+
+from hfg.errors import EncodingError
+from hfg.types import accepts, bare_type, describe, describe_value
+from hfg.values import Colour, Span, same
+
+__all__ = ["TAG", "decode", "encode", "find_reference", "has_tag", "read_text", "reference_to"]
+
+TAG: Final = "$type"
+"""The key of data that says of itself what it is."""
+
+_TEXTS: Final = (
+    datetime.datetime,
+    datetime.date,
+    datetime.time,
+    datetime.timedelta,
+    decimal.Decimal,
+    uuid.UUID,
+)
+"""What is written as a text that msgspec reads."""
+
+_AS_LIST: Final = (list, abc.Sequence, abc.MutableSequence, abc.Collection, abc.Iterable)
+_AS_SET: Final = {set: set, abc.MutableSet: set, frozenset: frozenset, abc.Set: frozenset}
+_AS_DICT: Final = (dict, abc.Mapping, abc.MutableMapping)
+_CODE: Final = (types.FunctionType, types.BuiltinFunctionType, type, abc.Callable, Callable)
+_INEXACT: Final = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+_LONGEST_ITEM: Final = 2**16  # bytes of one text in an array: what asks for more means harm
+_WORDS: Final = {"true": True, "false": False, "none": None, "null": None}
+
+Find = Callable[[str], Any]
+
+
+def encode(value: Any, hint: Any = Any) -> Any:
+    """Give a value as plain data: None, booleans, numbers, texts, lists, and dicts with texts as keys.
+
+    Args:
+      value: anything that is data.
+      hint: its declared type, with which it will be decoded.
+
+    Raises:
+      EncodingError: it is no data, or would come back as another value.
+
+    Example:
+      >>> encode({"path": Path("a/b.png"), "frame": Colour(255, 128, 0)}, dict[str, Path | Colour])
+      {'path': {'$type': 'path', 'value': 'a/b.png'}, 'frame': {'$type': 'colour', 'value': '#ff8000'}}
+      >>> encode(Colour(255, 128, 0), Colour)
+      '#ff8000'
+    """
+    try:
+        for tagged in (False, True):
+            data = _plain(value, tagged)
+            if _comes_back(data, hint, value):
+                return data
+    except RecursionError:
+        raise EncodingError("a value that contains itself, or is nested too deep, cannot be stored") from None
+    if not accepts(value, hint):
+        raise EncodingError(f"{describe_value(value)} is no {describe(hint)}, so it cannot be stored as one")
+    raise EncodingError(f"{describe_value(value)} cannot be stored: read again it would be another value")
+
+
+def _comes_back(data: Any, hint: Any, value: Any) -> bool:
+    try:
+        return same(_decode(data, hint, "", _already_imported), value)
+    except EncodingError:
+        return False
+
+
+def decode(data: Any, hint: Any = Any, *, where: str = "the value", find: Find | None = None) -> Any:
+    """Give the value of a type that plain data stands for; data that is such a value already is what it is.
+
+    Args:
+      data: as `encode` gave it, or a person wrote it; tuples stand for lists.
+      hint: the declared type.
+      where: what messages call it.
+      find: gives what "module:name" stands for, by default importing the module; raises what it likes to refuse that.
+
+    Raises:
+      EncodingError: it is none; the message says which part, what was expected and found.
+
+    Example:
+      >>> decode(["a.png", "b.png"], tuple[Path, ...])[1].suffix
+      '.png'
+      >>> decode("red", Colour)
+      Traceback (most recent call last):
+      hfg.errors.EncodingError: the value must be Colour, got 'red'
+    """
+    try:
+        return _decode(data, hint, where, find or find_reference)
+    except RecursionError:
+        raise EncodingError(f"{where} contains itself, or is nested too deep") from None
+
+
+def has_tag(data: Any) -> bool:
+    """Say whether data says of itself, somewhere in it, what it is."""
+    if isinstance(data, dict):
+        return TAG in data or any(map(has_tag, data.values()))
+    return isinstance(data, list | tuple) and any(map(has_tag, data))
+
+
+def read_text(text: str, hint: Any = Any, *, where: str = "the value", find: Find | None = None) -> Any:
+    """Give the value that somebody means who writes a text for it, as on the command line.
+
+    It is read as a Python literal, as true, false or none, as the text itself, or as a list with commas in it.
+
+    Raises:
+      EncodingError: it is none of the type.
+
+    Example:
+      >>> read_text("0.2, 0.8", Span[float]), read_text("a, b", list[str]), read_text("3", str)
+      (Span(low=0.2, high=0.8), ['a', 'b'], '3')
+    """
+    first: EncodingError | None = None
+    for data in _readings(text, hint):
+        try:
+            return decode(data, hint, where=where, find=find)
+        except EncodingError as error:
+            first = first or error
+    raise EncodingError(f"{where} must be {describe(hint)}, got {text!r:.80}") from first
+
+
+def _readings(text: str, hint: Any) -> Iterable[Any]:
+    if accepts(text, hint) and bare_type(hint) is not Any:
+        yield text
+    try:
+        yield ast.literal_eval(text.strip())
+    except (ValueError, SyntaxError, MemoryError, RecursionError, TypeError):
+        if text.strip().lower() in _WORDS:
+            yield _WORDS[text.strip().lower()]
+    yield text
+    if bare_type(hint) is not Any:
+        yield [part.strip() for part in text.split(",")] if text.strip() else []
+
+
+# --- references ---
+
+
+def reference_to(value: Any) -> str | None:
+    """Give "module:name" of a function or class; None for what cannot be found by that."""
+    module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
+    if module is None and isinstance(name, str) and hasattr(value, "__name__"):  # functions of C libraries
+        return None
+    if not isinstance(module, str) or not isinstance(name, str) or _found(module, name) is not value:
+        return None
+    return f"{module}:{name}"
+
+
+def find_reference(reference: str) -> Any:
+    """Import the module and give what "module:name" stands for.
+
+    Raises:
+      EncodingError: there is none.
+    """
+    module, colon, name = reference.partition(":")
+    if not (module and colon and name):
+        raise EncodingError(f'{reference!r:.80} is no reference; write "module:name", as in "my_robot.types:Pose"')
+    try:
+        importlib.import_module(module)
+    except Exception as error:  # a module may raise what it likes
+        raise EncodingError(f'"{reference}": importing "{module}" failed ({type(error).__name__}: {error})') from error
+    return _already_imported(reference)
+
+
+def _already_imported(reference: str) -> Any:
+    module, _, name = reference.partition(":")
+    found = _found(module, name)
+    if found is None:
+        raise EncodingError(f'"{reference}": module "{module}" has no "{name}"')
+    return found
+
+
+def _found(module: str, name: str) -> Any:
+    found: Any = sys.modules.get(module)
+    for part in name.split("."):
+        found = getattr(found, part, None)
+    return found
+
+
+# --- from values ---
+
+
+def _plain(value: Any, tagged: bool) -> Any:
+    """Give data; `tagged`: what is not plain says what it is."""
+    kind = type(value)
+    if value is None or kind in (bool, int, str):
+        return value
+    if isinstance(value, np.generic):
+        return _plain(value.item(), tagged)
+    if isinstance(value, float) and kind is float:
+        return value if math.isfinite(value) else _tag("float", _inexact(value), tagged)
+    if kind is list:
+        return [_plain(one, tagged) for one in value]
+    if kind is dict:
+        if TAG not in value and all(type(key) is str for key in value):
+            return {key: _plain(one, tagged) for key, one in value.items()}
+        return _tag("dict", [[_plain(key, tagged), _plain(one, tagged)] for key, one in value.items()], tagged)
+    if kind is tuple:
+        return _tag("tuple", [_plain(one, tagged) for one in value], tagged)
+    if kind in (set, frozenset):
+        return _tag(kind.__name__, sorted((_plain(one, tagged) for one in value), key=_order), tagged)
+    if isinstance(value, np.ndarray):
+        return _plain_array(value, tagged)
+    return _plain_object(value, tagged)
+
+
+def _plain_object(value: Any, tagged: bool) -> Any:
+    kind = type(value)
+    if isinstance(value, enum.Flag):
+        return _tag_of(kind, [one.name for one in value], tagged)
+    if isinstance(value, enum.Enum):
+        return _tag_of(kind, value.name, tagged)
+    if kind is Colour:
+        return _tag("colour", _hex(value), tagged)
+    if kind is Span:
+        return _tag("span", [_plain(one, tagged) for one in value], tagged)
+    if isinstance(value, PurePath):
+        return _tag("path", value.as_posix(), tagged)
+    if kind is bytes:
+        return _tag("bytes", base64.b64encode(value).decode(), tagged)
+    if kind is complex:
+        return _tag("complex", str(value), tagged)
+    if isinstance(value, _TEXTS):
+        return _tag_of(kind, msgspec.to_builtins(value), tagged)
+    fields = _fields_of(kind)
+    if fields is not None:
+        return _tag_of(kind, {name: _plain(getattr(value, name), tagged) for name in fields}, tagged)
+    if isinstance(value, type) or callable(value):
+        reference = reference_to(value)
+        if reference is not None:
+            return _tag("reference", reference, tagged)
+        raise EncodingError(f"{value!r:.80} cannot be found by a name, so it cannot be stored; define it in a module")
+    raise EncodingError(
+        f"{describe_value(value)} is no data that can be stored; use plain values, arrays, dataclasses or structs"
+    )
+
+
+def _tag(name: str, data: Any, tagged: bool) -> Any:
+    return {TAG: name, "value": data} if tagged else data
+
+
+def _tag_of(kind: type, data: Any, tagged: bool) -> Any:
+    if not tagged:
+        return data
+    reference = reference_to(kind)
+    if reference is None:
+        raise EncodingError(f"{kind.__qualname__} cannot be found by a name, so no value of it can be stored")
+    return {TAG: reference, "value": data}
+
+
+def _inexact(value: float) -> str:
+    return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
+
+
+def _hex(value: Colour) -> str:
+    if not all(type(part) is int and 0 <= part <= 255 for part in value):
+        raise EncodingError(f"{value!r} is no colour: red, green and blue are from 0 to 255")
+    return value.hex
+
+
+def _order(data: Any) -> tuple[str, Any]:
+    number = isinstance(data, int | float)
+    return ("" if number else type(data).__name__, data if number or isinstance(data, str) else repr(data))
+
+
+def _plain_array(value: np.ndarray[Any, Any], tagged: bool) -> Any:
+    if value.dtype.kind not in "biufcSU":
+        raise EncodingError(f"{describe_value(value)} cannot be stored; numbers, truth values and texts can")
+    items = value.astype(str) if value.dtype.kind == "S" else value
+    data = items.tolist() if value.dtype.kind in "biuSU" else _numbers(items.tolist())
+    if not tagged:
+        return data
+    name = value.dtype.name if value.dtype.isnative and value.dtype.kind in "biufc" else value.dtype.str
+    return {TAG: "array", "dtype": name, "shape": list(value.shape), "value": data}
+
+
+def _numbers(data: Any) -> Any:
+    """Write those that JSON has no number for as texts."""
+    if isinstance(data, list):
+        return [_numbers(one) for one in data]
+    if isinstance(data, complex):
+        return str(data)
+    return data if math.isfinite(data) else _inexact(data)
+
+
+def _fields_of(kind: Any) -> tuple[str, ...] | None:
+    """Give the names of what a dataclass, struct or named tuple is made of; None of others."""
+    if not isinstance(kind, type):
+        return None
+    if issubclass(kind, msgspec.Struct):
+        return kind.__struct_fields__
+    if dataclasses.is_dataclass(kind):
+        return tuple(one.name for one in dataclasses.fields(kind) if one.init)
+    names = getattr(kind, "_fields", None)
+    return names if issubclass(kind, tuple) and isinstance(names, tuple) else None
+
+
+# --- back to values ---
+
+
+def _decode(data: Any, hint: Any, where: str, find: Find) -> Any:
+    if isinstance(data, dict) and TAG in data:
+        value = _untagged(data, where, find)
+    else:
+        value = _Decoder(where, find, hint).value(data, hint)
+    if not accepts(value, hint):
+        raise _refusal(where, hint, data)
+    return value
+
+
+def _refusal(where: str, hint: Any, data: Any) -> EncodingError:
+    return EncodingError(f"{where} must be {describe(hint)}, got {data!r:.80}")
+
+
+def _untagged(data: dict[str, Any], where: str, find: Find) -> Any:
+    """Give what data says that it is."""
+    name = data[TAG]
+    if not isinstance(name, str) or "value" not in data:
+        raise EncodingError(f'{where} has "{TAG}" but does not say of which type which "value" is, got {data!r:.80}')
+    inner = data["value"]
+    if name == "array":
+        return _array(data, where)
+    hint = _TAGGED.get(name)
+    if hint is None:
+        hint = find(name)
+        if not _is_data(hint):
+            raise EncodingError(f'{where} is of type "{name}", which is no type of data')
+    elif name == "dict":
+        return _pairs(inner, Any, Any, where, find)
+    return _decode(inner, hint, where, find)
+
+
+_TAGGED: Final[dict[str, Any]] = {
+    "float": float,
+    "dict": dict,
+    "tuple": tuple,
+    "set": set,
+    "frozenset": frozenset,
+    "colour": Colour,
+    "span": Span,
+    "path": Path,
+    "bytes": bytes,
+    "complex": complex,
+    "reference": Callable,
+}
+
+
+def _is_data(kind: Any) -> bool:
+    """Whether values of a class are made of data alone, so that reading one runs none but its own checks."""
+    return isinstance(kind, type) and (issubclass(kind, (enum.Enum, *_TEXTS)) or _fields_of(kind) is not None)
+
+
+def _array(data: dict[str, Any], where: str) -> Any:
+    try:
+        dtype = np.dtype(data.get("dtype", "float64"))
+        if dtype.kind not in "biufcSU" or dtype.itemsize > _LONGEST_ITEM:
+            raise ValueError(f"an array of {dtype} is no data")
+        made = np.array(data["value"], dtype=dtype)
+        return made.reshape(data["shape"]) if "shape" in data else made
+    except (ValueError, TypeError, OverflowError) as error:
+        raise EncodingError(f"{where} is no array ({error})") from None
+
+
+def _pairs(data: Any, key: Any, item: Any, where: str, find: Find) -> dict[Any, Any]:
+    if isinstance(data, Mapping):
+        data = list(data.items())
+    if not _is_list(data) or not all(_is_list(one) and len(one) == 2 for one in data):
+        raise EncodingError(f"{where} must be a mapping, or a list of pairs [key, value], got {data!r:.80}")
+    try:
+        return {
+            _decode(one, key, f"{where}, key {one!r:.40}", find): _decode(other, item, f"{where}[{one!r:.40}]", find)
+            for one, other in data
+        }
+    except TypeError as error:  # a key that cannot be one
+        raise EncodingError(f"{where} has a key that cannot be one ({error})") from None
+
+
+def _is_list(data: Any) -> bool:
+    return type(data) in (list, tuple)
+
+
+class _Decoder:
+    """Reads data as one type; a method for each manner of types."""
+
+    def __init__(self, where: str, find: Find, hint: Any) -> None:
+        self.where = where
+        self.find = find
+        self.hint = hint
+
+    def refuse(self, data: Any) -> EncodingError:
+        return _refusal(self.where, self.hint, data)
+
+    def each(self, data: Any, hint: Any) -> list[Any]:
+        if not _is_list(data):
+            raise self.refuse(data)
+        return [_decode(one, hint, f"{self.where}[{number}]", self.find) for number, one in enumerate(data)]
+
+    def value(self, data: Any, hint: Any) -> Any:
+        bare = bare_type(hint)
+        if hasattr(bare, "__supertype__"):
+            return self.value(data, bare.__supertype__)
+        origin, arguments = typing.get_origin(bare), typing.get_args(bare)
+        if bare in (Any, object):
+            return self.untyped(data)
+        if origin in (typing.Union, types.UnionType):
+            return self.union(data, arguments)
+        if origin is Literal:
+            return self.literal(data, arguments)
+        if bare is np.ndarray or origin is np.ndarray:
+            return self.array(data, arguments)
+        cls = origin or bare
+        if cls is Span:
+            return self.span(data, arguments)
+        if cls is tuple:
+            return self.tuple(data, arguments)
+        if cls in _AS_LIST:
+            return data if isinstance(data, str) and cls is not list else self.each(data, (*arguments, Any)[0])
+        if cls in _AS_SET:
+            listed = sorted(data, key=_order) if type(data) in (set, frozenset) else data
+            return self.set_of(_AS_SET[cls], self.each(listed, (*arguments, Any)[0]))
+        if cls in _AS_DICT:
+            key, item = arguments if len(arguments) == 2 else (Any, Any)
+            return _pairs(data, key, item, self.where, self.find)
+        if cls in _CODE:
+            return self.code(data)
+        return self.instance(data, bare)
+
+    def set_of(self, cls: Any, items: list[Any]) -> Any:
+        try:
+            return cls(items)
+        except TypeError as error:
+            raise EncodingError(f"{self.where} has a member that cannot be one ({error})") from None
+
+    def untyped(self, data: Any) -> Any:
+        if type(data) is list:
+            return self.each(data, Any)
+        if type(data) is dict:
+            return {key: _decode(one, Any, f"{self.where}[{key!r:.40}]", self.find) for key, one in data.items()}
+        return data
+
+    def union(self, data: Any, members: tuple[Any, ...]) -> Any:
+        """What the data is as it stands, if a member is that; else the first that it can be."""
+        found: list[Any] = []
+        for member in members:
+            try:
+                found.append(_decode(data, member, self.where, self.find))
+            except EncodingError:
+                continue
+        if not found:
+            raise self.refuse(data)
+        return next((one for one in found if same(one, data)), found[0])
+
+    def literal(self, data: Any, members: tuple[Any, ...]) -> Any:
+        for one in members:
+            if same(one, data) or (isinstance(one, enum.Enum) and one.name == data):
+                return one
+        raise self.refuse(data)
+
+    def array(self, data: Any, arguments: tuple[Any, ...]) -> Any:
+        if isinstance(data, np.ndarray):
+            return data
+        dtypes = typing.get_args(arguments[1]) if len(arguments) > 1 else ()
+        scalar = bare_type(dtypes[0]) if dtypes else None
+        concrete = isinstance(scalar, type) and issubclass(scalar, np.generic) and not _is_open(scalar)
+        try:
+            made = np.array(data, dtype=scalar if concrete else None)
+        except (ValueError, TypeError, OverflowError):
+            raise self.refuse(data) from None
+        if made.dtype.kind not in "biufcSU":
+            raise self.refuse(data)
+        wanted = getattr(self.hint, "__metadata__", ())
+        empty = [one.axes for one in wanted if hasattr(one, "axes") and made.size == 0]
+        if empty and len(empty[0]) > made.ndim:  # [] is an array of no points, too
+            made = made.reshape((*made.shape, *(axis or 0 for axis in empty[0][made.ndim :])))
+        return made
+
+    def span(self, data: Any, arguments: tuple[Any, ...]) -> Any:
+        if type(data) is Span:
+            return data
+        ends = self.each(data, (*arguments, Any)[0])
+        if len(ends) != 2:
+            raise self.refuse(data)
+        return Span(*ends)
+
+    def tuple(self, data: Any, arguments: tuple[Any, ...]) -> Any:
+        if not arguments or arguments[1:] == (...,):
+            return tuple(self.each(data, (*arguments, Any)[0]))
+        wanted = () if arguments == ((),) else arguments
+        if not _is_list(data) or len(data) != len(wanted):
+            raise self.refuse(data)
+        return tuple(
+            _decode(one, hint, f"{self.where}[{number}]", self.find)
+            for number, (one, hint) in enumerate(zip(data, wanted, strict=True))
+        )
+
+    def code(self, data: Any) -> Any:
+        if not isinstance(data, str):
+            if callable(data):
+                return data
+            raise self.refuse(data)
+        return self.find(data)
+
+    def instance(self, data: Any, cls: Any) -> Any:
+        """One of a class that is no container."""
+        if not isinstance(cls, type):
+            return data
+        if issubclass(cls, enum.Enum):
+            return data if isinstance(data, cls) else self.member(data, cls)
+        if _is_instance(data, cls):
+            return data
+        if cls is float and data in _INEXACT:
+            return _INEXACT[data]
+        if cls is Colour:
+            return self.colour(data)
+        if issubclass(cls, os.PathLike) and isinstance(data, str):
+            return typing.cast(Any, cls)(data)  # paths are made of texts
+        if cls in (bytes, complex) and isinstance(data, str):
+            return self.made_of_text(cls, data)
+        if _fields_of(cls) is not None:
+            return self.fields(data, cls)
+        try:
+            return msgspec.convert(data, cls)
+        except Exception:  # types of users raise what they like
+            raise self.refuse(data) from None
+
+    def member(self, data: Any, cls: Any) -> Any:
+        """By name; a flag by several; else by value, as people write it."""
+        if issubclass(cls, enum.Flag) and _is_list(data) and all(name in cls.__members__ for name in data):
+            found = cls(0)
+            for name in data:
+                found |= cls[name]
+            return found
+        if isinstance(data, str) and data in cls.__members__:
+            return cls[data]
+        try:
+            return cls(tuple(data) if type(data) is list else data)
+        except (ValueError, TypeError, KeyError):
+            names = ", ".join(cls.__members__)
+            raise EncodingError(f"{self.where} must be {describe(cls)}, one of {names}, got {data!r:.80}") from None
+
+    def colour(self, data: Any) -> Colour:
+        if isinstance(data, str):
+            try:
+                return Colour.of(data)
+            except ValueError:
+                raise EncodingError(f'{self.where} must be a colour, as in "#ff8000", got {data!r:.80}') from None
+        if not _is_list(data) or len(data) != 3 or not all(type(one) is int and 0 <= one <= 255 for one in data):
+            raise EncodingError(f'{self.where} must be a colour, as in "#ff8000" or [255, 128, 0], got {data!r:.80}')
+        return Colour(*data)
+
+    def made_of_text(self, cls: Any, data: str) -> Any:
+        try:
+            return complex(data) if cls is complex else base64.b64decode(data, validate=True)
+        except (ValueError, binascii.Error):
+            raise self.refuse(data) from None
+
+    def fields(self, data: Any, cls: Any) -> Any:
+        names = _fields_of(cls) or ()
+        if _is_list(data) and issubclass(cls, tuple):
+            data = dict(zip(names, data, strict=False)) if len(data) <= len(names) else None
+        if not isinstance(data, dict):
+            raise self.refuse(data)
+        unknown = next((name for name in data if name not in names), None)
+        if unknown is not None:
+            raise EncodingError(
+                f"{self.where} has no {unknown!r:.40}: {describe(cls)} has {', '.join(names) or 'nothing'}"
+            )
+        try:
+            hints = typing.get_type_hints(cls, include_extras=True)
+        except Exception:  # names that exist for type checkers alone
+            hints = {}
+        values = {
+            name: _decode(one, hints.get(name, Any), f"{self.where}.{name}", self.find) for name, one in data.items()
+        }
+        try:
+            return cls(**values)
+        except Exception as error:  # of users, who check what they hold
+            raise EncodingError(f"{self.where} is no {describe(cls)} ({type(error).__name__}: {error})") from error
+
+
+def _is_instance(data: Any, cls: type) -> bool:
+    if isinstance(data, cls):
+        return True
+    return (cls is float and isinstance(data, int)) or (cls is complex and isinstance(data, int | float))
+
+
+def _is_open(scalar: type) -> bool:
+    """Whether a scalar class stands for several dtypes."""
+    try:
+        return np.dtype(scalar).type is not scalar
+    except TypeError:
+        return True
