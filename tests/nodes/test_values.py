@@ -45,7 +45,7 @@ def everything(node: Any) -> list[Any]:
         (values.ConstantInt, 3, 3),
         (values.ConstantFloat, 0.5, 0.5),
         (values.ConstantText, "on", "on"),
-        (values.ConstantColour, (255, 128, 0), (255, 128, 0)),
+        (values.ConstantColour, hfg.Colour(255, 128, 0), (255, 128, 0)),
         (values.ConstantVector, (1, 2.5), np.array([1.0, 2.5])),
         (values.ConstantVector, [], np.zeros(0)),
         (values.ConstantMatrix, ((1, 2), (3, 4), (5, 6)), np.array([[1.0, 2], [3, 4], [5, 6]])),
@@ -91,7 +91,7 @@ def test_a_constant_joined_with_a_stream_is_a_value_for_each_token() -> None:
 @pytest.mark.parametrize(
     ("made", "wrong"),
     [
-        (values.ConstantColour, (0, 0, 256)),
+        (values.ConstantColour, hfg.Colour(0, 0, 256)),
         (values.ConstantMatrix, ((1.0,), (1.0, 2.0))),
         (values.ConstantVector, (10**400,)),
         (values.ConstantInt, 0.5),
@@ -114,7 +114,7 @@ def test_a_constant_that_is_no_number_does_not_change_all_the_time() -> None:
         (values.IntOnTrigger, 3, 3),
         (values.FloatOnTrigger, 0.5, 0.5),
         (values.TextOnTrigger, "on", "on"),
-        (values.ColourOnTrigger, (255, 128, 0), (255, 128, 0)),
+        (values.ColourOnTrigger, hfg.Colour(255, 128, 0), (255, 128, 0)),
         (values.VectorOnTrigger, (1, 2.5), np.array([1.0, 2.5])),
         (values.MatrixOnTrigger, ((1, 2),), np.array([[1.0, 2]])),
     ],

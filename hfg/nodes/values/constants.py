@@ -17,6 +17,7 @@ from hfg.nodetype import Node
 from hfg.ports import Event, Output, Parameter, State, slot
 from hfg.ports.events import EventPort
 from hfg.types import Shape
+from hfg.values import Colour
 
 __all__ = [
     "BoolOnTrigger",
@@ -36,15 +37,9 @@ __all__ = [
     "replace_by",
 ]
 
-Colour: TypeAlias = tuple[int, int, int]
 VectorArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None)]
 MatrixArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None, None)]
 Rows: TypeAlias = Sequence[Sequence[float]]
-
-
-def is_colour(value: Colour) -> bool:
-    """Say whether all parts are from 0 to 255."""
-    return all(0 <= part <= 255 for part in value)
 
 
 def has_floats(value: Any) -> bool:
@@ -231,7 +226,7 @@ class ConstantColour(_Constant):
       changed: the new value, as it is given for the first time.
     """
 
-    value = Parameter((255, 255, 255), Predicate(is_colour), type=Colour)
+    value = Parameter(Colour(255, 255, 255))
     out = Output(Colour)
     changed = Event(Colour)
 
@@ -360,7 +355,7 @@ class ColourOnTrigger(Node):
       given: the value.
     """
 
-    value = Parameter((255, 255, 255), Predicate(is_colour), type=Colour)
+    value = Parameter(Colour(255, 255, 255))
     given = Event(Colour)
 
     @slot

@@ -1,0 +1,129 @@
+"""Reaching files: what goes wrong in one sentence, and whole files that are old or new, never half of each.
+
+Stands on the standard library alone.
+"""
+
+from __future__ import annotations
+
+import errno
+import glob
+import itertools
+import os
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, BinaryIO, Final, Literal, TypeAlias
+
+__all__ = ["FilePath", "find_files", "is_a_path", "named", "reaching", "write_whole"]
+
+FilePath: TypeAlias = str | os.PathLike[str]
+"""Where a file is; relative ones begin in the working directory of the program."""
+
+_REASONS: Final = {
+    errno.ENOENT: "there is no such file or directory",
+    errno.EISDIR: "it is a directory; name a file in it",
+    errno.ENOTDIR: "a part of the path is a file, no directory",
+    errno.EACCES: "it is not permitted; change the permissions or the path",
+    errno.EPERM: "it is not permitted; change the permissions or the path",
+    errno.EROFS: "the file system may only be read",
+    errno.EEXIST: "it is there already; allow to overwrite it, or change the path",
+    errno.ENOSPC: "the disk is full; make room on it",
+    errno.EDQUOT: "your part of the disk is full; make room on it",
+    errno.ENAMETOOLONG: "the name is too long",
+    errno.EMFILE: "too many files are open",
+}
+
+_numbers: Final = itertools.count()
+
+
+def is_a_path(path: FilePath) -> bool:
+    """Say whether a system could have a file of this name."""
+    return "\0" not in os.fspath(path)
+
+
+def named(path: FilePath) -> Path:
+    """Give the path that a parameter holds.
+
+    Raises:
+      ValueError: it was not set.
+    """
+    if not os.fspath(path):
+        raise ValueError('no path is set; set the parameter "path"')
+    return Path(path)
+
+
+@contextmanager
+def reaching(path: FilePath, doing: Literal["read", "write"]) -> Iterator[None]:
+    """Say in one sentence which file could not be read or written, and why.
+
+    Raises:
+      OSError: of the same class as the system's.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = _REASONS.get(error.errno or 0) or error.strerror or str(error)
+        where = "" if Path(path).is_absolute() else f' (relative to "{Path.cwd()}")'
+        raise type(error)(f'cannot {doing} "{os.fspath(path)}"{where}: {reason}') from error
+    except UnicodeError as error:
+        raise ValueError(f'cannot {doing} "{os.fspath(path)}": {error}; set another encoding') from None
+
+
+def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:
+    """Write a file so that it is either the old one or the new one, whatever happens meanwhile.
+
+    It is written beside its place, brought to the disk and then renamed. Directories that are missing are made.
+
+    Args:
+      path: where it will be; of a symbolic link, what that leads to.
+      write: writes the content.
+      overwrite: whether a file that is there may be replaced.
+
+    Raises:
+      OSError: it cannot be written; the old file is whole.
+    """
+    with reaching(path, "write"):
+        target = path.resolve() if path.is_symlink() else path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "")
+        if not overwrite and target.exists():
+            raise FileExistsError(errno.EEXIST, "")
+        beside = target.with_name(f".hfg-{os.getpid()}-{next(_numbers)}.part")
+        try:
+            with beside.open("xb") as file:
+                write(file)
+                file.flush()
+                os.fsync(file.fileno())
+            with suppress(OSError):
+                beside.chmod(target.stat().st_mode)
+            beside.replace(target)
+        except BaseException:
+            beside.unlink(missing_ok=True)
+            raise
+
+
+def find_files(pattern: str, order: str) -> list[Path]:
+    """List the files that a pattern describes.
+
+    Args:
+      pattern: as a shell has it; `**` is any number of directories.
+      order: by "name", by the "number" in the name, or by when they were "modified".
+
+    Raises:
+      OSError: there is none.
+    """
+    with reaching(pattern, "read"):
+        # Not Path.glob, which knows no absolute patterns.
+        found = [Path(name) for name in glob.glob(pattern, recursive=True) if not Path(name).is_dir()]  # noqa: PTH207
+        if not found:
+            raise FileNotFoundError(errno.ENOENT, "")
+        if order == "modified":
+            return sorted(found, key=lambda path: (path.stat().st_mtime_ns, str(path)))
+    return sorted(found, key=_by_numbers if order == "number" else str)
+
+
+def _by_numbers(path: Path) -> list[tuple[int, str]]:
+    """Order "9.png" before "10.png"."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"([0-9]+)", str(path))]

@@ -1,0 +1,346 @@
+"""Files read whole, one for each path that arrives. Stands on access, functions, numpy and msgspec."""
+
+from __future__ import annotations
+
+import csv
+import io
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, TypeAlias
+
+import msgspec
+import numpy as np
+from annotated_types import MaxLen, MinLen
+
+from hfg.functions import node
+from hfg.images import AnyImage, Image
+from hfg.nodes._extras import require
+from hfg.nodes.files.access import FilePath, named, reaching
+from hfg.types import Array
+
+__all__ = [
+    "list_directory",
+    "read_array",
+    "read_arrays",
+    "read_bytes",
+    "read_csv",
+    "read_image",
+    "read_json",
+    "read_raw_image",
+    "read_text",
+]
+
+Column: TypeAlias = Literal["text", "int", "float", "bool"]
+Encoding: TypeAlias = Literal["utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252"]
+Delimiter: TypeAlias = Annotated[str, MinLen(1), MaxLen(1)]
+
+
+_TRUTHS: Final = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+_CASTS: Final[dict[Column, Callable[[str], Any]]] = {
+    "int": int,
+    "float": float,
+    "bool": lambda text: _TRUTHS[text.strip().lower()],
+    "text": str,
+}
+
+
+@node
+def read_text(path: FilePath, *, encoding: Encoding = "utf-8") -> str:
+    r"""Read a file of text.
+
+    Line ends of all systems become "\n". It reads while the loop waits; put it into a thread group where files are
+    large or far away.
+
+    Args:
+      path: of the file; relative ones begin in the working directory.
+      encoding: how it was written.
+
+    Raises:
+      OSError: the file cannot be read; the sentence says why.
+      ValueError: it is no text of that encoding, or the path is no path.
+    """
+    place = named(path)
+    with reaching(place, "read"), place.open(encoding=encoding) as file:
+        return file.read()
+
+
+@node
+def read_bytes(path: FilePath) -> bytes:
+    """Read a file of anything.
+
+    It reads while the loop waits; put it into a thread group where files are large or far away.
+
+    Args:
+      path: of the file; relative ones begin in the working directory.
+
+    Raises:
+      OSError: the file cannot be read; the sentence says why.
+      ValueError: the path is no path.
+    """
+    place = named(path)
+    with reaching(place, "read"):
+        return place.read_bytes()
+
+
+@node
+def read_json(path: FilePath) -> Any:
+    """Read a file of JSON; `null` alone is silence.
+
+    It reads while the loop waits; put it into a thread group where files are large or far away.
+
+    Args:
+      path: of the file; relative ones begin in the working directory.
+
+    Raises:
+      OSError: the file cannot be read; the sentence says why.
+      ValueError: it is no JSON, or the path is no path.
+    """
+    return json_of(read_bytes.function(path), f'"{path}"')
+
+
+def json_of(data: bytes, what: str) -> Any:
+    """Read JSON.
+
+    Raises:
+      ValueError: it is none.
+    """
+    try:
+        return msgspec.json.decode(data)
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
+        raise ValueError(f"{what} is no JSON: {error}") from None
+
+
+@node
+def read_csv(
+    path: FilePath,
+    *,
+    delimiter: Delimiter = ",",
+    header: bool = True,
+    guess: bool = True,
+    columns: Mapping[str, Column] | None = None,
+    encoding: Encoding = "utf-8-sig",
+) -> list[dict[str, Any]]:
+    """Read a table of comma-separated values as a list of rows, each a dict.
+
+    It reads while the loop waits; put it into a thread group where files are large or far away.
+
+    Args:
+      path: of the file; relative ones begin in the working directory.
+      delimiter: between two values of a row.
+      header: whether the first row has the names of the columns; else they are called "0", "1" ...
+      guess: whether values that look like numbers become numbers, and empty ones None; else they stay text.
+      columns: the types of columns that are not guessed; an empty value of a number is None.
+      encoding: how it was written.
+
+    Raises:
+      OSError: the file cannot be read; the sentence says why.
+      ValueError: a row has more values than there are columns, or one that its column cannot have; or the path is no
+        path.
+    """
+    text = read_text.function(path, encoding=encoding)
+    return list(rows_of(io.StringIO(text), named(path), delimiter, header, guess, columns or {}))
+
+
+def rows_of(
+    lines: Iterator[str] | io.StringIO,
+    path: Path,
+    delimiter: str,
+    header: bool,
+    guess: bool,
+    columns: Mapping[str, Column],
+) -> Iterator[dict[str, Any]]:
+    """Read rows one by one.
+
+    Raises:
+      ValueError: one is wrong; the sentence has its line.
+    """
+    reader = csv.reader(lines, delimiter=delimiter)
+    names: list[str] = []
+    try:
+        for row in reader:
+            if not row:
+                continue
+            if not names:
+                names = row if header else [str(number) for number in range(len(row))]
+                if header:
+                    continue
+            if len(row) > len(names):
+                raise ValueError(f"it has {len(row)} values for {len(names)} columns")
+            row += [""] * (len(names) - len(row))
+            yield {name: _cell(cell, name, guess, columns) for name, cell in zip(names, row, strict=True)}
+    except (csv.Error, ValueError) as error:
+        raise ValueError(f'line {reader.line_num} of "{path}" is wrong: {error}') from None
+
+
+def _cell(text: str, name: str, guess: bool, columns: Mapping[str, Column]) -> Any:
+    said = columns.get(name)
+    if said is not None:
+        if not text and said != "text":
+            return None
+        try:
+            return _CASTS[said](text)
+        except (ValueError, KeyError):
+            raise ValueError(f'"{name}" should be {said}, got {text!r:.80}') from None
+    if not guess:
+        return text
+    if not text:
+        return None
+    for cast in (int, float):
+        try:
+            return cast(text)
+        except ValueError:
+            continue
+    return text
+
+
+def load_array(path: Path, mode: Literal["r"] | None = None) -> Any:
+    """Read a file of numpy, without running what pickles would.
+
+    Raises:
+      OSError: it cannot be read.
+      ValueError: it is no such file.
+    """
+    with reaching(path, "read"):
+        with path.open("rb") as file:  # a directory or a missing file is told by the system, not by numpy
+            is_zip = file.read(2) == b"PK"
+        try:
+            if is_zip and not zipfile.is_zipfile(path):
+                raise ValueError("its end is missing")  # numpy would leave it open
+            return np.load(path, mmap_mode=mode, allow_pickle=False)
+        except (ValueError, EOFError, zipfile.BadZipFile, KeyError, SyntaxError) as error:
+            raise ValueError(f'"{path}" is no file of numpy without Python objects: {error}') from None
+
+
+@node
+def read_array(path: FilePath) -> Array:
+    """Read an array of a `.npy` file.
+
+    It reads while the loop waits; put it into a thread group where files are large or far away.
+
+    Args:
+      path: of the file; relative ones begin in the working directory.
+
+    Raises:
+      OSError: the file cannot be read; the sentence says why.
+      ValueError: it is no such file, or holds Python objects, which are not read; or the path is no path.
+    """
+    found = load_array(named(path))
+    if not isinstance(found, np.ndarray):
+        found.close()
+        raise ValueError(f'"{path}" holds several arrays: use read_arrays')
+    return found
+
+
+@node
+def read_arrays(path: FilePath) -> dict[str, Array]:
+    """Read the arrays of a `.npz` file, by their names.
+
+    It reads while the loop waits; put it into a thread group where files are large or far away.
+
+    Args:
+      path: of the file; relative ones begin in the working directory.
+
+    Raises:
+      OSError: the file cannot be read; the sentence says why.
+      ValueError: it is no such file, or holds Python objects, which are not read; or the path is no path.
+    """
+    place = named(path)
+    found = load_array(place)
+    if isinstance(found, np.ndarray):
+        raise ValueError(f'"{path}" holds one array: use read_array')
+    with found, reaching(place, "read"):
+        try:
+            return {name: found[name] for name in found.files}
+        except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+            raise ValueError(f'"{path}" cannot be read: {error}') from None
+
+
+def load_image(path: FilePath, mode: Literal["color", "gray", "raw"]) -> Any:
+    """Read a picture; OpenCV itself says nothing of why it could not.
+
+    Raises:
+      OSError: the file cannot be read.
+      ValueError: it is no picture.
+    """
+    cv2 = require("cv2", "vision")
+    data = np.frombuffer(read_bytes.function(path), dtype=np.uint8)
+    flag = {"color": cv2.IMREAD_COLOR, "gray": cv2.IMREAD_GRAYSCALE, "raw": cv2.IMREAD_UNCHANGED}[mode]
+    try:
+        image = cv2.imdecode(data, flag) if len(data) else None
+    except cv2.error:
+        image = None
+    if image is None:
+        raise ValueError(f'"{path}" is no picture that OpenCV can read, or it is not whole')
+    return image
+
+
+@node
+def read_image(path: FilePath, *, mode: Literal["color", "gray"] = "color") -> Image:
+    """Read a picture as an image of 8 bits.
+
+    It reads while the loop waits, some milliseconds for each million pixels; put it into a thread group where that is
+    too long. Needs OpenCV.
+
+    Args:
+      path: of the file, such as PNG, JPEG, TIFF, BMP or WebP; relative ones begin in the working directory.
+      mode: "color" gives blue, green and red, "gray" one channel.
+
+    Raises:
+      OSError: the file cannot be read; the sentence says why.
+      ValueError: it is no picture, or the path is no path.
+      ModuleNotFoundError: OpenCV is not installed.
+    """
+    image: Image = load_image(path, mode)
+    return image
+
+
+@node
+def read_raw_image(path: FilePath) -> AnyImage:
+    """Read a picture as it was written: with its own channels, of 8 or 16 bits or real numbers, such as a depth image.
+
+    It reads while the loop waits, some milliseconds for each million pixels; put it into a thread group where that is
+    too long. Needs OpenCV.
+
+    Args:
+      path: of the file, such as PNG, TIFF or EXR; relative ones begin in the working directory.
+
+    Raises:
+      OSError: the file cannot be read; the sentence says why.
+      ValueError: it is no picture, or the path is no path.
+      ModuleNotFoundError: OpenCV is not installed.
+    """
+    image: AnyImage = load_image(path, "raw")
+    return image
+
+
+@node
+def list_directory(
+    path: FilePath,
+    *,
+    pattern: str = "*",
+    kind: Literal["files", "directories", "all"] = "files",
+    recursive: bool = False,
+) -> list[str]:
+    """List what is in a directory, by name.
+
+    Args:
+      path: of the directory; relative ones begin in the working directory.
+      pattern: which names are listed, as a shell has it: "*.png".
+      kind: whether files, directories or both are listed.
+      recursive: whether directories inside are gone through too.
+
+    Raises:
+      OSError: the directory cannot be read; the sentence says why.
+      ValueError: the pattern is empty or absolute, or the path is no path.
+    """
+    place = named(path)
+    with reaching(place, "read"):
+        next(place.iterdir(), None)  # a missing directory would be an empty one
+        try:
+            found = list(place.rglob(pattern) if recursive else place.glob(pattern))
+        except (ValueError, NotImplementedError) as error:
+            raise ValueError(f"{pattern!r:.80} is no pattern of names: {error}") from None
+        wanted = {"files": Path.is_file, "directories": Path.is_dir, "all": Path.exists}[kind]
+        return sorted(str(one) for one in found if wanted(one))
