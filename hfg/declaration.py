@@ -44,7 +44,7 @@ HOOKS: Final = ("setup", "ready", "end", "teardown", "on_activated", "on_deactiv
 """Methods of a node that a runner calls besides `process`."""
 
 RESERVED: Final = frozenset(
-    {*HOOKS, "process", "ports", "place", "active", "log", "inner", *AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS}
+    {*HOOKS, "process", "ports", "place", "active", "log", "inner", "start_soon", *AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS}
 )
 """Every public name of `Node`; a test keeps the list closed."""
 

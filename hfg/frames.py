@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-__all__ = ["is_machinery", "users_part"]
+__all__ = ["is_machinery", "is_ours", "users_part"]
 
 _OURS: Final = str(Path(__file__).resolve().parent)
 _STANDARD: Final = str(Path(traceback.__file__).parent)
@@ -27,10 +27,15 @@ _MACHINERY: Final = (
 )
 
 
+def is_ours(file: str) -> bool:
+    """Whether a frame of this file is hfg's own."""
+    return file.startswith(_OURS)
+
+
 def is_machinery(file: str) -> bool:
     """Whether a frame of this file tells a user nothing."""
     inside = file.removeprefix(f"{_STANDARD}/").replace("\\", "/")
-    return file.startswith(_OURS) or ((inside != file or file.startswith("<")) and inside.startswith(_MACHINERY))
+    return is_ours(file) or ((inside != file or file.startswith("<")) and inside.startswith(_MACHINERY))
 
 
 def users_part(found: TracebackType | None) -> TracebackType | None:

@@ -9,14 +9,14 @@ graphs nor who runs it.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 
 import msgspec
 
 from hfg.declaration import declare
 from hfg.description import NodeType, parameter_values, read_only_refusal, unknown_parameter
-from hfg.errors import DeclarationError, EngineInternalError, Failure, UsageError
+from hfg.errors import DeclarationError, EngineInternalError, Failure, NotRunning, UsageError
 from hfg.logs import Log, Logger, node_log
 from hfg.ports.automatic import (
     AUTOMATIC_EVENTS,
@@ -83,6 +83,7 @@ class Node:
         "_parameters",
         "_path_log",
         "_place",
+        "_start_task",
         "_written_before",
     )
 
@@ -93,6 +94,7 @@ class Node:
     _options: Any  # written by the graph
     _parameters: dict[str, Any]  # the live values; change them by `_set_parameter`
     _place: Place | None  # written by the graph
+    _start_task: Callable[[Coroutine[Any, Any, Any]], None] | None  # while somebody runs it
 
     activated: Event[None] = automatic_event("activated")
     deactivated: Event[None] = automatic_event("deactivated")
@@ -118,6 +120,7 @@ class Node:
         self._path_log = None
         self._options = None
         self._place = None
+        self._start_task = None
         if positional:
             raise TypeError(_positional(self._type))
         self._parameters = (
@@ -175,6 +178,46 @@ class Node:
 
     def on_deactivated(self) -> Any:
         """Learn that A(v) became 0."""
+
+    def start_soon(self, coroutine: Coroutine[Any, Any, Any]) -> None:
+        """Run a coroutine beside the firings of the node, as its child; in setup(), process(), slots and hooks.
+
+        Its errors are the node's, by `on_error`; the run does not end before it has, and it is cancelled when the node
+        is torn down or disabled (rules X1, X3, R5). It may trigger events; outputs belong to firings. For threads it is
+        refused.
+
+        Args:
+          coroutine: what an `async def` gives when it is called.
+
+        Raises:
+          NotRunning: nobody runs the node.
+          TypeError: it is no coroutine.
+
+        Example:
+          >>> import asyncio
+          >>> class Beacon(Node):
+          ...     beat = Event(int)
+          ...     def setup(self) -> None:
+          ...         self.start_soon(self.beats(3))
+          ...     async def beats(self, count: int) -> None:
+          ...         for number in range(count):
+          ...             await asyncio.sleep(1)
+          ...             self.beat.trigger(number)
+        """
+        path = _name(self)
+        if not isinstance(coroutine, Coroutine):
+            raise TypeError(
+                f'start_soon of "{path}" takes a coroutine, got {coroutine!r:.80}; call what makes one: '
+                f"self.start_soon({_called(coroutine)})"
+            )
+        if self._start_task is not None:
+            self._start_task(coroutine)
+            return
+        coroutine.close()
+        what = f'"{path}" cannot start_soon({_called(coroutine)})'
+        if self._type.is_subgraph:
+            raise UsageError(f"{what}, for a subgraph runs no code of its own; let a node inside do it")
+        raise NotRunning(f"{what}, for nobody runs it; do it in setup(), process() or a slot, while its graph runs")
 
     @property
     def ports(self) -> Ports:
@@ -488,6 +531,11 @@ def _only(node: Node, candidates: list[Any], what: str) -> Any:
 
 def _name(node: Node) -> str:
     return node._type.name if node._place is None else node._place.path
+
+
+def _called(one: Any) -> str:
+    """How a call is written that gives a coroutine."""
+    return f"{getattr(one, '__name__', 'work')}(...)"
 
 
 def _positional(type_: NodeType) -> str:

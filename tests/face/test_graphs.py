@@ -328,6 +328,7 @@ RESERVED = [
     "active",
     "log",
     "inner",
+    "start_soon",
     "activated",
     "deactivated",
     "processed",

@@ -22,7 +22,7 @@ from hfg.engine.editing.plan_diff import PlanDiff, diff
 from hfg.engine.editing.plan_index import PlanIndex
 from hfg.engine.editing.setting import refuse_without_effect
 from hfg.engine.editing.turns import Turns
-from hfg.engine.executing.code import answer
+from hfg.engine.executing.code import answer, whose_code
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
 from hfg.engine.rules import concurrency, lifecycle, subgraphs
@@ -147,6 +147,8 @@ class Edits:
         engine.hold()
         try:
             self._find_out(edit, check=check)
+            torn_down = [*(worker for worker, _, _ in edit.how.swapped), *self._to_start_afresh(edit.switched)]
+            self._turns.wait_for(torn_down, tasks_too=True)
             touched = self._touched(edit)
             self._turns.wait_for(touched)
             await self._set_up(edit)
@@ -247,7 +249,11 @@ class Edits:
           NodeError: it failed.
         """
         waiter: asyncio.Future[NodeError | None] = self._engine.loop.create_future()
-        self._engine.context.run(hook, worker, partial(answer, waiter))
+        begin = partial(hook, worker, partial(answer, waiter))
+        if whose_code() is None:
+            self._engine.context.run(begin)
+        else:  # the code of a node asks, which runs inside of that context
+            self._engine.soon(partial(self._engine.guard, begin))
         cancelled: asyncio.CancelledError | None = None
         while not waiter.done():
             try:
@@ -318,6 +324,7 @@ class Edits:
         engine, how = self._engine, edit.how
         assert self._index is not None
         new, nodes = apply(engine.core, self._index, self._graph, how, edit.come, engine.groups)
+        lifecycle.end_tasks(edit.come)
         for edge, flat in new:
             if flat.source.kind == "observable":
                 self._lifetime.feed(flat.source.port, edge, flat.through)

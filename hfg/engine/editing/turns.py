@@ -13,6 +13,7 @@ from contextlib import asynccontextmanager
 
 from hfg.engine.executing.code import whose_code
 from hfg.engine.model.flights import current_flight
+from hfg.engine.model.tasks import current_task
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 
@@ -42,14 +43,19 @@ class Turns:
             self._awaited.clear()
             self._pass_on()
 
-    def wait_for(self, workers: Iterable[Worker]) -> None:
+    def wait_for(self, workers: Iterable[Worker], *, tasks_too: bool = False) -> None:
         """The present edit waits from now on for the code of these, and of nobody else, to come to its end.
+
+        Args:
+          workers: whose.
+          tasks_too: and of the tasks that it has started, for the nodes are torn down.
 
         Raises:
           UsageError: it was asked for by the code of one of them.
         """
         self._awaited = set(workers)
-        speaker = _speaker()
+        task = current_task.get()
+        speaker = task.worker if tasks_too and task is not None and task.is_current() else _speaker()
         if speaker in self._awaited:
             raise _waits_for_itself(speaker)
         for worker in [worker for worker in self._asking if worker in self._awaited]:

@@ -2,6 +2,7 @@
 
 code        runs node code: on the loop, by a carrier (async), in the thread of one of the groups
 carrier     the dormant task of an async node           groups      who of a group is next; their threads
+tasks       what nodes start beside their firings        lost        what they start by asyncio, and nobody looks after
 virtual     a loop whose clock jumps                    punctual    a loop whose timers ring in time
 watchdog    a node that blocks the loop
 """

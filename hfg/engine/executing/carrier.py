@@ -96,6 +96,10 @@ class Carrier:
         """Whether a coroutine is under way."""
         return self._coroutine is not None
 
+    def is_current(self) -> bool:
+        """Whether the code that asks is what it carries."""
+        return asyncio.current_task(self._loop) is self.task
+
     def enter(self, call: Callable[..., object], *arguments: Any) -> None:
         """Call something in the context of the code that it carries."""
         self._context.run(call, *arguments)

@@ -21,11 +21,12 @@ from hfg.engine.executing.groups import Job
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import PENDING, Core
 from hfg.engine.model.flights import Flight, current_flight
+from hfg.engine.model.tasks import current_task
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.rules import concurrency, errors
-from hfg.engine.rules.sending import trigger
+from hfg.engine.rules.sending import trigger, trigger_beside
 
-__all__ = ["CodeRunner", "answer", "whose_code"]
+__all__ = ["CodeRunner", "answer", "speak_for", "whose_code"]
 
 _code_of: contextvars.ContextVar[Worker | None] = contextvars.ContextVar("hfg.code_of", default=None)
 
@@ -38,10 +39,19 @@ def whose_code() -> Worker | None:
     return _code_of.get()
 
 
+def speak_for(worker: Worker) -> None:
+    """From here on, in this context, it is the code of this async node that runs."""
+    _code_of.set(worker)
+
+
 def answer(waiter: asyncio.Future[Any], value: Any) -> None:
     """Give a waiting future its result, unless whoever waited has gone."""
     if not waiter.done():
         waiter.set_result(value)
+
+
+def _nobody_waits(_how_many: int) -> None:
+    """Who waits for room is no code of the node."""
 
 
 class _Pump(Protocol):
@@ -126,7 +136,7 @@ class CodeRunner:
     def carrier(self, worker: Worker) -> Carrier:
         """Make the dormant task of an async node, in a context that tells whose code runs."""
         context = self.context.copy()
-        context.run(_code_of.set, worker)
+        context.run(speak_for, worker)
         return Carrier(self.loop, f"hfg {worker.path}", self.context, context, self._engine.give_way)
 
     def _limit(self, worker: Worker) -> None:
@@ -383,20 +393,25 @@ class CodeRunner:
 
     async def trigger_wait(self, event: RunningEvent, value: Any, activity: int | None, stamp: float | None) -> None:
         """Trigger, then wait until no `wait` queue behind the node's events is full (F8)."""
-        trigger(event, value, activity, stamp)
         worker = event.worker
         core = worker.core
-        own = whose_code() is worker  # its own code waits for us, not we for it
+        task = current_task.get()
+        own: Any = worker.code_waits_for_room if whose_code() is worker else _nobody_waits  # its own waits for us
+        if task is not None and task.worker is worker:
+            trigger_beside(event, value, activity, stamp)
+            own = worker.tasks.wait_for_room
+        else:
+            trigger(event, value, activity, stamp)
         while worker.full_edges and core.started and not core.over:
             waiter: asyncio.Future[None] = self.loop.create_future()
             worker.when_room(partial(answer, waiter, None))
-            worker.code_waits_for_room(own)
+            own(1)
             self._look_for_room()
             core.host.kick()
             try:
                 await waiter
             finally:
-                worker.code_waits_for_room(-own)
+                own(-1)
                 self._look_for_room()
 
     def _look_for_room(self) -> None:

@@ -13,19 +13,20 @@ from hfg.engine.model.core import Core
 from hfg.engine.model.worker import Worker
 from hfg.logs import Log, Logger
 
-__all__ = ["log_of_speaker"]
+__all__ = ["log_of_speaker", "speaker"]
 
 
 def log_of_speaker(core: Core) -> Logger:
     """Give the log of the node whose code calls this; that of all nodes, if it is nobody's."""
-    worker = _speaker(core)
+    worker = speaker(core)
     if worker is None or worker.node is None:
         return Log("hfg.node")
     log: Logger = worker.node.log
     return log
 
 
-def _speaker(core: Core) -> Worker | None:
+def speaker(core: Core) -> Worker | None:
+    """Give the node of a run whose code calls this, if any."""
     worker = whose_code()
     if worker is not None:
         return worker

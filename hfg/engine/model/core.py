@@ -110,6 +110,9 @@ class Host(Protocol):
     def soon(self, callback: Callable[[], None]) -> None:
         """Call back at the loop's next pass."""
 
+    def start_task(self, worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> None:
+        """A node's code starts a task, a child of the node."""
+
     def on_loop(self) -> bool:
         """Whether the caller is on the run's own thread."""
 
@@ -243,6 +246,7 @@ class Core:
       code: what runs the nodes' code; given by the host.
       trace: receives every event of the run, or None: nobody listens and nothing is built (R7).
       in_flight: firings, calls and hooks that wait or run in a thread.
+      tasks: that nodes have started beside these; a pause does not wait for them, quiet does.
       timers: pending calls that could start something.
       pumping: the loop group is being drained; what is queued now is reached without a kick.
       current: the worker whose code runs on the loop, for the watchdog.
@@ -286,6 +290,7 @@ class Core:
 
     def _has_nothing_under_way(self) -> None:
         self.in_flight = 0
+        self.tasks = 0
         self.iterating: list[Iteration] = []  # subgraphs amid a firing in which they iterate, inner ones behind (G4)
         self.full_edges = 0  # queues that hold their sources back (F8)
         self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)

@@ -93,6 +93,7 @@ class Worker(Vertex):
       stamp: of what it sends now (T5); None outside a firing or call: the present.
       written: per output what was written in this firing; None until the first.
       events_due: automatic events that follow the firing or call (A9).
+      tasks: that its code has started; None until the first.
     """
 
     __slots__ = (
@@ -134,6 +135,7 @@ class Worker(Vertex):
         "next_start",
         "observed",
         "on_idle",
+        "opening",
         "outputs",
         "pending_end",
         "placed",
@@ -151,6 +153,7 @@ class Worker(Vertex):
         "stamp",
         "step",
         "taken",
+        "tasks",
         "ticket",
         "unfit",
         "waiting_room",
@@ -171,6 +174,7 @@ class Worker(Vertex):
         self._has_not_fired()
         self._has_no_timers()
         self.flights: Flights | None = None  # of a node that allows several firings under way (F14)
+        self.tasks: Any = None
         self.attempts: Attempts | None = None  # at its firing, where one that fails is tried again (X1)
         if options is not None and options.concurrency > 1:
             self.flights = Flights(options.concurrency, options.ordered)
@@ -212,6 +216,7 @@ class Worker(Vertex):
         self.pending_end = False  # END leaves as soon as the outputs are free (F4)
         self.deferred: list[int] | None = None  # modifiers drained before END was sent (F12)
         self.is_up = False  # its setup has begun, its teardown has not
+        self.opening = False  # its setup is under way
         self.generator: Any = None
         self.carrier: Any = None
         self.call_edge: Any = None
@@ -506,6 +511,10 @@ class Worker(Vertex):
         """Whether its setup has begun and its teardown has not."""
         self.is_up = up
 
+    def be_opening(self, opening: bool) -> None:
+        """Whether its setup is under way."""
+        self.opening = opening
+
     def take_written(self) -> list[Entry | None] | None:
         """What the firing has written leaves now, or never."""
         written, self.written = self.written, None
@@ -753,14 +762,20 @@ class Worker(Vertex):
         return min(1, self.firings) if self.flights is None else self.flights.most
 
     def codes_at_work(self) -> int:
-        """How much of its code waits or runs in a thread: one firing or call, or several firings."""
-        return self.in_flight + (0 if self.flights is None else self.flights.working)
+        """How much of its code waits or runs in a thread: one firing or call, or several firings, and tasks."""
+        firings = self.in_flight + (0 if self.flights is None else self.flights.working)
+        return firings + (0 if self.tasks is None else len(self.tasks))
 
     def codes_waiting_for_room(self) -> int:
         """How much of that waits until a queue has room (F8)."""
+        tasks = 0 if self.tasks is None else self.tasks.waiting_room
         if not self.waiting_room:
-            return 0
-        return int(self.in_flight) if self.flights is None else min(self.waiting_room, self.codes_at_work())
+            return int(tasks)
+        return tasks + (int(self.in_flight) if self.flights is None else min(self.waiting_room, self.flights.working))
+
+    def start_tasks(self, tasks: object) -> None:
+        """Its code starts a task for the first time."""
+        self.tasks = tasks
 
     def let_others(self) -> None:
         """What waits until it is not busy has its turn, as long as that does not make it busy."""
@@ -801,6 +816,7 @@ class Worker(Vertex):
             or self.rate_timer is not None
             or self.backoff_timer is not None
             or (self.active_timer is not None and self.timeout_leads_somewhere())
+            or (self.tasks is not None and self.tasks.move)
         )
 
     def is_on_fast_path(self) -> bool:

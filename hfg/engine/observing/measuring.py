@@ -243,6 +243,7 @@ class Measuring:
             waiting=dict(meter.waiting),
             active_share=_share(meter.active, passed),
             queued=sum(edge.untaken for edge in (*worker.in_edges, *worker.slot_edges)),
+            tasks=() if worker.tasks is None else worker.tasks.names,
         )
         return node, busy
 

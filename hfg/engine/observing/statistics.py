@@ -56,6 +56,7 @@ class NodeStatistics(msgspec.Struct, frozen=True):
         full), "gate", "ready", "restart", "signal" (it has slots only), "start", "unconnected", "disabled", "ended".
       active_share: of the time since measuring began, how much it was active.
       queued: untaken tokens in front of it.
+      tasks: what its code has started by `start_soon` and is under way, by name.
     """
 
     group: str
@@ -78,6 +79,7 @@ class NodeStatistics(msgspec.Struct, frozen=True):
     waiting: dict[str, float]
     active_share: float
     queued: int
+    tasks: tuple[str, ...] = ()
 
 
 class EdgeStatistics(msgspec.Struct, frozen=True):

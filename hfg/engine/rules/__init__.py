@@ -3,6 +3,7 @@
 agenda      who may move                 firing      a firing, from taking to answering
 sending     what leaves a node           releasing   when that is processed
 calls       of slots                     builtin_slots   those that every node has
+beside      what tasks send, which are beside the firings of their node
 modifiers   what activity does           activity    what follows when it changes
 listening   slots that are awake only while their node is active
 wiring      which edges are live         subgraphs   as wholes

@@ -9,7 +9,7 @@ import dis
 from collections.abc import Callable
 
 from hfg.engine.model.iteration import amid_element
-from hfg.engine.model.worker import BACKOFF, Worker
+from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, Worker
 from hfg.engine.rules import calls, firing, lifecycle
 from hfg.engine.rules.modifiers import automatic, report_error
 from hfg.engine.rules.retries import retry
@@ -32,6 +32,7 @@ __all__ = [
     "as_node_error",
     "begin_over",
     "fail",
+    "fail_beside",
     "fail_call",
     "follow",
     "judge",
@@ -95,6 +96,23 @@ def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> No
         return
     worker.count_failure()
     apply_policy(worker, as_node_error(worker, what, error), answer=answer)
+
+
+def fail_beside(worker: Worker, what: str, error: BaseException) -> None:
+    """A task of the node has failed, perhaps amid a firing, which goes on; the node's policy decides (X1)."""
+    if isinstance(error, QueueLimit):
+        worker.core.host.finish("failed", error)
+        return
+    worker.count_failure()
+    problem = as_node_error(worker, what, error)
+    policy = judge(worker, problem)
+    if policy == "stop":
+        return
+    automatic(worker, "failed", Failure(problem, {}))
+    restarts = begin_over(worker, policy)
+    if worker.busy in AMID_NOTHING:  # else it follows the firing or call under way (A9)
+        flush_automatic(worker)
+    follow(worker, policy, restarts=restarts)
 
 
 def fail_call(worker: Worker, slot: str, error: BaseException) -> None:

@@ -27,6 +27,7 @@ __all__ = [
     "discard_initial",
     "enable",
     "enable_around",
+    "end_tasks",
     "nothing",
     "reset",
     "restart",
@@ -90,7 +91,13 @@ def set_up(worker: Worker, then: Then) -> None:
         then(problem)
         return
     worker.core.upstairs.bind_ports(worker)
-    _run_hook(worker, "setup", then)
+    worker.be_opening(True)
+
+    def opened(error: NodeError | None) -> None:
+        worker.be_opening(False)
+        then(error)
+
+    _run_hook(worker, "setup", opened)
 
 
 def tear_down(worker: Worker, then: Then) -> None:
@@ -101,17 +108,20 @@ def tear_down(worker: Worker, then: Then) -> None:
     if worker.flights is not None and worker.is_flying() and not worker.core.over:
         worker.flights.when_rested(lambda: tear_down(worker, then))  # its firings go on beside a call of `reset` (F14)
         return
+    tasks = worker.tasks
+    if tasks is not None and tasks.end(lambda: tear_down(worker, then)):
+        return  # what its code has started comes to its end first
+    of_task = None if tasks is None else tasks.take_problem()
     worker.be_up(False)
     generator = worker.generator
     worker.keep_generator(None)
 
     def closed(_result: object, error: BaseException | None) -> None:
+        problem = of_task
         if error is not None:
             problem = NodeError(worker.path, "closing its generator", error)
             problem.__cause__ = error
-            _run_hook(worker, "teardown", lambda later: then(later or problem))
-        else:
-            _run_hook(worker, "teardown", then)
+        _run_hook(worker, "teardown", then if problem is None else lambda later: then(later or problem))
 
     close = getattr(generator, "close", None) or getattr(generator, "aclose", None)
     if close is None:  # none, or an iterator that has nothing to close
@@ -129,6 +139,7 @@ def disable(worker: Worker) -> None:
     worker.block(DISABLED)
     if core.trace is not None:
         core.trace(NodeEnabled(core.now(), worker.path, False))
+    end_tasks([worker])
     _settle_disabled([worker])
     derive_scopes(core)
 
@@ -138,7 +149,18 @@ def disable_around(workers: Iterable[Worker]) -> None:
     newly = [worker for worker in workers if not worker.blocked & DISABLED]
     for worker in newly:
         worker.block(DISABLED)
+    end_tasks(newly)
     _settle_disabled(newly)
+
+
+def end_tasks(workers: Iterable[Worker]) -> None:
+    """F10: what the code of disabled nodes has started beside their firings has no end by itself, so it is cancelled.
+
+    It lasts longer than the `setup()` of nodes that are disabled from the start, or reset while they are.
+    """
+    for worker in workers:
+        if worker.blocked & DISABLED and worker.tasks is not None:
+            worker.tasks.cancel()
 
 
 def enable_around(owner: Worker) -> None:
@@ -249,6 +271,7 @@ def reset(worker: Worker, then: Callable[[], None]) -> None:
         unblock(worker, ENDED)
         wiring.refresh(worker)
         judge_sources(worker.core)
+        end_tasks((worker,))
         then()
 
     _afresh(worker, up)

@@ -88,7 +88,7 @@ def grow(core: Core, among: Sequence[Worker] | None = None) -> bool:
 def _held_by_queue_alone(worker: Worker) -> bool:
     if not worker.blocked & FULL:
         return False
-    if worker.waiting_room:
+    if worker.waiting_room or (worker.tasks is not None and worker.tasks.waiting_room):
         return True
     if worker.calls and worker.blocked & CALLS_BLOCKED == FULL:
         return True
@@ -189,7 +189,7 @@ def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
 
 def only_waiting_for_room(core: Core) -> bool:
     """F8: all code under way waits until a full queue has room, so it does not keep the graph from being quiet."""
-    return sum(worker.codes_waiting_for_room() for worker in core.workers) >= core.in_flight
+    return sum(worker.codes_waiting_for_room() for worker in core.workers) >= core.in_flight + core.tasks
 
 
 def stall(core: Core) -> Stalled | None:

@@ -41,6 +41,7 @@ __all__ = [
     "tell",
     "telling_behind",
     "trigger",
+    "trigger_beside",
     "unwrapped",
 ]
 
@@ -303,6 +304,21 @@ def trigger(
         core.host.kick()
     if core.heard:
         _tell_subscribers(core)
+
+
+def trigger_beside(
+    event: RunningEvent, value: object = None, explicit: int | None = None, stamp: float | None = None
+) -> None:
+    """A task of the node sends a signal: a sending of its own, with the present as its stamp (T5, A3, A9).
+
+    If it takes the activity of the node, a firing or call that is under way has no right to that by A3.
+    """
+    worker = event.worker
+    right = worker.right
+    value, explicit, stamp = unwrapped(value, explicit, stamp)
+    trigger(event, value, explicit, worker.core.now() if stamp is None else stamp, extend_right=False)
+    if not right:
+        worker.keep_right(False)
 
 
 def _signals(event: RunningEvent, explicit: int | None, *, may_carry: bool) -> list[tuple[EventEdge, int]]:

@@ -11,13 +11,14 @@ import contextvars
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 from hfg.clock import current_clock, current_elapsed
 from hfg.engine.executing.code import CodeRunner, answer
 from hfg.engine.executing.groups import CheckedTurn, Dispatching, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.executing.speaking import log_of_speaker
+from hfg.engine.executing.tasks import TaskRunner
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
@@ -91,6 +92,7 @@ class Engine:
       epoch: what the run's clock is ahead of the machine's monotonic one; None: it follows another.
       callbacks: what those who stand on the engine want to be told.
       code: runs the nodes' code.
+      tasks: runs what that has started beside itself.
       ending: set from the moment the run is over.
       ended_how: its outcome, and what it failed with; None before.
       holds: people outside who may still bring something (R5).
@@ -133,6 +135,7 @@ class Engine:
         self.scheduler = rx.RunScheduler(self)
         self.code = CodeRunner(self, self.core, self.loop, self.context)
         self.core.code = self.code
+        self.tasks = TaskRunner(self, self.core, self.code)
         self.groups = self._make_groups()
         self._loop_group = self.groups["loop"]
         self._started: float | None = None  # on the loop's clock, whose digits are not taken up by the date
@@ -170,6 +173,10 @@ class Engine:
     def soon(self, callback: Callable[[], None]) -> None:
         """See `Host`."""
         self.loop.call_soon(callback, context=self.context)
+
+    def start_task(self, worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> None:
+        """See `Host`."""
+        self.tasks.start(worker, coroutine)
 
     # --- groups -----------------------------------------------------------------------------------------------------
 
@@ -311,7 +318,7 @@ class Engine:
     def _rests(self) -> bool:
         """R3: paused, so nothing new starts: it is quiet when nothing is under way, but does not end by that."""
         if self.core.held:
-            if not self.core.in_flight:
+            if not self.core.in_flight and not self.core.tasks:
                 self._answer_quiet()
             for call in self.callbacks.rested:
                 call()
@@ -439,7 +446,7 @@ class Engine:
         core = self.core
         if core.timers:
             return
-        if core.in_flight and not (
+        if (core.in_flight or core.tasks) and not (
             (core.futile and self._only_futile_works()) or (core.waiting_room and quiet.only_waiting_for_room(core))
         ):
             return

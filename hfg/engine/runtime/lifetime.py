@@ -16,6 +16,8 @@ import anyio
 
 from hfg.engine.executing.code import answer
 from hfg.engine.executing.groups import ThreadGroup
+from hfg.engine.executing.lost import LostTasks
+from hfg.engine.executing.speaking import speaker
 from hfg.engine.executing.watchdog import Watch, watchdog
 from hfg.engine.model.core import Core
 from hfg.engine.model.flights import Flight
@@ -52,6 +54,9 @@ class Lifetime:
         self._was_set_up: dict[Worker, None] = {}
         self._disposables: dict[Any, Callable[[], None]] = {}  # by edge: operators and observables before it
         self._watch: Watch | None = None
+        self._asking = partial(speaker, engine.core)
+        self._lost: LostTasks | None = None
+        self._of_tasks: list[NodeError] = []  # with what they failed, or that they did not end
         # Around what the teardown waits for now. Made here, for the first of a process takes a while: not in a hurry.
         self._patience = anyio.CancelScope()
 
@@ -60,6 +65,7 @@ class Lifetime:
         engine = self._engine
         core = engine.core
         engine.begin()
+        self._lost = LostTasks.notice(engine.loop, self._asking)
         self._watch = watchdog.watch(core, engine.settings.block_warning_s, virtual=engine.virtual)
         if not await self._set_up_all(core):
             return
@@ -106,6 +112,7 @@ class Lifetime:
         lifecycle.discard_initial(
             edge for edge in core.edges if isinstance(edge, BufferEdge | EventEdge) and edge.initial
         )
+        lifecycle.end_tasks(core.workers)
 
     def _connect_operators(self, core: Core) -> None:
         """P9: before anything is triggered; what they give out by themselves is the first of all."""
@@ -221,7 +228,7 @@ class Lifetime:
                 with self._within_limit():
                     await asyncio.wait(self.leaving)
             stuck = await self._cancel_code()
-            problems += stuck.values()
+            problems += [*stuck.values(), *self._of_tasks]
             for worker in reversed(self._was_set_up):
                 problem = await self._tear_down_one(worker) if worker not in stuck else None
                 if problem is not None:
@@ -254,6 +261,8 @@ class Lifetime:
                 group.stop()
         if self._watch is not None:
             watchdog.forget(self._watch)
+        if self._lost is not None:
+            self._lost.forget(self._asking, lambda worker: worker.core is engine.core)
 
     def _carriers(self) -> list[Any]:
         engine = self._engine
@@ -330,10 +339,15 @@ class Lifetime:
                 flight.carrier.cancel()
         for task in code.aside:
             task.cancel()
+        tasks = self._engine.tasks
+        tasks.cancel_all()
         begun = time.monotonic()
-        if busy or flights:
-            await self._until_back(lambda: any(worker.in_flight for worker in busy) or _any_works(flights))
+        if busy or flights or tasks.under_way:
+            await self._until_back(
+                lambda: bool(tasks.under_way) or any(worker.in_flight for worker in busy) or _any_works(flights)
+            )
         seconds = time.monotonic() - begun
+        self._of_tasks = tasks.leave_behind(seconds)
         late = [flight for flight in flights if flight.working]
         return self._leave_behind([worker for worker in busy if worker.in_flight], late, seconds)
 

@@ -12,7 +12,7 @@ from typing import Any
 from hfg.engine.fusion import slots
 from hfg.engine.model.vertex import RunningEvent
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import concurrency, firing
+from hfg.engine.rules import beside, concurrency, firing
 from hfg.engine.rules.sending import trigger
 from hfg.engine.rules.sharing import need_unwritten
 from hfg.engine.runtime import plan, relays
@@ -30,10 +30,13 @@ def bind(worker: Worker) -> None:
     node_type = worker.type
     if node is None or worker.silent_code:
         return
+    if worker.scope is None:
+        node._start_task = partial(worker.core.host.start_task, worker)
     ports = node.ports
     for position, name in enumerate(node_type.outputs):
         write = firing.write if worker.flights is None else concurrency.write
-        ports.outputs[name]._emit = partial(write, worker, position)
+        emit = partial(write, worker, position)
+        ports.outputs[name]._emit = emit if worker.tasks is None else beside.refusing(worker, position, emit)
     for name in node_type.events:
         bind_event(worker, name)
 
@@ -58,7 +61,7 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     port.__dict__.pop("trigger", None)  # the fast path, if it had one where it ran before (R4)
     if worker.group.threaded:
         port._emit = partial(_from_thread, worker, event)
-    elif worker.core.debug or worker.flights is not None or worker.attempts is not None:
+    elif worker.core.debug or any(one is not None for one in (worker.flights, worker.attempts, worker.tasks)):
         emit = slots.emitter(event, plainly=True)
         port._emit = lambda value, activity, stamp: emit(value, activity=activity, stamp=stamp)
     else:
@@ -69,6 +72,8 @@ def bind_event(worker: Worker, name: str) -> RunningEvent:
     if worker.flights is not None or worker.attempts is not None:
         port._emit = concurrency.triggering(worker, port._emit)
         port._emit_wait = concurrency.triggering(worker, port._emit_wait)
+    if worker.tasks is not None:
+        port._emit = beside.triggering(event, port._emit)
     if worker.core.debug:
         port._emit, port._emit_wait = _checked(worker, port, port._emit), _checked(worker, port, port._emit_wait)
     host.adopt_event(port)
@@ -139,6 +144,7 @@ def release_ports(worker: Worker) -> None:
     node = worker.node
     if node is not None:
         node._active = False
+        node._start_task = None
     for event in worker.events.values():
         port = event.port
         if port is not None:

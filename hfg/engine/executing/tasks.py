@@ -1,0 +1,198 @@
+"""Runs the tasks that the code of nodes starts by `start_soon`: children of their nodes (rules X1, X3, R5).
+
+Each is carried as the code of an async node is, so that at the end of the run it can be left behind and outlives
+nothing. Stands on `carrier` and `code`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+from collections.abc import Callable, Coroutine
+from functools import partial
+from typing import Any, Protocol
+
+from hfg.clock import current_clock, current_elapsed
+from hfg.engine.executing.carrier import Carrier
+from hfg.engine.executing.code import CodeRunner, speak_for
+from hfg.engine.model.core import PENDING, Core
+from hfg.engine.model.flights import current_flight
+from hfg.engine.model.tasks import Task, Tasks, current_task
+from hfg.engine.model.worker import DISABLED, ENDED, Worker
+from hfg.engine.rules import errors
+from hfg.errors import NodeError, NotRunning, UsageError
+from hfg.logs import current_log
+
+__all__ = ["TaskRunner"]
+
+_OF_THE_RUN: tuple[contextvars.ContextVar[Any], ...] = (current_clock, current_elapsed, current_log)
+
+
+class _Pump(Protocol):
+    """What is told that a task has gone on: the engine."""
+
+    def guard(self, call: Callable[[], None]) -> None:
+        """Call something of ours; what it raises ends the run."""
+
+    def go_on(self) -> None:
+        """A callback of the loop is over: pump."""
+
+    def give_way(self, call: Callable[[], None]) -> None:
+        """Call it behind all that is ready now."""
+
+    def soon(self, callback: Callable[[], None]) -> None:
+        """Call back at the loop's next pass."""
+
+    def on_loop(self) -> bool:
+        """Whether the caller is on the run's own thread."""
+
+
+class TaskRunner:
+    """Runs the tasks of the nodes of one engine.
+
+    Attributes:
+      under_way: all of them, those too of nodes that an edit has taken out.
+    """
+
+    def __init__(self, engine: _Pump, core: Core, code: CodeRunner) -> None:
+        self._engine = engine
+        self._core = core
+        self._code = code
+        self.under_way: dict[Task, None] = {}
+        self._problems: list[NodeError] = []
+
+    def start(self, worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> None:
+        """Run a coroutine as a child of a node, from the loop's next pass on.
+
+        Raises:
+          UsageError: the node is in a thread, or the call comes from one.
+          NotRunning: the node is not set up, or the run is over.
+        """
+        name = getattr(coroutine, "__name__", type(coroutine).__name__)
+        refusal = self._refusal(worker, name)
+        if refusal is not None:
+            coroutine.close()
+            raise refusal
+        _not_again(worker)
+        if worker.blocked & DISABLED and not worker.opening:
+            coroutine.close()  # a firing of a node that was switched off meanwhile: what it does goes nowhere (F10)
+            return
+        if worker.tasks is None:
+            worker.start_tasks(Tasks(worker))
+            self._core.upstairs.bind_ports(worker)  # what it sends is looked at from here on
+        task = Task(worker, name, coroutine)
+        worker.tasks.begin(task)
+        self.under_way[task] = None
+        self._engine.soon(partial(self._begin, task, self._context(task)))
+
+    def _refusal(self, worker: Worker, name: str) -> Exception | None:
+        call = f'"{worker.path}" cannot start_soon({name}(...))'
+        if worker.group.threaded:
+            return UsageError(
+                f'{call}, for its group "{worker.group.name}" is a thread and async code runs on the loop; leave out '
+                "group=, or send an event to a node on the loop that starts it"
+            )
+        if not self._engine.on_loop():
+            return UsageError(
+                f"{call} from a thread, for async code runs on the loop; call it where the thread is awaited"
+            )
+        if self._core.over:
+            return NotRunning(f"{call}, for the run is over; await it in teardown() itself")
+        if not worker.is_up:
+            return NotRunning(f"{call} while it is torn down; await it in teardown(), or start it in setup()")
+        return None
+
+    def _context(self, task: Task) -> contextvars.Context:
+        """What the code that has started it sees, but for whose code it is."""
+        context = contextvars.copy_context()
+        for one in _OF_THE_RUN:
+            context.run(one.set, self._code.context[one])
+        context.run(speak_for, task.worker)
+        context.run(current_flight.set, None)
+        context.run(current_task.set, task)
+        return context
+
+    def _begin(self, task: Task, context: contextvars.Context) -> None:
+        """Its turn has come; it may be over at its first step."""
+        code, core = self._code, self._core
+        if task not in self.under_way:
+            return  # it was left behind
+        if task.cancelled:
+            self._over(task, None, None)
+            return
+        worker = task.worker
+        carrier = Carrier(code.loop, f"hfg {worker.path} {task.name}", code.context, context, self._engine.give_way)
+        task.be_carried(carrier)
+        core.current = worker
+        try:
+            result = carrier.start(task.coroutine, partial(self._over, task))
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            self._over(task, None, error)
+        else:
+            if result is not PENDING:
+                self._over(task, None, None)
+        finally:
+            core.current = None
+
+    def _over(self, task: Task, _result: object, error: BaseException | None) -> None:
+        """It has come to its end."""
+        self._core.current = None
+        if task in self.under_way:
+            self._engine.guard(partial(self._end, task, error))
+            if self._core.over:
+                self._code.came_back.set()
+            else:
+                self._engine.go_on()
+
+    def _end(self, task: Task, error: BaseException | None) -> None:
+        worker = task.worker
+        del self.under_way[task]
+        if task.carrier is None:
+            task.coroutine.close()
+        else:
+            task.carrier.drop()
+        if error is not None and not isinstance(error, asyncio.CancelledError):
+            self._failed(task, error)
+        tasks: Tasks = worker.tasks
+        tasks.over(task)
+
+    def _failed(self, task: Task, error: BaseException) -> None:
+        """X1: the policy of its node decides; of one that was to end, it is told with other errors (X3)."""
+        worker = task.worker
+        what = task.what + (", after its end" if worker.blocked & ENDED else "")
+        if self._core.over:
+            self._problems.append(errors.as_node_error(worker, what, error))
+        elif task.cancelled and not worker.blocked & DISABLED:
+            worker.tasks.problems.append(errors.as_node_error(worker, what, error))
+        else:
+            errors.fail_beside(worker, what, error)
+
+    # --- the end ----------------------------------------------------------------------------------------------------
+
+    def cancel_all(self) -> None:
+        """The run is over."""
+        for task in list(self.under_way):
+            task.cancel()
+
+    def leave_behind(self, seconds: float) -> list[NodeError]:
+        """Wait no more for what does not end; gives back what failed meanwhile, and what did not end."""
+        problems, self._problems = self._problems, []
+        for task in list(self.under_way):
+            worker = task.worker
+            words = f"it was cancelled and did not end within {seconds:.1f} s"
+            problems.append(NodeError(worker.path, task.what, words))
+            self._end(task, None)
+        return problems
+
+
+def _not_again(worker: Worker) -> None:
+    """X1: a firing that has started a task cannot be taken back, as one that has sent a signal cannot."""
+    if current_task.get() is not None:
+        return
+    flight = current_flight.get()
+    if flight is not None and flight.worker is worker:
+        flight.attempts.has_triggered()
+    elif worker.attempts is not None:
+        worker.attempts.has_triggered()

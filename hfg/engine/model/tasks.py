@@ -1,0 +1,130 @@
+"""Tasks that the code of one node has started by `start_soon` (rules X1, X3, R5): what the rules know of them.
+
+They are beside the node's firings: none waits for them, but quiet and the node's teardown do. Plain state; what makes
+them go on is `executing.tasks`, and both exist only where somebody has started one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any
+
+from hfg.errors import NodeError
+
+if TYPE_CHECKING:
+    from hfg.engine.model.worker import Worker
+
+__all__ = ["Task", "Tasks", "current_task"]
+
+
+class Task:
+    """One of them.
+
+    Attributes:
+      worker: whose code has started it.
+      name: of its coroutine function.
+      coroutine: what it runs.
+      carrier: what carries it once it has begun.
+      cancelled: its node is torn down or switched off, or the run is over.
+    """
+
+    __slots__ = ("cancelled", "carrier", "coroutine", "name", "worker")
+
+    def __init__(self, worker: Worker, name: str, coroutine: Coroutine[Any, Any, Any]) -> None:
+        self.worker = worker
+        self.name = name
+        self.coroutine = coroutine
+        self.carrier: Any = None
+        self.cancelled = False
+
+    @property
+    def what(self) -> str:
+        """What it is called where it fails."""
+        return f'task "{self.name}"'
+
+    def be_carried(self, carrier: object) -> None:
+        """It begins."""
+        self.carrier = carrier
+
+    def is_current(self) -> bool:
+        """Whether the code that asks is its own, and not that of something which it has started by itself."""
+        return self.carrier is not None and self.carrier.is_current()
+
+    def cancel(self) -> None:
+        """Let it end: at what it waits for, or before it has begun."""
+        self.cancelled = True
+        if self.carrier is not None:
+            self.carrier.cancel()
+
+
+current_task: ContextVar[Task | None] = ContextVar("hfg.task", default=None)
+"""Whose code runs, if it is that of a task; also in the tasks that it starts by itself."""
+
+
+class Tasks:
+    """Those of one node that are under way.
+
+    Attributes:
+      waiting_room: how many wait until a queue has room (F8).
+      problems: what those failed with that were cancelled, for whoever ends them.
+    """
+
+    __slots__ = ("_on_rest", "_under_way", "_worker", "problems", "waiting_room")
+
+    def __init__(self, worker: Worker) -> None:
+        self._worker = worker
+        self._under_way: dict[Task, None] = {}
+        self._on_rest: list[Callable[[], None]] = []
+        self.waiting_room = 0
+        self.problems: list[NodeError] = []
+
+    def __len__(self) -> int:
+        return len(self._under_way)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What they are called, in the order in which they began."""
+        return tuple(task.name for task in self._under_way)
+
+    @property
+    def move(self) -> bool:
+        """Whether one of them does not only wait for room."""
+        return len(self._under_way) > self.waiting_room
+
+    def begin(self, task: Task) -> None:
+        """One more."""
+        self._under_way[task] = None
+        self._worker.core.tasks += 1
+
+    def over(self, task: Task) -> None:
+        """One less; behind the last one those have their turn who wait for that."""
+        del self._under_way[task]
+        self._worker.core.tasks -= 1
+        if not self._under_way:
+            waiting, self._on_rest = self._on_rest, []
+            for callback in waiting:
+                callback()
+
+    def wait_for_room(self, how_many: int) -> None:
+        """F8: so many more of them await `trigger_wait`."""
+        self.waiting_room += how_many
+        self._worker.core.waiting_room += how_many
+
+    def cancel(self) -> None:
+        """Let all of them end."""
+        for task in list(self._under_way):
+            task.cancel()
+
+    def end(self, then: Callable[[], None]) -> bool:
+        """Let all of them end; whether there are any, which `then` follows."""
+        if not self._under_way:
+            return False
+        self._on_rest.append(then)
+        self.cancel()
+        return True
+
+    def take_problem(self) -> NodeError | None:
+        """What the first of them failed with that failed as it was cancelled."""
+        problems, self.problems = self.problems, []
+        return problems[0] if problems else None

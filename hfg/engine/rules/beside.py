@@ -1,0 +1,52 @@
+"""What the code of tasks sends, which is beside the firings of their node (rules F3, T5, A3).
+
+Installed on a node's ports when its code has started one by `start_soon`; others pay nothing. Stands on `sending`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeAlias
+
+from hfg.engine.model.tasks import current_task
+from hfg.engine.model.worker import RunningEvent, Worker
+from hfg.engine.rules.sending import trigger_beside
+from hfg.errors import UsageError
+
+__all__ = ["refusing", "triggering"]
+
+_Emit: TypeAlias = Callable[[Any, int | None, float | None], Any]
+
+
+def refusing(worker: Worker, position: int, emit: _Emit) -> _Emit:
+    """What writes to an output of a worker: its firings do, its tasks may not (F3)."""
+
+    def write(value: Any, activity: int | None, stamp: float | None) -> Any:
+        task = current_task.get()
+        if task is not None and task.worker is worker:
+            raise UsageError(
+                f'output "{worker.path}.{worker.out_names[position]}" was written by the task "{task.name}": outputs '
+                "belong to process() and end(); trigger an event instead"
+            )
+        return emit(value, activity, stamp)
+
+    return write
+
+
+def triggering(event: RunningEvent, emit: _Emit) -> _Emit:
+    """What triggers an event of a worker: for its tasks each signal is a sending of its own."""
+    worker = event.worker
+    host = worker.core.host
+
+    def send(value: Any, activity: int | None, stamp: float | None) -> Any:
+        task = current_task.get()
+        if task is None or task.worker is not worker:
+            return emit(value, activity, stamp)
+        if host.on_loop():
+            trigger_beside(event, value, activity, stamp)
+        else:  # from a thread that the task has started
+            host.bring_in(partial(trigger_beside, event, value, activity, stamp))
+        return None
+
+    return send
