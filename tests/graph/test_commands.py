@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -266,6 +268,99 @@ def test_a_subgraph_with_a_type_is_told_by_that_and_what_was_set_or_switched_ins
     assert other["loud/first"].factor == 4  # promoted, as in the one that was built
 
 
+EDITED: list[list[c.Command]] = [
+    [c.Disconnect("loud/first.out", "loud/second.value")],
+    [c.Rename("loud/first", "other"), c.SetParameter("loud.by", 5)],
+    [c.SetParameter("loud/first.factor", 6), c.Remove("loud/second")],
+    [c.Promote("loud.by", "loud/second.factor")],
+    [c.Promote("loud.by", "loud/first.factor", promoted=False), c.SetParameter("loud.by", 8)],
+    [c.Enclose(("loud",), "around"), c.Disconnect("around/loud/first.out", "around/loud/second.value")],
+    [c.Copy("loud", "again"), c.Remove("again/first")],
+    [c.Replace("loud/first", "hfg.testing.nodes:Scaled", {"factor": 2}), c.Note("loud/first", "text", "here")],
+]
+
+
+@pytest.mark.rule("G3", "R4")
+@pytest.mark.parametrize("edits", EDITED, ids=lambda edits: type(edits[0]).__name__)
+def test_an_edited_inside_with_promoted_parameters_is_told(edits: list[c.Command]) -> None:
+    graph = louder()
+    before = drawn(graph)
+    graph.edit(*edits)
+    other = hfg.Graph("music")
+    other.edit(*c.decode(c.encode(graph.as_commands())))
+    assert drawn(other, identity=False) == drawn(graph, identity=False)
+    assert other.as_commands() == graph.as_commands()
+    graph.undo()
+    assert drawn(graph) == before
+    graph.redo()
+    assert drawn(other, identity=False) == drawn(graph, identity=False)
+
+
+@pytest.mark.rule("G3")
+def test_a_promotion_takes_the_value_along_and_is_undone_with_it() -> None:
+    graph = louder()
+    graph["loud/second"].factor = 7
+    graph.edit(c.Promote("loud.by", "loud/second.factor"))
+    assert graph["loud/second"].factor == 3
+    graph.edit(c.SetParameter("loud.by", 4))
+    assert (graph["loud/first"].factor, graph["loud/second"].factor) == (4, 4)
+    graph.undo()
+    graph.undo()
+    assert graph["loud/second"].factor == 7
+    graph.edit(c.SetParameter("loud.by", 5))
+    assert (graph["loud/first"].factor, graph["loud/second"].factor) == (5, 7)
+
+
+@pytest.mark.rule("R4", "P8")
+def test_a_promotion_is_followed_by_a_graph_that_runs() -> None:
+    async def main() -> tuple[int, int]:
+        graph = louder()
+        async with hfg.running(graph, clock="virtual") as run:
+            await run.edit(c.Promote("loud.by", "loud/second.factor"))
+            await run.edit(c.SetParameter("loud.by", 9))
+            return graph["loud/first"].factor, graph["loud/second"].factor
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        assert runner.run(main()) == (9, 9)
+
+
+WRONG_PROMOTIONS = {
+    c.Promote("loud.by", "loud/first.factor"): '"loud/first.factor" is promoted already',
+    c.Promote("loud.bye", "loud/second.factor"): 'there is no "loud.bye"',
+    c.Promote("loud/second.factor", "loud/first.factor"): '"loud/second.factor" is no parameter of the subgraph',
+    c.Promote("loud.by", "loud/second.factor", promoted=False): '"loud.by" does not stand for "loud/second.factor"',
+    c.Promote(3, "loud/second.factor"): "3",  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("command", WRONG_PROMOTIONS, ids=str)
+def test_a_promotion_that_cannot_be_is_refused(command: c.Promote) -> None:
+    graph = louder()
+    before = drawn(graph)
+    with pytest.raises(GraphError, match=WRONG_PROMOTIONS[command]):
+        graph.edit(command)
+    assert drawn(graph) == before
+
+
+WRONGLY_WRITTEN: dict[str, Callable[[], object]] = {
+    "commands.Add: missing required argument 'path'; write commands.Add(type, path, parameters=..., options=...)": (
+        lambda: c.Add("hfg.testing.nodes:Scaled")  # type: ignore[call-arg]
+    ),
+    "commands.Rename: extra positional arguments provided; write commands.Rename(path, name)": (
+        lambda: c.Rename("a", "b", "c")  # type: ignore[call-arg]
+    ),
+    "commands.Remove: unexpected keyword argument 'pth'; write commands.Remove(path)": (
+        lambda: c.Remove("a", pth="b")  # type: ignore[call-arg]
+    ),
+}
+
+
+@pytest.mark.parametrize("sentence", WRONGLY_WRITTEN)
+def test_a_command_that_is_written_wrongly_says_how_it_is_written(sentence: str) -> None:
+    with pytest.raises(GraphError, match=f"^{re.escape(sentence)}$"):
+        WRONGLY_WRITTEN[sentence]()
+
+
 def test_a_port_of_the_whole_has_a_type_that_is_said_as_a_text() -> None:
     graph = hfg.Graph()
     hints: list[Any] = [
@@ -298,10 +393,6 @@ def _untold() -> dict[str, tuple[Callable[[hfg.Graph], object], str]]:
     def local(value: int) -> int:
         return value
 
-    def edited(graph: hfg.Graph) -> None:
-        graph.add(Louder(), name="box")
-        graph.edit(c.Disconnect("box/first.out", "box/second.value"))
-
     def observable(graph: hfg.Graph) -> None:
         graph.connect(reactivex.of(1), graph.add(sink()).value)
 
@@ -309,10 +400,6 @@ def _untold() -> dict[str, tuple[Callable[[hfg.Graph], object], str]]:
         "a type without a name": (
             lambda graph: graph.add(local(), name="here"),
             'node "here": its type .*local cannot be found by name, so no command can make it; define it at the top',
-        ),
-        "an inside that was edited": (
-            edited,
-            'subgraph "box": what is inside was edited and is not what Louder builds, and its promoted',
         ),
         "an observable": (
             observable,

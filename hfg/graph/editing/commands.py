@@ -7,7 +7,7 @@ A command can be logged, sent over a wire and carried out again: `encode` and `d
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import msgspec
 
@@ -35,6 +35,7 @@ __all__ = [
     "Move",
     "Note",
     "Operator",
+    "Promote",
     "Remove",
     "RemoveGroup",
     "Rename",
@@ -47,7 +48,32 @@ __all__ = [
 ]
 
 
-class Command(msgspec.Struct, frozen=True, tag=True, tag_field="do", forbid_unknown_fields=True, omit_defaults=True):
+class _Sentence(msgspec.StructMeta):
+    """Commands that are written wrongly say so as all of hfg does: which one, what it takes and what was found."""
+
+    if not TYPE_CHECKING:  # type checkers know it of the fields
+
+        def __call__(self, *values: object, **named: object) -> object:
+            try:
+                return super().__call__(*values, **named)
+            except TypeError as error:
+                words = str(error)
+                fields = [
+                    one.name if one.required else f"{one.name}=..." for one in msgspec.structs.fields(cast(Any, self))
+                ]
+                name = f"commands.{self.__name__}"
+                raise GraphError(f"{name}: {words[:1].lower()}{words[1:]}; write {name}({', '.join(fields)})") from None
+
+
+class Command(
+    msgspec.Struct,
+    metaclass=_Sentence,
+    frozen=True,
+    tag=True,
+    tag_field="do",
+    forbid_unknown_fields=True,
+    omit_defaults=True,
+):
     """One edit. Paths are those of the whole graph: "fetch/go_to", "fetch/go_to.goal", "fetch.person.inner"."""
 
 
@@ -232,6 +258,20 @@ class Ungate(Command, frozen=True):
     path: str
 
 
+class Promote(Command, frozen=True):
+    """Let a parameter of a subgraph stand for one inside, as `graph.promote` does in `build()` (rule G3), or no more.
+
+    Attributes:
+      path: of the parameter of the subgraph, "follow.speed".
+      inner: of the one inside, "follow/plan.limit", which takes the value of the first.
+      promoted: False takes it back; the value stays.
+    """
+
+    path: str
+    inner: str
+    promoted: bool = True
+
+
 class SetParameter(Command, frozen=True):
     """Set a parameter, "lookup.tolerance"."""
 
@@ -297,6 +337,7 @@ AnyCommand: TypeAlias = (
     | Disable
     | Gate
     | Ungate
+    | Promote
     | SetParameter
     | Note
     | Enclose

@@ -49,7 +49,7 @@ from hfg.graph.structure.operators import find_operator
 from hfg.graph.structure.options import DEFAULT_CAPACITY, GroupSpec, edge_options, group_spec
 from hfg.graph.structure.places import side_of
 from hfg.graph.structure.pointing import level_and_name, node_at, parameter_at, source_at, target_at
-from hfg.graph.structure.promoting import refuse_standing, stands_for
+from hfg.graph.structure.promoting import refuse_promotion, refuse_standing, stands_for
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
 from hfg.ports import ParameterPort, Port
@@ -367,13 +367,34 @@ class _Hand:
 
     def _setparameter(self, command: c.SetParameter) -> None:
         port = parameter_at(self.root, command.path)
-        reached = list(stands_for(port))
-        before = [(one.node, one.name, one.value) for one in reached]
         try:
-            port.value = fitting(port.spec, command.value)
+            value = fitting(port.spec, command.value)
+        except ValueError as error:
+            raise GraphError(str(error)) from error
+        self._write(port, value)
+
+    def _write(self, port: ParameterPort[Any], value: object) -> None:
+        """Give a parameter, and those that it stands for, a value."""
+        before = [(one.node, one.name, one.value) for one in stands_for(port)]
+        try:
+            port.value = value
         except ValueError as error:
             raise GraphError(str(error)) from error
         self.changes += [ParameterChange(node, name, value, node._parameters[name]) for node, name, value in before]
+
+    def _promote(self, command: c.Promote) -> None:
+        outer, inner = parameter_at(self.root, command.path), parameter_at(self.root, command.inner)
+        around = level_of(inner.node.place.graph)
+        promoted = around.promotions.copied()
+        if not command.promoted:
+            standing = promoted.get(outer.name, []) if around.owner is outer.node else []
+            if inner not in standing:
+                raise GraphError(f'"{outer.path}" does not stand for "{inner.path}", so there is nothing to take back')
+            self.promote(around, promoted | {outer.name: [port for port in standing if port is not inner]})
+            return
+        refuse_promotion(around, outer, inner)
+        self._write(inner, outer.value)
+        self.promote(around, promoted | {outer.name: [*promoted.get(outer.name, []), inner]})
 
     # --- edges ---
 

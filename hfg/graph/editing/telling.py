@@ -10,6 +10,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import msgspec
+
 from hfg.encoding import encode
 from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing import commands as c
@@ -20,6 +22,8 @@ from hfg.graph.structure.edge import Edge, is_feed, type_of
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.operators import NamedOperator
 from hfg.graph.structure.options import EdgeOptions, NodeOptions
+from hfg.graph.structure.pointing import parameter_at
+from hfg.graph.structure.promoting import stands_for
 from hfg.graph.structure.subgraph import Subgraph, inside, is_box
 from hfg.graph.structure.whole import Whole
 from hfg.nodetype import Node
@@ -92,14 +96,16 @@ class _Telling:
                 inner, inner_made = inside(node), inside(made.nodes[name])
                 if inner is None or inner_made is None:
                     continue
-                if same(_shape(inner), _shape(inner_made)):
-                    self._tell_values(node, inner, inner_made)
+                if same(_shape(inner), _shape(inner_made)) and _tells_apart(inner, inner_made):
+                    self._tell_values(inner, inner_made)
                     continue
-                self._clear(node, inner_made)
+                self._clear(inner_made)
                 waiting.append((inner, inner_made))
         for level, _ in found:
             for edge in level.edges:
                 self.say(_connected(edge))
+        for level, _ in reversed(found):  # inner ones first: a value goes on to what the parameter stands for
+            self._tell_promotions(level)
 
     def _tell_node(self, node: Node) -> None:
         path, options = node.place.path, _others(node._options, _PLAIN_NODE)
@@ -114,12 +120,19 @@ class _Telling:
                 "define it at the top of a module"
             )
 
-    def _tell_values(self, node: Node, inner: Level, made: Level) -> None:
-        """What is inside of a subgraph is what its type builds; what was set or switched there is told beside.
+    def _tell_promotions(self, level: Level) -> None:
+        """What the parameters of a subgraph stand for; one inside may have been set by itself since."""
+        if level.owner is None:
+            return
+        for name, ports in level.promotions.by_name.items():
+            for port in ports:
+                self.say(c.Promote(level.owner.ports.parameters[name].path, port.path))
+                for one in stands_for(port):
+                    if one.spec.is_given and not same(parameter_at(self.made, one.path).value, one.value):
+                        self.say(c.SetParameter(one.path, _data(one.spec.encode, one.value)))
 
-        Raises:
-          GraphError: something else is different, too.
-        """
+    def _tell_values(self, inner: Level, made: Level) -> None:
+        """What is inside of a subgraph is what its type builds; what was set or switched there is told beside."""
         there = _walk(made)
         for path, one in _walk(inner).items():
             other = there[path]
@@ -131,28 +144,13 @@ class _Telling:
                 self.say(c.Enable(path) if one._options.enabled else c.Disable(path))
             if one._options.group != other._options.group:
                 self.say(c.Move(path, one._options.group))
-        for path, one in _walk(inner).items():
-            if one._options != there[path]._options or not same(_given(one), _given(there[path])):
-                raise self._not_as_built(node)
 
-    def _clear(self, node: Node, made: Level) -> None:
-        """What its type builds inside is something else by now: it is taken out, and what is there told instead.
-
-        Raises:
-          GraphError: a parameter of the subgraph stands for one inside, which only build() can say.
-        """
-        if any(one.promotions.by_name for one in (inside(node), made) if one is not None):
-            raise self._not_as_built(node)
+    def _clear(self, made: Level) -> None:
+        """What its type builds inside is something else by now: it is taken out, and what is there told instead."""
         for edge in list(made.edges):
             self.say(c.Disconnect(edge.source.path, edge.target.path))
         for name in list(made.nodes):
             self.say(c.Remove(made.path_to(name)))
-
-    def _not_as_built(self, node: Node) -> GraphError:
-        return GraphError(
-            f'subgraph "{node.place.path}": what is inside was edited and is not what {node._type.qualname} '
-            "builds, and its promoted parameters can be said by build() alone; let build() make it so"
-        )
 
     def _tell_gates(self) -> None:
         there = {(gate.target.place.path, gate.by.place.path) for level in self.made.walk() for gate in level.gates}
@@ -242,6 +240,20 @@ def _operator(edge: Edge, operator: object) -> c.Operator:
         )
     arguments = tuple(_data(encode, one) for one in operator.arguments)
     return c.Operator(reference, arguments, {name: _data(encode, one) for name, one in operator.parameters.items()})
+
+
+def _tells_apart(inner: Level, made: Level) -> bool:
+    """Whether all that differs inside are values, switches and groups, which commands say of nodes that are there."""
+    others = _walk(made)
+    for path, one in _walk(inner).items():
+        other = others[path]
+        here, there = one._options, other._options
+        if msgspec.structs.replace(there, enabled=here.enabled, group=here.group) != here:
+            return False
+        ports, before = one._type.parameters, _given(other)
+        if any(not same(before[name], value) for name, value in _given(one).items() if not ports[name].is_port):
+            return False
+    return True
 
 
 # --- what is the same ---

@@ -25,6 +25,7 @@ from hfg.graph.editing.commands import (
     Dissolve,
     Enclose,
     Move,
+    Promote,
     Replace,
     SetEdge,
 )
@@ -50,7 +51,7 @@ __all__ = [
     "undo",
 ]
 
-_MAY_BREAK = (Add, ChangeGroup, Connect, Copy, Dissolve, Enclose, Move, Replace, SetEdge)
+_MAY_BREAK = (Add, ChangeGroup, Connect, Copy, Dissolve, Enclose, Move, Promote, Replace, SetEdge)
 """Commands after which something may be wrong that only the whole shows."""
 
 

@@ -13,7 +13,7 @@ from hfg.graph.structure.subgraph import inside
 from hfg.ports import ParameterPort
 from hfg.types import describe, why_not
 
-__all__ = ["promote", "refuse_standing", "stands_for"]
+__all__ = ["promote", "refuse_promotion", "refuse_standing", "stands_for"]
 
 
 def promote(level: Level, outer: ParameterPort[Any], inner: ParameterPort[Any]) -> None:
@@ -24,12 +24,17 @@ def promote(level: Level, outer: ParameterPort[Any], inner: ParameterPort[Any]) 
     """
     level.need_rest("promoting a parameter")
     with Refusable(outer):
-        _refuse_promotion(level, outer, inner)
+        refuse_promotion(level, outer, inner)
         inner.value = outer.value
         level.promotions.add(outer.name, inner)
 
 
-def _refuse_promotion(level: Level, outer: ParameterPort[Any], inner: ParameterPort[Any]) -> None:
+def refuse_promotion(level: Level, outer: ParameterPort[Any], inner: ParameterPort[Any]) -> None:
+    """Raise if a parameter of the subgraph cannot stand for one inside.
+
+    Raises:
+      GraphError: the two cannot be one.
+    """
     for port, role in ((outer, "first"), (inner, "second")):
         if not isinstance(port, ParameterPort):
             raise GraphError(
