@@ -237,10 +237,12 @@ def _drive(graph: Graph, node: Node, name: str, steps: tuple[Step, ...], tick_s:
 
 def _seen(node: Node, seen: Recorder, tick_s: float) -> dict[str, list[Step]]:
     found: dict[str, list[Step]] = {}
+    ears = {f"from_{name}.value": name for name in node.ports.outputs}
+    ears |= {f"at_{name}.hear": name for name in node.ports.events}  # of a subgraph an edge begins at a node inside
     for event in seen:
         tick = round(event.time / tick_s)
-        if isinstance(event, TokenSent) and event.edge.startswith("node."):
-            port = event.edge.partition(" -> ")[0].removeprefix("node.")
+        port = ears.get(event.edge.partition(" -> ")[2]) if isinstance(event, TokenSent) else None
+        if isinstance(event, TokenSent) and port is not None:
             found.setdefault(port, []).append(Step(tick, event.token.value, event.token.activity))
         elif isinstance(event, ActivityChanged) and event.node == "node":
             found.setdefault("activity", []).append(Step(tick, None, 1 if event.active else -1))
