@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from typing import Final
 
 from hfg.clock import elapsed
 from hfg.nodetype import Node
 
 __all__ = ["Alarm"]
+
+_INSTANT_S: Final = 1e-9
+"""What is closer is now: a clock in whole nanoseconds never reaches the last digits of a sum of floats."""
 
 
 class Alarm:
@@ -55,7 +59,7 @@ class Alarm:
         try:
             while self.due is not None:
                 rest = self.due - elapsed()
-                if rest > 0:  # it was set to a later moment meanwhile, or has just begun
+                if rest > _INSTANT_S:  # it was set to a later moment meanwhile, or has just begun
                     await self._sleep(rest)
                 else:
                     self.due = None

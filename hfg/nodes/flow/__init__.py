@@ -5,6 +5,7 @@
     joining     what belongs together: by step, by stamp, the newest of each; sample and hold
     keeping     values that are kept and given again: latch, buffer, cache, a cell that nodes share
     collecting  several values as one: counters, the last ones, windows
+    timing      values that come later or less often: delay, debounce, throttle
 
 All of them pass on values, never token objects (rule A4), so activity goes through them by active edges alone, as it
 does through any node. `docs/howto/library.md` shows how to choose, and which nodes of CS::APEX they stand for.
@@ -12,7 +13,7 @@ does through any node. `docs/howto/library.md` shows how to choose, and which no
 
 from hfg.nodes.flow.collecting import Accumulate, Count, CountItems, Recent, TimeWindow, Window
 from hfg.nodes.flow.joining import CombineLatest, Join, JoinByStamp, SampleAndHold, Synchronizer
-from hfg.nodes.flow.keeping import HoldableBuffer, Latch, TriggeredLatch
+from hfg.nodes.flow.keeping import Cache, HoldableBuffer, Latch, MemoryCell, TriggeredLatch
 from hfg.nodes.flow.passing import (
     AtEnd,
     Different,
@@ -27,13 +28,17 @@ from hfg.nodes.flow.passing import (
     relay,
 )
 from hfg.nodes.flow.routing import Demux, Gate, Merge, Mux, Rejoin, Split, switch
+from hfg.nodes.flow.timing import Debounce, Delay, Throttle
 
 __all__ = [
     "Accumulate",
     "AtEnd",
+    "Cache",
     "CombineLatest",
     "Count",
     "CountItems",
+    "Debounce",
+    "Delay",
     "Demux",
     "Different",
     "Distinct",
@@ -44,6 +49,7 @@ __all__ = [
     "JoinByStamp",
     "Latch",
     "MarkerDetector",
+    "MemoryCell",
     "Merge",
     "MessageEvent",
     "Mux",
@@ -56,6 +62,7 @@ __all__ = [
     "Synchronizer",
     "Take",
     "TakeWhile",
+    "Throttle",
     "TimeWindow",
     "TriggeredLatch",
     "Window",

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
+import weakref
 from collections import deque
-from typing import Any
+from typing import Any, Final
 
-from annotated_types import Ge, Interval
+from annotated_types import Ge, Gt, Interval
 
+from hfg.clock import elapsed
 from hfg.errors import EndOfStream
+from hfg.graph import Graph
+from hfg.graph.structure.level import level_of
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
-__all__ = ["HoldableBuffer", "Latch", "TriggeredLatch"]
+__all__ = ["Cache", "HoldableBuffer", "Latch", "MemoryCell", "TriggeredLatch"]
 
 
 class Latch(Node):
@@ -124,3 +129,179 @@ class HoldableBuffer(Node):
             while len(self.kept) > self.size:
                 self.kept.popleft()
         return self.kept[-1 - self.index] if self.index < len(self.kept) else None
+
+
+class Cache(Node):
+    """Record values, and play them back at a rate.
+
+    What comes is kept, the last `size` values. `play` tells those from `first` to `last`, each in its turn and not
+    before there is room for it behind an edge that waits; with `loop` again and again, until `pause`. What comes
+    meanwhile is kept for the next time. `play` while it plays begins anew.
+
+    Attributes:
+      value: is kept.
+      size: how many values are kept; the oldest are forgotten.
+      buffered: how many there are.
+      rate_hz: how many values a second are told.
+      first: the number of the first value to be told, from 0, which is the oldest.
+      last: the number of the last one; negative numbers count from the newest, which is -1.
+      loop: whether the first follows the last.
+      play: begins to tell them.
+      pause: tells no more.
+      forget: keeps nothing.
+      played: a value that was kept.
+      finished: all were told; does not come with `loop`, nor behind `pause`.
+
+    CS::APEX: csapex::Cache.
+    """
+
+    played = Event(Any)
+    finished = Event()
+    size = Parameter(100, Ge(1))
+    buffered = Parameter(0, read_only=True)
+    rate_hz = Parameter(10.0, Gt(0), unit="Hz")
+    first = Parameter(0)
+    last = Parameter(-1)
+    loop = Parameter(False)
+    kept = State(factory=deque[Any])
+    playing = State(0)
+    """The number of the playback under way; 0: none."""
+    playbacks = State(0)
+
+    @slot
+    def value(self, value: Any) -> None:
+        """Keep it."""
+        self.kept.append(value)
+        while len(self.kept) > self.size:
+            self.kept.popleft()
+        self.buffered = len(self.kept)
+
+    @slot
+    def play(self) -> None:
+        """Begin to tell them."""
+        self.playbacks += 1
+        self.playing = self.playbacks
+        self.start_soon(self._play(self.playing, self._chosen()))
+
+    @slot
+    def pause(self) -> None:
+        """Tell no more."""
+        self.playing = 0
+
+    @slot
+    def forget(self) -> None:
+        """Keep nothing."""
+        self.kept.clear()
+        self.buffered = 0
+
+    def _chosen(self) -> list[Any]:
+        count = len(self.kept)
+        first, last = (number + count if number < 0 else number for number in (self.first, self.last))
+        return list(self.kept)[max(0, first) : last + 1]
+
+    async def _play(self, number: int, values: list[Any]) -> None:
+        due, turns = elapsed(), 0
+        while values and (self.loop or not turns):
+            for value in values:
+                await asyncio.sleep(max(0.0, due - elapsed()))
+                if self.playing != number:
+                    return
+                await self.played.trigger_wait(value)
+                due = max(due, elapsed() - 1 / self.rate_hz) + 1 / self.rate_hz  # nothing is made up in a burst
+            turns += 1
+        if self.playing == number:
+            self.playing = 0
+            self.finished.trigger()
+
+
+class MemoryCell(Node):
+    """Keep a value under a name for all cells of that name in the graph, inside of subgraphs too.
+
+    Each run begins without values; what a cell of another run keeps is its own. Who sets a value tells all cells of the
+    name, each by its own event, and so it is with clearing. Of what is set at the same moment by several nodes the
+    order is that of the run. Edges show in a drawing who tells whom, and cells do not: use them for what would else
+    cross everything. A cell belongs on the loop, not into a thread.
+
+    Attributes:
+      name: the name.
+      set: sets the value.
+      clear: there is no value any more.
+      publish: asks for the value.
+      changed: a cell of this name was set; the value.
+      cleared: a cell of this name was cleared, and had a value.
+      published: was asked for; the value.
+      empty: was asked for, and there is none.
+
+    CS::APEX: state::MemoryCell.
+    """
+
+    changed = Event(Any)
+    cleared = Event()
+    published = Event(Any)
+    empty = Event()
+    name = Parameter("cell")
+
+    def setup(self) -> None:
+        """Join the others."""
+        self.shared = _SHARED.setdefault(level_of(self.place.graph).whole.root.face, _Shared())
+        self.shared.join(self)
+
+    def teardown(self) -> None:
+        """Leave them."""
+        self.shared.leave(self)
+
+    @slot
+    def set(self, value: Any) -> None:
+        """Set it, and tell all."""
+        self.shared.values[self.name] = value
+        self.changed.trigger(value)
+        for other in self.shared.others(self):
+            other.start_soon(other._tell_changed(value))  # a signal of another node is not this one's to send
+
+    @slot
+    def clear(self) -> None:
+        """Forget it, and tell all."""
+        if self.name in self.shared.values:
+            del self.shared.values[self.name]
+            self.cleared.trigger()
+            for other in self.shared.others(self):
+                other.start_soon(other._tell_cleared())
+
+    @slot
+    def publish(self) -> None:
+        """Tell it."""
+        if self.name in self.shared.values:
+            self.published.trigger(self.shared.values[self.name])
+        else:
+            self.empty.trigger()
+
+    async def _tell_changed(self, value: Any) -> None:
+        self.changed.trigger(value)
+
+    async def _tell_cleared(self) -> None:
+        self.cleared.trigger()
+
+
+class _Shared:
+    """What the cells of one run share."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, Any] = {}
+        self._cells: dict[int, weakref.ref[MemoryCell]] = {}  # weak, for a cell leads to the graph that is the key
+
+    def join(self, cell: MemoryCell) -> None:
+        self._cells[id(cell)] = weakref.ref(cell)
+
+    def leave(self, cell: MemoryCell) -> None:
+        """Forget everything with the last one, for then the run is over."""
+        self._cells.pop(id(cell), None)
+        if not self._cells:
+            self.values.clear()
+
+    def others(self, cell: MemoryCell) -> list[MemoryCell]:
+        cells = [one() for one in self._cells.values()]
+        return [one for one in cells if one is not None and one is not cell and one.name == cell.name]
+
+
+_SHARED: Final[weakref.WeakKeyDictionary[Graph, _Shared]] = weakref.WeakKeyDictionary()
+"""By graph, of which there is at most one run at a time."""

@@ -303,7 +303,7 @@ class ProcessSignal(Node):
     CS::APEX: csapex::UnixSignalEmitter.
     """
 
-    value = Input(Any)
+    value = Input(Any, optional=True)
     signal = Parameter[Literal["SIGWINCH", "SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2"]](
         "SIGWINCH", choices=("SIGWINCH", "SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2")
     )
