@@ -360,7 +360,7 @@ def test_a_pause_is_broken_off_when_the_activity_is_taken_away() -> None:
     graph, work, finished, exhausted = retrying(1, pause_s=1000.0)
     clock = graph.add(Behaviour(takes_s=2.5), name="clock")
     graph.connect(graph.start, clock.begin)
-    graph.connect(clock.done, graph["retry"].deactivate)  # type: ignore[union-attr]
+    graph.connect(clock.done, graph["retry"].deactivate)
     report = hfg.run(graph, clock="virtual")
     assert (len(work.begun), finished.told, exhausted.told, report.duration_s) == (1, [], [], 2.5)
 
@@ -368,7 +368,7 @@ def test_a_pause_is_broken_off_when_the_activity_is_taken_away() -> None:
 def test_figure_17_as_nodes_of_the_library() -> None:
     """Wait for the start signal, switch the lamp on, go on."""
     graph = hfg.Graph()
-    topic = graph.add(script(values=("start", "hello", "start")), max_rate_hz=1)
+    graph.add(script(values=("start", "hello", "start")), max_rate_hz=1)
     boot, wait = graph.add(activity.Wait(seconds=0.5), name="boot"), graph.add(activity.WaitForText())
     lamp, on = graph.add(activity.OneShotCommand(), name="lamp"), graph.add(flow.Latch(), name="on", max_rate_hz=10)
     sent, drive = graph.add(Heard(), name="sent"), graph.add(Heard(), name="drive")
@@ -376,7 +376,7 @@ def test_figure_17_as_nodes_of_the_library() -> None:
     boot.done.activates(wait.begin)
     wait.received.activates(lamp.begin)
     lamp.done.activates(drive.hear)
-    graph.connect(topic.out, wait.message)
+    graph.connect("script.out", "wait_for_text.message")
     graph.connect(graph.add(script(values=("on",)), name="command").out, on.value)
     graph.connect(on.out, lamp.value)
     graph.connect(lamp.out, sent.hear)

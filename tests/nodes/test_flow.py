@@ -301,12 +301,6 @@ def test_a_gate_may_be_set_by_an_edge() -> None:
     assert hfg.run(graph, clock="virtual").outputs["out"] == [2]
 
 
-def test_split_takes_a_sequence_apart() -> None:
-    assert fire(flow.Split(parts=3), value=(1, None, "c")).outputs == {"parts[0]": 1, "parts[2]": "c"}
-    with pytest.raises(ValueError, match=r"Split has 2 parts, got a sequence of 3; .* Split\(parts=3\)"):
-        fire(flow.Split(), value=[1, 2, 3])
-
-
 # --- joining ---
 
 

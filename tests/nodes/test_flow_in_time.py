@@ -279,6 +279,6 @@ def test_each_run_begins_without_values_and_graphs_share_nothing() -> None:
     empty = heard_of(cell.empty, asking)
     hfg.run(asking, clock="virtual")
     assert empty.told == [(0.0, None)]
-    graph["goals"].values = ()  # type: ignore[union-attr]
+    graph["goals"].values = ()
     hfg.run(graph, clock="virtual")
-    assert graph["heard"].told == []  # type: ignore[union-attr]
+    assert graph["heard"].told == []

@@ -1,7 +1,7 @@
 """The ways that values take: passed on, chosen, kept, joined, collected, and brought from one rate to another.
 
     passing     one in, one out: relay, the first ones, those that differ, a value as an event, the end as an event
-    routing     several ways: merge, mux, demux, switch, gate, split
+    routing     several ways: merge, mux, demux, switch, gate
     joining     what belongs together: by step, by stamp, the newest of each; sample and hold
     keeping     values that are kept and given again: latch, buffer, cache, a cell that nodes share
     collecting  several values as one: counters, the last ones, windows
@@ -27,7 +27,7 @@ from hfg.nodes.flow.passing import (
     TakeWhile,
     relay,
 )
-from hfg.nodes.flow.routing import Demux, Gate, Merge, Mux, Rejoin, Split, switch
+from hfg.nodes.flow.routing import Demux, Gate, Merge, Mux, Rejoin, switch
 from hfg.nodes.flow.timing import Debounce, Delay, Throttle
 
 __all__ = [
@@ -58,7 +58,6 @@ __all__ = [
     "Rejoin",
     "SampleAndHold",
     "Skip",
-    "Split",
     "Synchronizer",
     "Take",
     "TakeWhile",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from hfg.functions import node
@@ -10,7 +9,7 @@ from hfg.nodetype import Node
 from hfg.ports import Event, Input, Inputs, Output, Outputs, Parameter, Slots, slot
 from hfg.token import NO_MESSAGE
 
-__all__ = ["Demux", "Gate", "Merge", "Mux", "Rejoin", "Split", "switch"]
+__all__ = ["Demux", "Gate", "Merge", "Mux", "Rejoin", "switch"]
 
 T = TypeVar("T")
 
@@ -179,31 +178,3 @@ class Gate(Node):
     def close(self) -> None:
         """Let none pass."""
         self.is_open = False
-
-
-class Split(Node):
-    """Take a sequence apart: each element leaves by an output of its own.
-
-    An element that is None is silence at its output.
-
-    Attributes:
-      value: a list, tuple or other sequence with as many elements as there are outputs.
-      parts: one output for each element.
-
-    Raises:
-      ValueError: the sequence has another number of elements.
-
-    CS::APEX: csapex::Decomposer.
-    """
-
-    value = Input(Sequence[Any])
-    parts = Outputs(Any, 2)
-
-    def process(self, value: Sequence[Any]) -> list[Any]:
-        """Take it apart."""
-        if len(value) != len(self.parts):
-            raise ValueError(
-                f"Split has {len(self.parts)} parts, got a sequence of {len(value)}; make it with as many, as in "
-                f"Split(parts={len(value)})"
-            )
-        return list(value)
