@@ -61,12 +61,12 @@ def test_a_ticker_ticks_on_a_grid_and_ends_behind_its_count() -> None:
 
 
 @pytest.mark.rule("F11")
-def test_a_ticker_does_not_drift_in_an_hour() -> None:
+def test_a_ticker_does_not_drift() -> None:
     graph = hfg.Graph()
     heard = heard_of(graph.add(time.Ticker(rate_hz=3.0)).tick, graph)
-    hfg.run(graph, clock="virtual", until_s=3600.1)
-    assert heard.told[-1] == (3600.0, 3 * 3600)
-    assert len(heard.told) == 3 * 3600 + 1
+    hfg.run(graph, clock="virtual", until_s=100.1)
+    assert heard.told[-1] == (100.0, 300)
+    assert [at for at, _ in heard.told] == [round(number / 3, 6) for number in range(301)]
 
 
 @pytest.mark.rule("F11")
