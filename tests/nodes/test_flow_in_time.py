@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
@@ -220,6 +221,71 @@ def test_a_playback_waits_for_a_consumer_that_is_slow() -> None:
     )
     assert heard.told == [(2.0 + number, number) for number in range(8)]
     assert grown == []
+
+
+# --- work in the background ---
+
+
+class Fetch(flow.Background):
+    """Takes as many seconds as the value says; fails at 13."""
+
+    begun = hfg.State(factory=list[tuple[float, int]])
+
+    async def work(self, value: int) -> str:
+        self.begun.append((hfg.elapsed(), value))
+        await asyncio.sleep(value)
+        if value == 13:
+            raise ValueError("thirteen")
+        return f"got {value}"
+
+
+def fetching(*values: int, **options: Any) -> tuple[hfg.Graph, Fetch, Heard]:
+    graph = hfg.Graph()
+    fetch = graph.add(Fetch(at_most=options.pop("at_most", 8)), name="fetch", **options)
+    graph.connect(graph.add(script(values=values), name="urls").out, fetch.value)
+    return graph, fetch, heard_of(fetch.done, graph)
+
+
+def test_work_in_the_background_is_told_of_as_it_is_done_and_the_run_waits_for_it() -> None:
+    graph, fetch, heard = fetching(3, 1, 2)
+    assert hfg.run(graph, clock="virtual").duration_s == 3
+    assert fetch.begun == [(0.0, 3), (0.0, 1), (0.0, 2)]
+    assert heard.told == [(1.0, "got 1"), (2.0, "got 2"), (3.0, "got 3")]
+
+
+def test_who_sends_waits_for_a_place_when_all_are_taken() -> None:
+    graph, fetch, heard = fetching(3, 1, 2, at_most=2)
+    hfg.run(graph, clock="virtual")
+    assert fetch.begun == [(0.0, 3), (0.0, 1), (1.0, 2)]
+    assert [value for _, value in heard.told] == ["got 1", "got 3", "got 2"]
+
+
+@pytest.mark.rule("X1")
+def test_what_work_raises_is_an_error_of_the_node() -> None:
+    graph, _, _ = fetching(13)
+    with pytest.raises(hfg.errors.NodeError, match='node "fetch" failed in task .*thirteen'):
+        hfg.run(graph, clock="virtual")
+    graph, _, heard = fetching(13, 2, 14, on_error="skip")
+    hfg.run(graph, clock="virtual")
+    assert heard.told == [(2.0, "got 2"), (14.0, "got 14")]
+
+
+def test_a_place_is_free_again_when_work_has_failed() -> None:
+    graph, _, heard = fetching(13, 1, at_most=1, on_error="skip")
+    hfg.run(graph, clock="virtual")
+    assert heard.told == [(14.0, "got 1")]
+
+
+def test_work_is_cancelled_by_a_reset_and_its_places_are_free() -> None:
+    graph = hfg.Graph()
+    fetch = graph.add(Fetch(at_most=1), name="fetch")
+    graph.connect(graph.add(script(values=(100, 2)), max_rate_hz=0.1).out, fetch.value)
+    delay = graph.add(flow.Delay(seconds=5.0))
+    graph.connect(graph.start, delay.forward)
+    graph.connect(delay.forwarded, fetch.reset)
+    heard = heard_of(fetch.done, graph)
+    hfg.run(graph, clock="virtual")
+    assert heard.told == [(12.0, "got 2")]
 
 
 # --- memory cells ---

@@ -6,11 +6,13 @@
     keeping     values that are kept and given again: latch, buffer, cache, a cell that nodes share
     collecting  several values as one: counters, the last ones, windows
     timing      values that come later or less often: delay, debounce, throttle
+    background  work beside the stream
 
 All of them pass on values, never token objects (rule A4), so activity goes through them by active edges alone, as it
 does through any node. `docs/howto/library.md` shows how to choose, and which nodes of CS::APEX they stand for.
 """
 
+from hfg.nodes.flow.background import Background
 from hfg.nodes.flow.collecting import Accumulate, Count, CountItems, Recent, TimeWindow, Window
 from hfg.nodes.flow.joining import CombineLatest, Join, JoinByStamp, SampleAndHold, Synchronizer
 from hfg.nodes.flow.keeping import Cache, HoldableBuffer, Latch, MemoryCell, TriggeredLatch
@@ -33,6 +35,7 @@ from hfg.nodes.flow.timing import Debounce, Delay, Throttle
 __all__ = [
     "Accumulate",
     "AtEnd",
+    "Background",
     "Cache",
     "CombineLatest",
     "Count",
