@@ -14,6 +14,7 @@ from reactivex import operators as ops
 import hfg
 from hfg.functions import FunctionNode
 from hfg.graph import Edge, GraphInput, GraphOutput, GroupSpec
+from hfg.images import Image
 from hfg.ports import (
     EventPort,
     InnerSource,
@@ -27,7 +28,6 @@ from hfg.ports import (
     Target,
 )
 from hfg.problem import Problem
-from hfg.types import Image
 
 T = TypeVar("T")
 
