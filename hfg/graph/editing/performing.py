@@ -53,7 +53,7 @@ from hfg.graph.structure.promoting import refuse_promotion, refuse_standing, sta
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
 from hfg.ports import ParameterPort, Port
-from hfg.values import same
+from hfg.values import own_copy, same
 
 __all__ = ["perform"]
 
@@ -380,7 +380,9 @@ class _Hand:
             port.value = value
         except ValueError as error:
             raise GraphError(str(error)) from error
-        self.changes += [ParameterChange(node, name, value, node._parameters[name]) for node, name, value in before]
+        self.changes += [
+            ParameterChange(node, name, value, own_copy(node._parameters[name])) for node, name, value in before
+        ]
 
     def _promote(self, command: c.Promote) -> None:
         outer, inner = parameter_at(self.root, command.path), parameter_at(self.root, command.inner)
