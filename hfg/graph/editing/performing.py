@@ -21,6 +21,7 @@ from hfg.graph.editing.changes import (
     GateChange,
     GroupsChange,
     NodeChange,
+    NodeCopied,
     NodeSwap,
     NotesChange,
     OptionsChange,
@@ -182,6 +183,7 @@ class _Hand:
         self.do(NodeChange(around, name, copy, node._options, len(around.nodes), inner, added=True))
         for one, other in zip(nodes_within(node), nodes_within(copy), strict=True):
             self._note_of(other, self.root.whole.notes.get(one, {}))
+            self.changes.append(NodeCopied(one, other))
 
     def _rename(self, command: c.Rename) -> None:
         node = node_at(self.root, command.path)
