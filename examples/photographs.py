@@ -26,9 +26,9 @@ from reactivex import operators
 
 import hfg
 from hfg.cli.live import live_table
-from hfg.images import Image
 from hfg.timeline import Timeline
 from hfg.trace import ActivityChanged, FiringStarted, TokenSent, TraceEvent
+from hfg.types import Image
 
 Clock = Literal["real", "virtual"]
 
@@ -163,7 +163,7 @@ def see(
 @hfg.node
 def clean(sight: Sight, *, strength: Annotated[float, Interval(gt=0, le=30)] = 8.0) -> Sight:
     """Take the noise out of the picture by non-local means: by far the most expensive work here."""
-    return sight._replace(picture=cv2.fastNlMeansDenoising(sight.picture, None, strength, 7, 15))  # type: ignore[arg-type]  # OpenCV does not say the dtype
+    return sight._replace(picture=cv2.fastNlMeansDenoising(sight.picture, None, strength, 7, 15))
 
 
 @hfg.node

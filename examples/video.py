@@ -20,7 +20,7 @@ import numpy as np
 import skimage.data
 
 import hfg
-from hfg.images import Image
+from hfg.types import Image
 
 HZ, FIND_HZ = 30, 5
 WIDTH = 256
@@ -49,7 +49,7 @@ def draw(picture: Image, *, corners: Corners = ()) -> Image:
     drawn = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
     for corner in corners:
         cv2.circle(drawn, corner, 4, (0, 0, 255), 1)
-    return drawn  # type: ignore[return-value]  # OpenCV does not say the dtype
+    return drawn
 
 
 class Film(hfg.Node):

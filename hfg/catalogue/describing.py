@@ -16,6 +16,7 @@ import msgspec
 from hfg.catalogue.documentation import Documentation, read_documentation
 from hfg.description import NodeType
 from hfg.functions import NodeFunction
+from hfg.limits import Inside
 from hfg.nodetype import Node
 from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.types import describe
@@ -68,34 +69,32 @@ class ParameterDescription(msgspec.Struct, frozen=True):
     """A parameter of a node type.
 
     Attributes:
-      kind: what an editor shows for it: "float", "choice", "path" ...
+      kind: what an editor shows for it: "int", "choice", "colour" ...
       required: it has no default, so it is given when a node is made.
       limits: by name: "gt", "ge", "lt", "le", "multiple_of", "min_length", "max_length", "predicate".
-      choices: the only allowed values, or None.
-      trigger: no value, but a slot and an event.
-      size: how many ports a vector of this name has.
-      labels: what to call the choices, one each, or none.
+      choices: the only allowed values, or members of them, or None.
+      labels: what to call the choices.
       step: by how much an editor moves the value.
       group: what it is shown with.
-      shown_if: when it is shown, in words.
-      read_only: set by the node and shown to users.
+      shown_if: when it is shown, in words, as in "mode is 'custom'".
+      read_only: its node alone sets it.
       pattern: which names of files fit.
       directory: the path is that of a directory.
       save: the path is one to write to.
+      trigger: no value, but a slot and an event.
+      size: how many ports a vector of this name has.
     """
 
     name: str
+    kind: str
     type: str
     doc: str
     default: Any = None
     required: bool = False
     limits: dict[str, Any] = {}  # a struct copies it for each
     choices: tuple[Any, ...] | None = None
-    unit: str | None = None
-    trigger: bool = False
-    size: bool = False
-    kind: str = "any"
     labels: tuple[str, ...] = ()
+    unit: str | None = None
     step: float | None = None
     group: str | None = None
     shown_if: tuple[str, ...] = ()
@@ -103,6 +102,8 @@ class ParameterDescription(msgspec.Struct, frozen=True):
     pattern: str | None = None
     directory: bool = False
     save: bool = False
+    trigger: bool = False
+    size: bool = False
 
     def limits_in_words(self) -> list[str]:
         """Say what its values must be: ">= 0", "one of 3, 5, 7"."""
@@ -270,24 +271,24 @@ def _parameter(spec: ParameterSpec, kind: NodeType, read: Documentation) -> Para
     required = spec.default is REQUIRED
     return ParameterDescription(
         name=spec.name,
+        kind=spec.kind,
         type="" if spec.trigger else describe(spec.type),
         doc=spec.help or read.entries.get(spec.name, ""),
         default=None if required or spec.trigger else spec.default,
-        required=required,
-        limits=dict(_limit(limit) for limit in spec.limits),
+        required=required and spec.is_given,
+        limits=dict(_limit(limit) for limit in spec.limits if not isinstance(limit, Inside)),
         choices=spec.choices,
-        unit=spec.unit,
-        trigger=spec.trigger,
-        size=spec.size,
-        kind=spec.kind,
         labels=spec.labels,
+        unit=spec.unit,
         step=spec.step,
         group=spec.group,
-        shown_if=tuple(condition.in_words() for condition in spec.shown_if),
+        shown_if=tuple(one.in_words() for one in spec.shown_if),
         read_only=spec.read_only,
         pattern=spec.pattern,
         directory=spec.directory,
         save=spec.save,
+        trigger=spec.trigger,
+        size=spec.size,
     )
 
 

@@ -1,6 +1,9 @@
 """Help for tests of nodes and graphs, and the oracle that hfg itself is tested against.
 
     firing         fire one node without a graph
+    values         Hypothesis: values of the type hints of ports and parameters
+    trying         fire a node type with such values, and see whether it keeps its word
+    usable         the same for many types, in processes of their own
     diagrams       token diagrams: drive a node by lines of characters
     recording      a recorder for traces
     invariants     what holds in every run
@@ -12,11 +15,12 @@
     waves          the same, and that waves go depth first (R2)
     pytest_plugin  fixtures and the `rule` mark
 
-Sees all of hfg; nothing of hfg sees it. `strategies` needs hypothesis and is imported when it is used.
+Sees all of hfg; nothing of hfg sees it. What needs hypothesis is imported when it is used.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from hfg.testing import diagrams, invariants
@@ -28,16 +32,20 @@ from hfg.testing.reference import ReferenceMachine, ReferenceReport, reference_r
 
 if TYPE_CHECKING:
     from hfg.testing.strategies import graphs, schedules, tokens
+    from hfg.testing.trying import NotUsable, Trial, try_type
+    from hfg.testing.values import values_of
 
 __all__ = [
     "Divergence",
     "Exploration",
     "Firing",
+    "NotUsable",
     "Recorder",
     "ReferenceMachine",
     "ReferenceReport",
     "Replay",
     "ScheduleFailure",
+    "Trial",
     "diagrams",
     "explore",
     "fire",
@@ -48,12 +56,23 @@ __all__ = [
     "replay",
     "schedules",
     "tokens",
+    "try_type",
+    "values_of",
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in ("graphs", "schedules", "tokens"):
-        from hfg.testing import strategies
+_NEED_HYPOTHESIS = {
+    "graphs": "strategies",
+    "schedules": "strategies",
+    "tokens": "strategies",
+    "values_of": "values",
+    "try_type": "trying",
+    "NotUsable": "trying",
+    "Trial": "trying",
+}
 
-        return getattr(strategies, name)
+
+def __getattr__(name: str) -> Any:
+    if name in _NEED_HYPOTHESIS:
+        return getattr(import_module(f"{__name__}.{_NEED_HYPOTHESIS[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -16,7 +16,7 @@ import pytest
 from annotated_types import Ge, Interval
 
 import hfg
-from hfg.images import Image
+from hfg.types import Image
 
 
 class Pose(NamedTuple):
@@ -29,7 +29,7 @@ class Pose(NamedTuple):
 
 @hfg.node
 def blur(image: Image, *, sigma: Annotated[float, Interval(gt=0, le=20)] = 2.0) -> Image:
-    return cv2.GaussianBlur(image, (0, 0), sigma)  # type: ignore[return-value]  # OpenCV does not say the dtype
+    return cv2.GaussianBlur(image, (0, 0), sigma)
 
 
 @hfg.node

@@ -25,7 +25,6 @@ from hfg.ports.edges import AnyEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringKind, FiringOutcome, FiringStarted, TokenTaken
 from hfg.types import accepts, describe, describe_value
-from hfg.values import own_copy
 
 __all__ = [
     "arguments_of",
@@ -428,8 +427,7 @@ def _add_parameters(worker: Worker, written: list[Any] | None, parameters: dict[
     if written is None:
         written = [None] * len(worker.out_edges)
     for position in range(len(worker.type.outputs), len(worker.out_names)):
-        value = parameters[worker.out_names[position]]
-        written[position] = (own_copy(value), None, None)  # the node may change its own (T1)
+        written[position] = (parameters[worker.out_names[position]], None, None)
     return written
 
 

@@ -142,9 +142,7 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callab
     scheduler = _EdgeScheduler(host, edge.target.within)
 
     def connect() -> None:
-        nonlocal newest
         subject: Subject[Any] = Subject()
-        newest = None
 
         def into(token: Token[Any]) -> None:
             nonlocal newest

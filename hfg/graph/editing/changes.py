@@ -31,7 +31,6 @@ __all__ = [
     "GateChange",
     "GroupsChange",
     "NodeChange",
-    "NodeCopied",
     "NodeSwap",
     "NotesChange",
     "OptionsChange",
@@ -246,22 +245,6 @@ class GateChange(Change):
     @override
     def inverse(self) -> Self:
         return replace(self, added=not self.added)
-
-
-@dataclass(eq=False)
-class NodeCopied(Change):
-    """A node that was added is a copy of another: said for a run, where the other may be set until both are there."""
-
-    source: Node
-    copy: Node
-
-    @override
-    def do(self) -> None:
-        pass
-
-    @override
-    def inverse(self) -> Self:
-        return self
 
 
 @dataclass(eq=False)
