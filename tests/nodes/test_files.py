@@ -241,6 +241,12 @@ def test_one_array_and_several_are_told_apart() -> None:
 # --- pictures ---
 
 
+@pytest.mark.parametrize("path", ["a", "a.xyz", ""])
+def test_a_name_that_no_picture_has_is_refused_where_it_is_set(path: str) -> None:
+    with pytest.raises(ValueError, match=r'parameter "write_image.path" must be the name of a file like \*.png'):
+        files.WriteImage(path=path)
+
+
 def test_images_are_written_and_read_again() -> None:
     assert written(files.WriteImage(path="out/{number:03}.png"), PICTURE, PICTURE[..., 0]) == [
         "out/001.png",
@@ -264,10 +270,10 @@ def test_the_quality_makes_files_smaller() -> None:
 
 @pytest.mark.parametrize(
     ("path", "image"),
-    [("a", PICTURE), ("a.xyz", PICTURE), ("a.png", np.zeros((2, 2, 2), np.uint8)), ("a.png", np.zeros((2, 2), bool))],
+    [("a.png", np.zeros((2, 2, 2), np.uint8)), ("a.png", np.zeros((2, 2), bool))],
 )
 def test_an_image_that_a_format_does_not_take_is_told(path: str, image: Any) -> None:
-    with pytest.raises(ValueError, match=r"an image of .*, 2 x 2.*cannot be written|6 x 8 x 3, cannot be written"):
+    with pytest.raises(ValueError, match=r"an image of .*, 2 x 2.*cannot be written as"):
         fire(files.WriteImage(path=path), image=image)
     assert not Path(path).exists()
 

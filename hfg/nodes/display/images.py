@@ -15,7 +15,7 @@ from hfg.clock import now
 from hfg.functions import node
 from hfg.images import AnyImage, Image
 from hfg.nodes.files.access import is_a_path, named, write_whole
-from hfg.nodes.files.sinks import encoded
+from hfg.nodes.files.sinks import PICTURES, encoded
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Inputs, Parameter, State
 
@@ -40,14 +40,14 @@ class ImageDisplay(Node):
 
     Raises:
       OSError: the file cannot be written; the sentence says why, and the old one is whole.
-      ValueError: the name has no end of a format, the format does not take such an image, or no path is set.
+      ValueError: the format does not take such an image.
       ModuleNotFoundError: OpenCV is not installed.
 
     CS::APEX: csapex::OutputDisplay.
     """
 
     image = Input(AnyImage)
-    path = Parameter("display.png", Predicate(is_a_path), save=True)
+    path = Parameter("display.png", Predicate(is_a_path), save=True, pattern=PICTURES)
     quality = Parameter(90, Interval(ge=1, le=100))
     most_per_s = Parameter(5.0, Interval(ge=0))
     shown = Event(str)

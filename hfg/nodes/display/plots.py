@@ -318,4 +318,8 @@ class HistogramPlot(_Plot):
         numbers = finite(self.kept)
         numbers = numbers[np.isfinite(numbers)]
         if len(numbers):
-            axes.hist(numbers, bins=self.bins)
+            try:
+                counts, edges = np.histogram(numbers, bins=self.bins)
+            except ValueError:  # numbers that differ by less than floats can be parted
+                counts, edges = np.histogram(numbers, bins=1)
+            axes.stairs(counts, edges, fill=True)  # one shape; a bar for each range takes seconds

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, Final, Literal, TypeAlias
 
 __all__ = ["FilePath", "find_files", "is_a_path", "named", "reaching", "write_whole"]
 
-FilePath: TypeAlias = str | os.PathLike[str]
+FilePath: TypeAlias = str | Path
 """Where a file is; relative ones begin in the working directory of the program."""
 
 _REASONS: Final = {

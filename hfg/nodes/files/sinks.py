@@ -11,7 +11,7 @@ import io
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, Any, BinaryIO, Final
 
 import msgspec
 import numpy as np
@@ -41,7 +41,8 @@ __all__ = [
     "WriteText",
 ]
 
-_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252")
+PICTURES: Final = "*.png *.jpg *.jpeg *.tif *.tiff *.bmp *.webp *.exr *.hdr *.pgm *.ppm"
+_ENCODINGS: Final = ("utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252")
 
 
 # --- one file for each value ---
@@ -244,13 +245,13 @@ class WriteImage(_WholeFiles):
 
     Raises:
       OSError: the file cannot be written; the sentence says why, and the old one is whole.
-      ValueError: the name has no end of a format, the format does not take such an image, no path is set, or the path
-        asks for another field.
+      ValueError: the format does not take such an image, or the path asks for another field.
       ModuleNotFoundError: OpenCV is not installed.
 
     CS::APEX: csapex::ExportFile.
     """
 
+    path = Parameter("image-{number:04}.png", Predicate(is_a_path), Predicate(is_a_format), save=True, pattern=PICTURES)
     image = Input(AnyImage)
     quality = Parameter(95, Interval(ge=1, le=100))
     written = Output(str)

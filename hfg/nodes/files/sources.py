@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from annotated_types import MaxLen, MinLen, Predicate
@@ -23,7 +23,7 @@ from hfg.types import Array
 
 __all__ = ["ArrayRows", "CsvRows", "FilePaths", "ImageFiles", "JsonLines", "StandardInput", "TextLines"]
 
-_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252")
+_ENCODINGS: Final = ("utf-8", "utf-8-sig", "latin-1", "ascii", "utf-16", "cp1252")
 
 
 class TextLines(Node):
