@@ -225,8 +225,6 @@ def to_float(value: float) -> float:
 
     Raises:
       OverflowError: a whole number is too large for a float.
-
-    CS::APEX: csapex::DurationConvertion.
     """
     return float(value)
 
