@@ -22,6 +22,7 @@ from hfg.activity import StateMachine
 from hfg.clock import elapsed, now
 from hfg.engine import PunctualLoop, Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
 from hfg.errors import EndOfStream, Failure
+from hfg.files import load, save
 from hfg.functions import node
 from hfg.graph import Graph, Subgraph, commands, operator
 from hfg.logs import log
@@ -60,6 +61,7 @@ __all__ = [
     "commands",
     "elapsed",
     "errors",
+    "load",
     "log",
     "node",
     "now",
@@ -68,5 +70,6 @@ __all__ = [
     "run",
     "run_async",
     "running",
+    "save",
     "slot",
 ]

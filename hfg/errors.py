@@ -9,6 +9,7 @@
     ├── UsageError            a call at the wrong moment (a port outside a run, a second run, ...)
     │   └── NotRunning        the run that the call needs has not begun or is over
     ├── EncodingError         a value that is no data, or data that is no value of the type it should be
+    ├── FileError             a graph file without a graph, a graph that no file can say; `problems` holds all of it
     ├── TargetError           a TARGET of the command line that cannot be found or imported
     ├── RunError              a run that did not end well
     │   ├── NodeError         a node's own code failed; `__cause__` is its exception (rule X1)
@@ -42,6 +43,7 @@ __all__ = [
     "EndOfStream",
     "EngineInternalError",
     "Failure",
+    "FileError",
     "FiringTimeout",
     "GraphError",
     "HfgError",
@@ -109,6 +111,22 @@ class MachineError(HfgError):
         if len(self.problems) > _SHOWN:
             lines.append(f"  ... and {len(self.problems) - _SHOWN} more: the error's problems hold them all")
         super().__init__("\n".join([f"{sentence}, {count}:", *lines]))
+
+
+class FileError(HfgError):
+    """A graph file says no graph, or a graph holds what no file can say; nothing was made or written.
+
+    Attributes:
+      problems: every finding, with its file and line, in their order.
+    """
+
+    def __init__(self, sentence: str, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        lines = [f"  {problem}" for problem in self.problems[:_SHOWN]]
+        if len(self.problems) > _SHOWN:
+            lines.append(f"  ... and {len(self.problems) - _SHOWN} more: the error's problems hold them all")
+        many = "\n".join([f"{sentence}, {len(self.problems)} findings:", *lines])
+        super().__init__(str(self.problems[0]) if len(self.problems) == 1 else many)
 
 
 class UsageError(HfgError):

@@ -115,7 +115,7 @@ def test_fragments_are_python_and_few(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_blocks_say_what_they_are(page: Path) -> None:
-    known = {"python", "python no-run", "output", "mermaid", "console", "text", "toml", "json"}
+    known = {"python", "python no-run", "output", "mermaid", "yaml", "console", "text", "toml", "json"}
     for block in blocks(page):
         assert block.info in known, f"{page_id(page)}:{block.line}: ```{block.info}"
 

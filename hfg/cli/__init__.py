@@ -6,6 +6,7 @@
     top         hfg top             watch a graph that runs in another process
     check       hfg check TARGET    look for mistakes without running
     draw        hfg draw TARGET     show what a graph looks like
+    convert     hfg convert TARGET  write it as a graph file
     nodes       hfg nodes [MODULE]  which node types there are
     new         hfg new node NAME   begin a file; templates: what it says
     execute     a run with everything around it

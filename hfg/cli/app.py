@@ -16,9 +16,9 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hfg.cli import check, draw, new, nodes, run, show, tap, top
+from hfg.cli import check, convert, draw, new, nodes, run, show, tap, top
 from hfg.cli.interrupt import Interrupt
-from hfg.errors import HfgError, TargetError
+from hfg.errors import FileError, HfgError, TargetError
 
 __all__ = ["app", "main"]
 
@@ -31,6 +31,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("check")(check.check)
+app.command("convert")(convert.convert)
 app.command("draw")(draw.draw)
 app.command("nodes")(nodes.nodes)
 app.command("tap")(tap.tap)
@@ -93,6 +94,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 2
         except TargetError as error:
             show.user_traceback(error.__cause__)
+            show.sentence(str(error))
+            return 2
+        except FileError as error:
             show.sentence(str(error))
             return 2
         except HfgError as error:

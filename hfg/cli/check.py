@@ -11,9 +11,9 @@ from typing import Annotated
 import typer
 
 from hfg.cli import show
-from hfg.cli.options import ArgOption, TargetArgument
+from hfg.cli.options import AllowOption, ArgOption, TargetArgument
 from hfg.cli.target import load_graph
-from hfg.errors import CheckFailed, HfgError, MachineError, TargetError
+from hfg.errors import CheckFailed, FileError, HfgError, MachineError, TargetError
 from hfg.graph import Graph
 from hfg.graph.structure.refusals import keep_refusals, problem_of
 from hfg.problem import SEVERITIES, Problem
@@ -24,6 +24,7 @@ __all__ = ["check"]
 def check(
     target: TargetArgument,
     arg: ArgOption = None,
+    allow: AllowOption = None,
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
@@ -32,12 +33,14 @@ def check(
     graph: Graph | None = None
     with keep_refusals() as problems:
         try:
-            graph = load_graph(target, arg or [])
+            graph = load_graph(target, arg or [], allow)
         except TargetError as error:
             if not isinstance(error.__cause__, Exception):
                 raise  # there is no such target: nothing was looked at
             show.user_traceback(error.__cause__)
             problems += _unbuilt(target, error, error.__cause__)
+        except FileError as error:
+            problems += error.problems
     if graph is not None:
         refused = {problem.path.rpartition(" -> ")[2] for problem in problems}  # what follows from that is no news
         found = graph.check()
@@ -57,7 +60,7 @@ def check(
 def _unbuilt(target: str, error: TargetError, cause: Exception) -> Sequence[Problem]:
     """The code that builds the graph failed: what can be said of it."""
     why = "so the graph is not there to be checked"
-    if isinstance(cause, CheckFailed | MachineError):
+    if isinstance(cause, CheckFailed | FileError | MachineError):
         return cause.problems
     if isinstance(cause, HfgError):
         return [problem_of(cause, target, why)]

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from hfg.cli import show
-from hfg.cli.options import ArgOption, TargetArgument
+from hfg.cli.options import AllowOption, ArgOption, TargetArgument
 from hfg.cli.target import load_graph
 from hfg.errors import UsageError
 from hfg.graph.drawing import FORMATS
@@ -23,6 +23,7 @@ def draw(
         Path | None, typer.Argument(help="a file that ends in .mmd or .dot; without it, standard output")
     ] = None,
     arg: ArgOption = None,
+    allow: AllowOption = None,
     format: Annotated[  # noqa: A002 - the word users know
         Literal["mmd", "dot"], typer.Option("--format", help="What goes to standard output: Mermaid or Graphviz.")
     ] = "mmd",
@@ -30,7 +31,7 @@ def draw(
 ) -> int:
     """Draw a graph without running it."""
     show.set_debug(debug)
-    graph = load_graph(target, arg or [])
+    graph = load_graph(target, arg or [], allow)
     if out is None:
         sys.stdout.write(FORMATS[f".{format}"](graph))
         return 0

@@ -9,7 +9,16 @@ import typer
 
 from hfg.cli import completing
 
-__all__ = ["ArgOption", "Clock", "ClockOption", "DebugOption", "ParamOption", "TargetArgument", "UntilOption"]
+__all__ = [
+    "AllowOption",
+    "ArgOption",
+    "Clock",
+    "ClockOption",
+    "DebugOption",
+    "ParamOption",
+    "TargetArgument",
+    "UntilOption",
+]
 
 
 class Clock(StrEnum):
@@ -26,7 +35,7 @@ def _not_negative(seconds: float | None) -> float | None:
 
 
 TargetArgument = Annotated[
-    str, typer.Argument(help="module:graph, file.py or file.py:graph", autocompletion=completing.targets)
+    str, typer.Argument(help="module:graph, file.py, file.py:graph or file.hfg.yaml", autocompletion=completing.targets)
 ]
 ClockOption = Annotated[Clock, typer.Option(help="virtual: as fast as the machine can, the same each time.")]
 UntilOption = Annotated[
@@ -46,6 +55,13 @@ ArgOption = Annotated[
     typer.Option(
         metavar="NAME=VALUE",
         help="An argument of the function that builds the graph, as in count=3; may be given several times.",
+    ),
+]
+AllowOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PACKAGE",
+        help="A package whose node types a graph file may import, too; may be given several times.",
     ),
 ]
 DebugOption = Annotated[

@@ -20,7 +20,16 @@ from hfg.cli import show
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.live import live_table
-from hfg.cli.options import ArgOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
+from hfg.cli.options import (
+    AllowOption,
+    ArgOption,
+    Clock,
+    ClockOption,
+    DebugOption,
+    ParamOption,
+    TargetArgument,
+    UntilOption,
+)
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
 from hfg.engine import Run
@@ -41,6 +50,7 @@ def run(
     until: UntilOption = None,
     param: ParamOption = None,
     arg: ArgOption = None,
+    allow: AllowOption = None,
     policy: Annotated[str | None, typer.Option(help="Which node is next: fifo, priority, random ...")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the policy random.")] = None,
     trace: Annotated[
@@ -64,7 +74,7 @@ def run(
     """Run a graph to its end; Ctrl-C ends it earlier, twice at once."""
     show.set_debug(debug)
     records = show.Records(verbose, debug, virtual=clock is Clock.virtual)
-    graph = load_graph(target, arg or [])
+    graph = load_graph(target, arg or [], allow)
     records.loaded()
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()

@@ -16,7 +16,7 @@ import typer
 from hfg.cli import completing, show
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
-from hfg.cli.options import Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
+from hfg.cli.options import AllowOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
 from hfg.cli.settings import set_parameters
 from hfg.cli.sockets import Line
 from hfg.cli.target import load_graph
@@ -45,6 +45,7 @@ def tap(
         float | None, typer.Option(metavar="HZ", help="Print at most so many tokens a second, the newest.")
     ] = None,
     param: ParamOption = None,
+    allow: AllowOption = None,
     json: Annotated[bool, typer.Option("--json", help="Write each token as a JSON object.")] = False,
     debug: DebugOption = False,
 ) -> int:
@@ -61,7 +62,7 @@ def tap(
                 "--clock"
             )
         return _look_at(target, Question("tap", path, rate, json), limit)
-    graph = load_graph(target)
+    graph = load_graph(target, (), allow)
     records.loaded()
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()

@@ -1,4 +1,4 @@
-"""Finds what TARGET names: `package.module:graph`, `file.py` or `file.py:graph`; a graph, or a function that makes one.
+"""Finds what TARGET names: `module:graph`, `file.py`, `file.py:graph` (a graph or what makes one), `file.hfg.yaml`.
 
 The file or module is imported as Python itself would import it. Stands on `arguments` and the graph floor.
 """
@@ -17,6 +17,7 @@ from typing import Any
 
 from hfg.cli.arguments import builder_arguments
 from hfg.errors import TargetError, in_words
+from hfg.files import load
 from hfg.functions import NodeFunction
 from hfg.graph import Graph
 from hfg.nodetype import Node
@@ -24,17 +25,27 @@ from hfg.nodetype import Node
 __all__ = ["import_from_here", "load_graph", "load_module"]
 
 
-def load_graph(target: str, given: Sequence[str] = ()) -> Graph:
+def load_graph(target: str, given: Sequence[str] = (), allow: Sequence[str] | None = None) -> Graph:
     """Import the target and give back its graph, built if need be.
 
     Args:
       target: as users write it.
       given: arguments of the function that builds it, "count=3" each.
+      allow: packages that a graph file may import, too.
 
     Raises:
+      FileError: a graph file describes no graph.
       TargetError: there is no such file, module or name, its code fails, or what it names is no graph; `__cause__` is
         the user's exception.
     """
+    if target.endswith((".yaml", ".yml")):
+        if given:
+            raise TargetError(f"{target} is a graph file, no function, so --arg {given[0]} means nothing to it")
+        return load(target, allow=allow or ())
+    if allow:
+        raise TargetError(
+            f"{target} is code, which imports what it likes, so --allow {allow[0]} means nothing to it; leave it out"
+        )
     place, name = _split(target)
     module = load_module(place)
     found = _named(module, name, place, bool(given)) if name else _only(module, place, bool(given))
@@ -66,9 +77,7 @@ def load_module(place: str) -> ModuleType:
       TargetError: it is not there, or its code fails.
     """
     if place.endswith((".yaml", ".yml")):
-        raise TargetError(
-            f"{place}: graph files come in a later version; name a Python file or module that builds the graph"
-        )
+        raise TargetError(f"{place} is a graph file, no module; name a Python file or a module")
     if place.endswith(".py") or "/" in place or "\\" in place:
         return _load_file(Path(place))
     if Path(place).is_file():

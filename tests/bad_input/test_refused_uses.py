@@ -521,7 +521,7 @@ LINES = {
     "run :build": '":build" names nothing: write module:graph, file.py or file.py:graph',
     "run nothing.like.this": 'there is no module "nothing',
     "run .steps": '".steps" is no module; name one from here on, as in package.module, or a file',
-    "run steps.yaml": "name a Python file or module that builds the graph",
+    "run steps.yaml": "steps.yaml: there is no such file",
     "run": "Missing argument 'target'; hfg --help shows what there is",
     "run steps.py more": "Got unexpected extra argument(s) (more)",
     "runn steps.py": "No such command 'runn'. Did you mean 'run'?",

@@ -64,5 +64,7 @@ def test_line_works_as_written(command: Command, line: list[str], monkeypatch: p
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(Path.cwd()))
     program, *arguments = line[: line.index("|")] if "|" in line else line
     assert program == "hfg"
+    if "robot.hfg.yaml" in arguments[:2]:
+        command("convert", "robot.py", "robot.hfg.yaml")
     shown = command(*arguments)
     assert shown.code == (NOTHING_RUNS if "top" in arguments or "4711" in arguments else 0), shown.err

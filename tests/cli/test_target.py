@@ -92,7 +92,6 @@ def test_node_types_of_a_file_are_found_by_name() -> None:
         ("", "missing_module:graph", 'there is no module "missing_module"'),
         ("", "a_file:", "names nothing"),
         ("", "a_file.py", "has no graph"),
-        ("", "a_file.hfg.yaml", "graph files come in a later version"),
         (ONE, "a_file.py:other", 'has no "other"; it has only'),
         (ONE, "a_file.py:hfg", "is a module, no Graph"),
         (ONE + "two = hfg.Graph('two')\n", "a_file.py", "name one of a_file.py:only, a_file.py:two"),

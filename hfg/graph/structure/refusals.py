@@ -19,7 +19,7 @@ from hfg.graph.structure.naming import path_of
 from hfg.nodetype import Node
 from hfg.problem import Problem
 
-__all__ = ["Refusable", "keep_refusals", "problem_of"]
+__all__ = ["Refusable", "keep_refusals", "problem_of", "raise_refusals"]
 
 _kept: ContextVar[list[Problem] | None] = ContextVar("hfg.refusals", default=None)
 _OURS = str(Path(__file__).resolve().parents[2])
@@ -32,6 +32,16 @@ def keep_refusals() -> Iterator[list[Problem]]:
     token = _kept.set(problems)
     try:
         yield problems
+    finally:
+        _kept.reset(token)
+
+
+@contextmanager
+def raise_refusals() -> Iterator[None]:
+    """Raise them all the same: whoever builds inside tells them itself, with the line of a file."""
+    token = _kept.set(None)
+    try:
+        yield
     finally:
         _kept.reset(token)
 

@@ -1,0 +1,67 @@
+"""`hfg convert TARGET OUT`: writes a graph as a file, or the schema of such files.
+
+Stands on `target`, `show` and the files' floor.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hfg.cli import completing, show
+from hfg.cli.options import AllowOption, ArgOption
+from hfg.cli.target import load_graph
+from hfg.errors import TargetError, UsageError
+from hfg.files import describe, save, schema, text_of
+
+__all__ = ["convert"]
+
+
+def convert(
+    target: Annotated[
+        str | None,
+        typer.Argument(help="module:graph, file.py, file.py:graph or file.hfg.yaml", autocompletion=completing.targets),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Argument(help="a file that ends in .hfg.yaml; without it, standard output")
+    ] = None,
+    arg: ArgOption = None,
+    allow: AllowOption = None,
+    json_schema: Annotated[
+        bool, typer.Option("--schema", help="Write the JSON schema of graph files, for editors, instead of a graph.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
+) -> int:
+    """Write a graph as a graph file; what no file can say is told, all of it, and then nothing is written."""
+    show.set_debug(debug)
+    if json_schema:
+        if out is not None:
+            raise TargetError("--schema needs no TARGET: write hfg convert --schema FILE, or leave FILE out")
+        return _write_schema(target)
+    if target is None:
+        raise TargetError("there is no TARGET: write hfg convert graph.py graph.hfg.yaml")
+    graph = load_graph(target, arg or [], allow)
+    if out is None:
+        sys.stdout.write(text_of(describe(graph, beside=Path("graph.hfg.yaml"))))
+        return 0
+    try:
+        save(graph, out)
+    except UsageError as error:
+        show.sentence(str(error))
+        return 2
+    return 0
+
+
+def _write_schema(file: str | None) -> int:
+    if file is None:
+        sys.stdout.write(schema())
+        return 0
+    try:
+        Path(file).write_text(schema(), encoding="utf-8")
+    except OSError as error:
+        show.sentence(f"{file} cannot be written: {error.strerror}")
+        return 2
+    return 0

@@ -1,0 +1,174 @@
+"""Types of subgraphs that a document describes: with its ports, its parameters and, as `build`, its inside.
+
+A subgraph that stands in a file of its own has one type for all its nodes, which is found by name like any other:
+`hfg.files.boxes:File[...]`. Who fills the inside hands that down. Stands on `document` and the editing wing.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Final
+from urllib.parse import quote, unquote
+
+import annotated_types
+
+from hfg.encoding import Find
+from hfg.errors import GraphError, HfgError
+from hfg.files.document import BoxDocument, Document, ParameterDocument
+from hfg.files.values import decoded
+from hfg.graph.editing.enclosing import Enclosed
+from hfg.graph.editing.type_texts import type_of_text
+from hfg.graph.graph import Graph
+from hfg.graph.structure.subgraph import Subgraph
+from hfg.ports import Event, Input, Output, Parameter, slot
+
+__all__ = ["LIMITS", "FileBox", "box_type", "file_box_type", "limits_in_words"]
+
+Fill = Callable[[Any, Graph], None]
+"""Takes a subgraph and the graph inside it."""
+
+LIMITS: Final[dict[str, tuple[type[Any], str]]] = {
+    "gt": (annotated_types.Gt, "gt"),
+    "ge": (annotated_types.Ge, "ge"),
+    "lt": (annotated_types.Lt, "lt"),
+    "le": (annotated_types.Le, "le"),
+    "multiple_of": (annotated_types.MultipleOf, "multiple_of"),
+    "min_length": (annotated_types.MinLen, "min_length"),
+    "max_length": (annotated_types.MaxLen, "max_length"),
+}
+"""By the word that a file has for it: the limit, and the attribute that holds its value."""
+
+_KINDS: Final[tuple[tuple[str, Callable[[Any], Any]], ...]] = (
+    ("inputs", Input),
+    ("outputs", Output),
+    ("events", Event),
+    ("slots", lambda hint: slot(type=hint)),
+)
+_MADE: Final[dict[Path, type[FileBox]]] = {}
+"""The newest type of each file."""
+
+
+class FileBox(Subgraph):
+    """A subgraph that a file describes."""
+
+    _file: ClassVar[Path]
+    _document: ClassVar[Document]
+    _parts: ClassVar[Mapping[str, type[FileBox]]]
+    """The types of the files that it includes, by how it names them."""
+    _fill: ClassVar[Fill]
+
+    def build(self, graph: Graph) -> None:
+        """Make what the file says."""
+        type(self)._fill(self, graph)
+
+
+def box_type(
+    box: BoxDocument, path: str, fill: Fill, said: Callable[[str, str, str], None], find: Find
+) -> type[Enclosed]:
+    """Make the type of a subgraph that a document describes where it stands.
+
+    Args:
+      box: what is inside, and the ports.
+      path: of the subgraph, for messages.
+      fill: is called when a node of it is added.
+      said: is told what of its ports cannot be: the kind, the name and the sentence.
+      find: gives what values of its parameters refer to.
+    """
+    body = dict(_declarations(box, said, find)) | {"build": lambda self, graph: fill(self, graph)}
+    try:
+        made: type[Enclosed] = types.new_class("Enclosed", (Enclosed,), exec_body=lambda names: names.update(body))
+    except HfgError as error:
+        said("", "", str(error))
+        return box_type(BoxDocument(), path, fill, said, find)
+    return made
+
+
+def file_box_type(
+    file: Path,
+    document: Document,
+    parts: Mapping[str, type[FileBox]],
+    fill: Fill,
+    said: Callable[[str, str, str], None],
+    find: Find,
+) -> type[FileBox]:
+    """Make the type of the subgraphs that a file describes; the one there is, if the file says the same as ever."""
+    known = _MADE.get(file)
+    if known is not None and known._document == document and known._parts == parts:
+        return known
+    body: dict[str, Any] = dict(_declarations(document, said, find)) | {
+        "__module__": __name__,
+        "__qualname__": f"File[{quote(str(file), safe='').replace('.', '%2E')}]",
+        "__doc__": f"The subgraph in {file.name}.",
+        "_file": file,
+        "_document": document,
+        "_parts": parts,
+        "_fill": staticmethod(fill),
+    }
+    name = "".join(part.title() for part in file.name.partition(".")[0].replace("-", "_").split("_")) or "Box"
+    try:
+        made: type[FileBox] = types.new_class(name, (FileBox,), exec_body=lambda names: names.update(body))
+    except HfgError as error:
+        said("", "", str(error))
+        return FileBox
+    _MADE[file] = made
+    return made
+
+
+def _declarations(box: BoxDocument, said: Callable[[str, str, str], None], find: Find) -> Iterator[tuple[str, Any]]:
+    """What stands in the body of the class; what cannot is told and left out."""
+    names: set[str] = set()
+    for kind, declared in _KINDS:
+        for name, text in getattr(box, kind).items():
+            try:
+                _need_port_name(name, names)
+                yield name, declared(type_of_text(text, f'"{name}"'))
+            except HfgError as error:
+                said(kind, name, str(error))
+    for name, parameter in box.parameters.items():
+        try:
+            _need_port_name(name, names)
+            yield name, _parameter(name, parameter, find)
+        except HfgError as error:
+            said("parameters", name, str(error))
+
+
+def _need_port_name(name: str, names: set[str]) -> None:
+    if not name.isidentifier() or name.startswith("_") or hasattr(Subgraph, name):
+        raise GraphError(f'a port of a subgraph cannot be called "{name}"; choose another name')
+    if name in names:
+        raise GraphError(f'the subgraph has two ports "{name}"; give each a name of its own')
+    names.add(name)
+
+
+def _parameter(name: str, said: ParameterDocument, find: Find) -> Parameter[Any]:
+    hint = type_of_text(said.type, f'"{name}"')
+    unknown = [word for word in said.limits if word not in LIMITS]
+    if unknown:
+        raise GraphError(f'"{name}": "{unknown[0]}" is no limit; there are {", ".join(LIMITS)}')
+    limits = [LIMITS[word][0](value) for word, value in said.limits.items()]
+    choices = None if said.choices is None else [decoded(one, hint, find) for one in said.choices]
+    return Parameter(decoded(said.default, hint, find), *limits, unit=said.unit, choices=choices, type=hint)
+
+
+def limits_in_words(limits: tuple[Any, ...]) -> dict[str, Any] | None:
+    """Give limits as a file has them; None if one cannot be said."""
+    found: dict[str, Any] = {}
+    for limit in limits:
+        word = next((word for word, (kind, _) in LIMITS.items() if type(limit) is kind), None)
+        if word is None or word in found:
+            return None
+        found[word] = getattr(limit, LIMITS[word][1])
+    return found
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("File[") and name.endswith("]"):
+        file = Path(unquote(name.removeprefix("File[").removesuffix("]")))
+        if file not in _MADE:
+            from hfg.files.building import box_of_file
+
+            return box_of_file(file)
+        return _MADE[file]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,429 @@
+"""Makes a document of a graph, and finds everything that no file can say before anything is written.
+
+A node is told by the reference of its type. What is inside of a subgraph whose type has a name is what that builds: it
+is built once more beside, and what is otherwise is told; if it was edited, the inside is told whole. A subgraph that a
+file describes is told by that file. Stands on `document`, `boxes` and `missing`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from hfg.encoding import encode
+from hfg.errors import EncodingError, UsageError
+from hfg.files.allowed import project_of
+from hfg.files.boxes import FileBox, limits_in_words
+from hfg.files.document import (
+    NODE_OPTIONS,
+    BoxDocument,
+    Document,
+    EdgeDocument,
+    GateDocument,
+    GroupDocument,
+    InsideDocument,
+    NodeDocument,
+    OperatorDocument,
+    ParameterDocument,
+)
+from hfg.files.findings import Findings
+from hfg.files.missing import MissingNode
+from hfg.graph.editing.enclosing import Enclosed
+from hfg.graph.editing.type_texts import text_of_type
+from hfg.graph.graph import Graph
+from hfg.graph.structure.edge import Edge, is_feed, type_of
+from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.operators import NamedOperator
+from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
+from hfg.graph.structure.refusals import raise_refusals
+from hfg.graph.structure.subgraph import Subgraph, inside, is_box
+from hfg.nodetype import Node
+from hfg.ports import InnerSource, InnerTarget, Port
+from hfg.ports.specs import REQUIRED
+from hfg.values import same
+
+__all__ = ["describe"]
+
+_PLAIN_EDGE: Final = EdgeOptions()
+_PLAIN_NODE: Final = NodeOptions()
+_OF_BUILT: Final = ("enabled", "group")  # what may be said about a node that a type has built
+
+
+def describe(graph: Graph, beside: Path | None = None) -> Document:
+    """Make a document of a whole graph.
+
+    Args:
+      graph: that is told.
+      beside: the file that it is written to: included files are named from its folder.
+
+    Raises:
+      FileError: something cannot be said; `problems` holds every finding.
+      UsageError: it is the inside of a subgraph.
+    """
+    level = level_of(graph)
+    if level.owner is not None:
+        raise UsageError(
+            f'{level.title} is saved with the whole graph: save graph "{level.whole.root.name}", or describe the '
+            "subgraph in a file of its own"
+        )
+    telling = _Telling(level, beside)
+    document = telling.document()
+    telling.findings.reject(f'graph "{graph.name}" cannot be said in a file')
+    return document
+
+
+class _Telling:
+    def __init__(self, root: Level, beside: Path | None) -> None:
+        self.root = root
+        self.beside = None if beside is None else beside.resolve()
+        self.findings = Findings()
+        self.gates = {gate.target: gate for level in root.walk() for gate in level.gates}
+
+    def wrong(self, path: str, sentence: str) -> None:
+        self.findings.add("", 0, path, sentence)
+
+    def document(self) -> Document:
+        root = self.root
+        document = Document(name=root.name, notes=dict(root.whole.notes.get(None, {})))
+        for spec in root.whole.groups.by_name.values():
+            if spec != GroupSpec("loop"):
+                threads = 1 if spec.name == "loop" else spec.threads
+                document.groups[spec.name] = GroupDocument(threads, spec.policy, spec.seed)
+        for name, port in root.ports.inputs.items():
+            document.inputs[name] = self.type_text(port.type, f'input "{name}"')
+        for name, out in root.ports.outputs.items():
+            document.outputs[name] = self.type_text(out.type, f'output "{name}"')
+        self.fill(document, root)
+        return document
+
+    def type_text(self, hint: object, path: str) -> str:
+        text = text_of_type(hint)
+        if text is None:
+            self.wrong(
+                path,
+                f"its type {hint!r:.80} has no name; give it one in a module, as in Picture = Annotated[...], and "
+                "declare the port with that",
+            )
+        return text or "Any"
+
+    # --- one level ---
+
+    def fill(self, box: BoxDocument, level: Level) -> None:
+        """Tell what lies at a level."""
+        for name, node in level.nodes.items():
+            box.nodes[name] = self.node(node)
+        for edge in level.edges:
+            told = self.edge(edge, level)
+            if told is not None:
+                box.edges.append(told)
+        for name, ports in level.promotions.by_name.items():
+            box.promotes[name] = [_parameter_name(port) for port in ports]
+
+    def node(self, node: Node) -> NodeDocument:
+        if isinstance(node, MissingNode):
+            said = node._said
+            told = NodeDocument(said.type, parameters=said.parameters, inside=said.inside, graph=said.graph)
+        else:
+            told = NodeDocument(parameters=self.parameters(node))
+            if is_box(node):
+                self.box(node, told)
+            else:
+                told.type = self.reference(node)
+        for option in NODE_OPTIONS:
+            value = getattr(node._options, option)
+            if value != getattr(_PLAIN_NODE, option):
+                setattr(told, option, list(value) if option == "iterate_over" else value)
+        told.gate = self.gate(node, level_of(node.place.graph))
+        told.position, told.notes = self.notes(node, {})
+        return told
+
+    def gate(self, node: Node, seen: Level) -> GateDocument | None:
+        """The gate of a node, if it has any; by whom is named from a level of the file."""
+        gate = self.gates.get(node)
+        if gate is None:
+            return None
+        by, prefix = gate.by.place.path, f"{seen.path}/" if seen.path else ""
+        return GateDocument(by.removeprefix(prefix) if by.startswith(prefix) else f"/{by}", gate.idle_rate_hz)
+
+    def reference(self, node: Node) -> str:
+        reference = node._type.reference
+        if reference is None:
+            self.wrong(
+                node.place.path,
+                f"its type {node._type.qualname} cannot be found by name; define it at the top of a module",
+            )
+        elif reference.startswith(("__main__:", "hfg_target_")):
+            self.wrong(
+                node.place.path,
+                f"its type {node._type.qualname} is in the program itself, where no other program finds it; move it to "
+                "a module whose name no other module has",
+            )
+        return reference or ""
+
+    def parameters(self, node: Node, other: Node | None = None) -> dict[str, Any]:
+        """The values that are not what the type gives by itself, or not those of another node."""
+        found: dict[str, Any] = {}
+        specs, promoted = node._type.parameters, self.promoted(node)
+        for name, value in node._parameters.items():
+            if not specs[name].is_given:
+                continue
+            usual = specs[name].default if other is None else other._parameters[name]
+            if other is None and name in promoted:
+                usual = promoted[name]
+            if usual is not REQUIRED and same(usual, value):
+                continue
+            try:
+                found[name] = specs[name].encode(value)
+            except EncodingError as error:
+                self.wrong(f"{node.place.path}.{name}", f"{error}; take a type whose values are plain data")
+        return found
+
+    def promoted(self, node: Node) -> dict[str, Any]:
+        """What the subgraph around gives to parameters of a node."""
+        level = level_of(node.place.graph)
+        return {
+            port.name: level.owner._parameters[name]
+            for name, ports in level.promotions.by_name.items()
+            for port in ports
+            if port.node is node and level.owner is not None
+        }
+
+    def notes(self, node: Node, usual: dict[str, Any]) -> tuple[list[Any] | None, dict[str, Any]]:
+        """What editors noted; a position has a place of its own if it is two numbers."""
+        noted = {
+            name: value
+            for name, value in level_of(node.place.graph).whole.notes.get(node, {}).items()
+            if name not in usual or not same(usual[name], value)
+        }
+        position = noted.get("position")
+        if not (isinstance(position, list) and len(position) == 2 and {int, float}.issuperset(map(type, position))):
+            return None, noted
+        return position, {name: value for name, value in noted.items() if name != "position"}
+
+    # --- subgraphs ---
+
+    def box(self, node: Subgraph, told: NodeDocument) -> None:
+        """Say what a subgraph is: a file, a type, or a graph alone."""
+        kind, within = node._type, inside(node)
+        if within is None:
+            return
+        if isinstance(node, FileBox):
+            same_inside = self.as_built(node, within)
+            if same_inside is not None:
+                told.file, told.inside = self.file(node), same_inside
+                return
+        elif kind.reference is not None:
+            told.type = self.reference(node)
+            same_inside = self.as_built(node, within)
+            if same_inside is not None:
+                told.inside = same_inside
+                return
+            told.graph = BoxDocument()
+            self.fill(told.graph, within)
+            return
+        elif type(node).__bases__[0] not in (Subgraph, Enclosed) or kind.vectors:
+            told.type = self.reference(node)
+            return
+        told.graph = BoxDocument()
+        for field in ("inputs", "outputs", "events", "slots"):
+            for name, spec in getattr(kind, field).items():
+                if name not in kind.parameters:  # those of triggers
+                    getattr(told.graph, field)[name] = self.type_text(spec.type, f"{node.place.path}.{name}")
+        for name in kind.parameters:
+            self.declare(node, name, told.graph)
+        self.fill(told.graph, within)
+
+    def declare(self, node: Subgraph, name: str, graph: BoxDocument) -> None:
+        spec, path = node._type.parameters[name], f"{node.place.path}.{name}"
+        limits = limits_in_words(spec.limits)
+        if limits is None or spec.trigger:
+            what = "a trigger" if spec.trigger else f"its limits {spec.limits!r:.80}"
+            self.wrong(
+                path,
+                f"{what} cannot be said in a file; define the subgraph {node._type.qualname} at the top of a module",
+            )
+            return
+        try:
+            default = encode(spec.default, spec.type)
+            choices = None if spec.choices is None else [encode(one, spec.type) for one in spec.choices]
+        except EncodingError as error:
+            self.wrong(path, f"{error}; take a type whose values are plain data")
+            return
+        text = self.type_text(spec.type, path)
+        graph.parameters[name] = ParameterDocument(text, default, spec.unit, choices, limits)
+
+    def file(self, node: FileBox) -> str:
+        """Name the file of a subgraph from where this one is written."""
+        file = node._file
+        if self.beside is None:
+            return str(file)
+        project = project_of(self.beside)
+        if not file.is_relative_to(project):
+            self.wrong(
+                node.place.path,
+                f"its file {file} is outside of the project {project}, so a file there cannot include it; save beside "
+                "it, or copy it there",
+            )
+        return Path(os.path.relpath(file, self.beside.parent)).as_posix()
+
+    def as_built(self, node: Subgraph, within: Level) -> dict[str, InsideDocument] | None:
+        """Tell what is otherwise inside than the type builds it; None if more is than can be said so."""
+        fresh = self.built_anew(node)
+        made = None if fresh is None else inside(fresh)
+        if made is None or fresh is None or _shape(within) != _shape(made):
+            return None
+        found: dict[str, InsideDocument] = {}
+        notes = level_of(fresh.place.graph).whole.notes
+        pairs = zip(_within(within), _within(made), strict=True)
+        built = {gate.target for level in made.whole.root.walk() for gate in level.gates}
+        for (path, one), (_, other) in pairs:
+            if any(getattr(one._options, name) != getattr(other._options, name) for name in _rest()):
+                return None
+            told = InsideDocument(parameters=self.parameters(one, other))
+            if any(not one._type.parameters[name].is_port for name in told.parameters):
+                return None  # the size of a vector
+            if one._options.enabled != other._options.enabled:
+                told.enabled = one._options.enabled
+            if one._options.group != other._options.group:
+                told.group = one._options.group or ""
+            if other not in built:
+                told.gate = self.gate(one, level_of(node.place.graph))
+            told.position, told.notes = self.notes(one, notes.get(other, {}))
+            if told != InsideDocument():
+                found[path] = told
+        return found
+
+    def built_anew(self, node: Subgraph) -> Subgraph | None:
+        """The same subgraph as its type makes it."""
+        graph = Graph()
+        for spec in self.root.whole.groups.by_name.values():
+            level_of(graph).whole.groups.change(spec)
+        try:
+            with raise_refusals():
+                made: Subgraph = graph.add(node._copy(), name="box", iterate_over=node._options.iterate_over)  # type: ignore[assignment]
+        except Exception as error:  # code of users raises what it likes
+            self.wrong(
+                node.place.path,
+                f"its type {node._type.qualname} cannot build its inside again ({type(error).__name__}: {error}); mend "
+                "its build()",
+            )
+            return None
+        return made
+
+    # --- edges ---
+
+    def edge(self, edge: Edge, level: Level) -> EdgeDocument | None:
+        if is_feed(edge.source):
+            self.wrong(
+                edge.label,
+                "an observable from outside is code; connect it by hand to the graph that is loaded, or feed the graph "
+                "by graph.input(...)",
+            )
+            return None
+        told = EdgeDocument(_end(edge.source, level), _end(edge.target, level))
+        for name in ("active", "capacity", "overflow", "capacity_limit", "buffer"):
+            setattr(told, name, getattr(edge.options, name))
+        if edge.overflow == "latest":
+            told.capacity = _PLAIN_EDGE.capacity  # it is 1 by that
+        try:
+            told.initial = [encode(one, type_of(edge.target)) for one in edge.options.initial]
+        except EncodingError as error:
+            self.wrong(edge.label, f"an initial value is no plain data: {error}; take another")
+        told.through = [one for operator in edge.options.through for one in self.operator(edge, operator)]
+        return told
+
+    def operator(self, edge: Edge, operator: object) -> Iterator[OperatorDocument]:
+        reference = operator.made_by.reference if isinstance(operator, NamedOperator) else None
+        if not isinstance(operator, NamedOperator) or reference is None:
+            self.wrong(
+                edge.label,
+                f"its operator {operator!r:.80} cannot be found by name; make it by a function at the top of a module "
+                "with @hfg.operator, or by one of reactivex, as in hfg.operator(ops.debounce)(0.2)",
+            )
+            return
+        try:
+            yield OperatorDocument(
+                reference,
+                [encode(one, Any) for one in operator.arguments],
+                {name: encode(one, Any) for name, one in operator.parameters.items()},
+            )
+        except EncodingError as error:
+            self.wrong(edge.label, f"its operator {operator!r:.80} is not made of plain data: {error}; give it others")
+
+
+def _end(end: Any, level: Level) -> str:
+    """Name an end as it is seen from its level."""
+    if isinstance(end, InnerSource | InnerTarget):
+        return end.outer.name
+    assert isinstance(end, Port)
+    if level.ports.has(end):
+        taken = level.owner is not None and any(
+            end.name in getattr(level.owner._type, kind) for kind in ("inputs", "outputs", "events", "slots")
+        )
+        return f"/{end.name}" if taken else end.name
+    if not isinstance(end.node, Node):
+        return end.name
+    return f"{end.node.place.name}.{end.name}"
+
+
+def _rest() -> list[str]:
+    return [name for name in NODE_OPTIONS if name not in _OF_BUILT]
+
+
+def _within(level: Level) -> list[tuple[str, Node]]:
+    """All nodes inside of a subgraph, by path from there."""
+    prefix = f"{level.path}/"
+    return [(node.place.path.removeprefix(prefix), node) for one in level.walk() for node in one.nodes.values()]
+
+
+def _shape(level: Level) -> list[Any]:
+    """What is inside, as data that can be compared, but for what is told of a node that is there."""
+    return [_shape_of_level(one, f"{level.path}/") for one in level.walk()]
+
+
+def _shape_of_level(level: Level, prefix: str) -> tuple[Any, ...]:
+    def near(path: str) -> str:
+        return path.replace(prefix, "", 1) if path.startswith(prefix) else path
+
+    return (
+        [(name, node._type.reference or _kind(node)) for name, node in level.nodes.items()],
+        [(_ends(edge, level), _said(edge)) for edge in level.edges],
+        [(near(gate.target.place.path), near(gate.by.place.path), gate.idle_rate_hz) for gate in level.gates],
+        [(name, [_parameter_name(port) for port in ports]) for name, ports in level.promotions.by_name.items()],
+    )
+
+
+def _parameter_name(port: Any) -> str:
+    """Name a parameter as its subgraph promotes it."""
+    return f"{port.node.place.name}.{port.name}"
+
+
+def _kind(node: Node) -> object:
+    """What stands for a type that has no name: a subgraph that is built has another each time."""
+    return node._type.qualname if is_box(node) else node._type
+
+
+def _ends(edge: Edge, level: Level) -> tuple[str, str]:
+    return ("observable" if is_feed(edge.source) else _end(edge.source, level)), _end(edge.target, level)
+
+
+def _said(edge: Edge) -> tuple[Any, ...]:
+    """What is said about an edge; operators without a name are made anew each time, and are taken for the same."""
+    options = edge.options
+    through = [one if isinstance(one, NamedOperator) else None for one in options.through]
+    others = [getattr(options, name) for name in options.__struct_fields__ if name not in ("through", "initial")]
+    return (*others, through, len(options.initial), *map(_Same, options.initial))
+
+
+class _Same:
+    """A value that is compared as files compare values."""
+
+    def __init__(self, value: object) -> None:
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and same(self.value, other.value)
+
+    __hash__: Callable[..., int] = None  # type: ignore[assignment]

@@ -1,0 +1,232 @@
+"""What a graph file says, as plain data: structs of texts, numbers, lists and dicts; no node is made of it here.
+
+    Document            a whole graph, or a subgraph that other files include
+    ├── groups          GroupDocument by name
+    ├── nodes           NodeDocument by name; one may hold a BoxDocument of its own, its inside
+    │                   and a GateDocument, or InsideDocuments about what its type has built
+    └── edges           EdgeDocument in order, each perhaps with OperatorDocuments
+
+`reading` makes a document of a text and `writing` a text of a document; `building` makes a graph of a document and
+`describing` a document of a graph. Whoever reads another format makes a document and goes on from there. What is
+omitted in a file is what stands here as default, which is what `graph.add` and `graph.connect` take when it is not
+said. Stands on the options of the graph floor.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import msgspec
+
+from hfg.graph.structure.options import DEFAULT_CAPACITY, NodeOptions, OnError, Overflow, Policy, Release
+
+__all__ = [
+    "NODE_OPTIONS",
+    "SUFFIX",
+    "VERSION",
+    "BoxDocument",
+    "Document",
+    "EdgeDocument",
+    "GateDocument",
+    "GroupDocument",
+    "InsideDocument",
+    "NodeDocument",
+    "OperatorDocument",
+    "ParameterDocument",
+]
+
+VERSION: Final = 1
+SUFFIX: Final = ".hfg.yaml"
+
+
+class OperatorDocument(msgspec.Struct, omit_defaults=True):
+    """An operator on an edge (rule P9); in a file its reference alone if it is given nothing.
+
+    Attributes:
+      type: the reference of the function that makes it, "reactivex.operators:debounce".
+      arguments: what that is given by position.
+      parameters: what it is given by name.
+    """
+
+    type: str
+    arguments: list[Any] = []
+    parameters: dict[str, Any] = {}
+
+
+class EdgeDocument(msgspec.Struct, omit_defaults=True):
+    """An edge; in a file "camera.out -> blur.image", what else is said about it below that.
+
+    Attributes:
+      source: a port as seen from where the edge stands: "camera.out", "fetch/go_to.goal", or a port of its own by name.
+      target: likewise.
+      active: whether it also transports activity.
+      capacity: of an event edge: how many untaken signals it holds (rule P5).
+      overflow: of an event edge: what happens to more of them.
+      capacity_limit: of an event edge: how far "wait" may let the queue grow (rule F8).
+      buffer: of an edge from an output into an input: by how many tokens the producer may run ahead (rule P4).
+      initial: values that lie on it at the start, the oldest first (rule P7).
+      through: operators on the way (rule P9).
+    """
+
+    source: str
+    target: str
+    active: bool = False
+    capacity: int = DEFAULT_CAPACITY
+    overflow: Overflow = "wait"
+    capacity_limit: int | None = None
+    buffer: int = 0
+    initial: list[Any] = []
+    through: list[OperatorDocument] = []
+
+
+class GateDocument(msgspec.Struct, omit_defaults=True):
+    """While `by` is inactive the gated node rests (rule A11).
+
+    Attributes:
+      by: the path of the state node or subgraph, from the graph in which the gated node stands, or behind a "/" from
+        the outermost graph of the file.
+      idle_rate_hz: so many firings a second go on meanwhile.
+    """
+
+    by: str
+    idle_rate_hz: float | None = None
+
+
+class GroupDocument(msgspec.Struct, omit_defaults=True):
+    """Where nodes run (rules R1, R2).
+
+    Attributes:
+      threads: 1 for a thread of its own, more for as many, 0 for the event loop.
+      policy: who is first when several can run.
+      seed: for policy "random"; by default the run's.
+    """
+
+    threads: int = 1
+    policy: Policy = "fifo"
+    seed: int | None = None
+
+
+class ParameterDocument(msgspec.Struct, omit_defaults=True):
+    """A parameter that a subgraph declares.
+
+    Attributes:
+      type: as a text, "float".
+      default: its value unless the subgraph is made with another.
+      unit: for people.
+      choices: the only allowed values.
+      limits: by their names in annotated_types: gt, ge, lt, le, multiple_of, min_length, max_length.
+    """
+
+    type: str
+    default: Any = None
+    unit: str | None = None
+    choices: list[Any] | None = None
+    limits: dict[str, Any] = {}
+
+
+class InsideDocument(msgspec.Struct, omit_defaults=True):
+    """What is otherwise with a node inside a subgraph than its type, or its file, makes it.
+
+    Attributes:
+      parameters: by name, those that were set.
+      enabled: whether it is at the start of a run.
+      group: where it runs; "" is the group of the subgraph around it.
+      gate: couples its work to the activity of another, whose path is as that of this one.
+      position: in a drawing, x and y.
+      notes: of editors, by name.
+    """
+
+    parameters: dict[str, Any] = {}
+    enabled: bool | None = None
+    group: str | None = None
+    gate: GateDocument | None = None
+    position: list[Any] | None = None
+    notes: dict[str, Any] = {}
+
+
+class BoxDocument(msgspec.Struct, omit_defaults=True):
+    """What lies in a graph, or inside a subgraph, and which ports that has.
+
+    Attributes:
+      inputs: the types of its ports by name, as texts: "int", "list[my_robot.types.Pose]"; so the next three.
+      events: of subgraphs only, as are slots and parameters.
+      parameters: that it is made with.
+      nodes: by name, in order of adding.
+      edges: in order of connecting.
+      promotes: by the name of a parameter, the parameters inside that it stands for (rule G3).
+    """
+
+    inputs: dict[str, str] = {}
+    outputs: dict[str, str] = {}
+    events: dict[str, str] = {}
+    slots: dict[str, str] = {}
+    parameters: dict[str, ParameterDocument] = {}
+    nodes: dict[str, NodeDocument] = {}
+    edges: list[EdgeDocument] = []
+    promotes: dict[str, list[str]] = {}
+
+
+class NodeDocument(msgspec.Struct, omit_defaults=True):
+    """A node: what it is, how it runs, what it is given.
+
+    It is one of three: of a type, of a file, or a graph alone, which is a subgraph without a type of its own. A type
+    with a graph is a subgraph whose inside was edited and is told instead of built.
+
+    Attributes:
+      type: its reference, "my_robot.nodes:MapLookup".
+      file: of a subgraph that another file describes, from the folder of this one.
+      group: where it runs; by default where the subgraph around it does. This and the next are those of `graph.add`.
+      gate: couples its work to the activity of another.
+      parameters: by name.
+      inside: of a subgraph: what is otherwise with the nodes in it, by path from there.
+      position: in a drawing, x and y.
+      notes: of editors, by name.
+      graph: of a subgraph: its inside.
+    """
+
+    type: str = ""
+    file: str = ""
+    group: str | None = None
+    priority: int = 0
+    max_rate_hz: float | None = None
+    on_error: OnError = "stop"
+    restart_limit: int = 5
+    restart_backoff_s: float = 0.1
+    max_duration_s: float | None = None
+    retries: int = 0
+    retry_backoff_s: float = 0.1
+    retry_backoff_max_s: float = 30.0
+    retry_jitter: float = 0.0
+    concurrency: int = 1
+    ordered: bool = True
+    release: Release = "auto"
+    active_for_s: float | None = None
+    deadline_s: float | None = None
+    enabled: bool = True
+    iterate_over: list[str] = []
+    gate: GateDocument | None = None
+    parameters: dict[str, Any] = {}
+    inside: dict[str, InsideDocument] = {}
+    position: list[Any] | None = None
+    notes: dict[str, Any] = {}
+    graph: BoxDocument | None = None
+
+
+class Document(BoxDocument, omit_defaults=True):
+    """A graph file.
+
+    Attributes:
+      hfg: the version of the format.
+      name: of the graph, for people.
+      notes: about the whole, by name.
+      groups: where nodes run, by name.
+    """
+
+    hfg: int = VERSION
+    name: str = "graph"
+    notes: dict[str, Any] = {}
+    groups: dict[str, GroupDocument] = {}
+
+
+NODE_OPTIONS: Final = NodeOptions.__struct_fields__
+"""The fields of a node that `graph.add` takes."""

@@ -1,0 +1,129 @@
+"""Writes a document as text, and text into a file: whole or not at all. Stands on `emitting` and `document`."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from pathlib import Path
+from typing import Any, Final
+
+from hfg.files.document import (
+    VERSION,
+    BoxDocument,
+    Document,
+    EdgeDocument,
+    GroupDocument,
+    NodeDocument,
+    OperatorDocument,
+)
+from hfg.files.emitting import emit
+
+__all__ = ["text_of", "write_text"]
+
+_FIRST: Final = ("hfg", "name", "notes", "groups")
+_ARROW: Final = " -> "
+
+
+def text_of(document: Document) -> str:
+    """Write a document as text; the same text for the same document.
+
+    Raises:
+      TypeError: a value in it is no plain data.
+    """
+    said: dict[str, Any] = {"hfg": VERSION, "name": document.name}
+    for name in _FIRST[2:]:
+        value = getattr(document, name)
+        if value:
+            said[name] = _plain(value)
+    return emit(said | _box(document))
+
+
+def _box(box: BoxDocument) -> dict[str, Any]:
+    return {name: _plain(value) for name in BoxDocument.__struct_fields__ if (value := getattr(box, name))}
+
+
+def _plain(value: Any) -> Any:
+    match value:
+        case NodeDocument():
+            found = _struct(value)
+            if value.graph is not None:
+                found["graph"] = _box(value.graph)
+            return found
+        case EdgeDocument():
+            return _edge(value)
+        case GroupDocument():
+            return {"threads": value.threads} | _struct(value)
+        case OperatorDocument():
+            found = _struct(value)
+            return value.type if len(found) == 1 else found
+        case dict():
+            return {name: _plain(one) for name, one in value.items()}
+        case list():
+            return [_plain(one) for one in value]
+    if hasattr(value, "__struct_fields__"):
+        return _struct(value) or None
+    return value
+
+
+def _struct(value: Any) -> dict[str, Any]:
+    """The fields that are not as they are when nothing is said; those that must be said always."""
+    defaults = dict(zip(reversed(value.__struct_fields__), reversed(value.__struct_defaults__), strict=False))
+    found: dict[str, Any] = {}
+    for name in value.__struct_fields__:
+        one = getattr(value, name)
+        usual = defaults.get(name, _Required)
+        usual = usual.factory() if hasattr(usual, "factory") else usual
+        if usual is _Required or type(usual) is not type(one) or usual != one:
+            found[name] = _plain(one)
+    return found
+
+
+class _Required:
+    """Stands for no default."""
+
+
+def _edge(edge: EdgeDocument) -> Any:
+    options = _struct(edge)
+    del options["source"], options["target"]
+    label = f"{edge.source}{_ARROW}{edge.target}"
+    if label.count(_ARROW) > 1 or label != " ".join(label.split(" ")).strip() or edge.source.strip() != edge.source:
+        return {"source": edge.source, "target": edge.target} | options
+    return {label: options} if options else label
+
+
+def write_text(text: str, path: Path) -> None:
+    """Put a text into a file: all of it or, on a full disk or a sudden end, nothing, and then the file is as before.
+
+    Raises:
+      OSError: it cannot be written.
+    """
+    file = path.resolve()  # what a link names, not the link
+    descriptor, name = tempfile.mkstemp(prefix=f".{file.name}.", suffix=".new", dir=file.parent)
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(text.encode())
+            stream.flush()
+            os.fsync(stream.fileno())
+        Path(name).chmod(_mode(file))
+        Path(name).replace(file)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(name).unlink()
+        raise
+    with contextlib.suppress(OSError):  # so that the name, too, outlives a sudden end; not every system can
+        folder = os.open(file.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def _mode(file: Path) -> int:
+    """Who may read and write it: as before, else as any new file."""
+    try:
+        return file.stat().st_mode & 0o7777
+    except OSError:
+        mask = os.umask(0)
+        os.umask(mask)
+        return 0o666 & ~mask

@@ -1,0 +1,57 @@
+"""`hfg convert`, and graph files as TARGET."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hfg.files import schema
+from tests.cli.conftest import Command
+
+
+def test_code_becomes_a_file_that_checks_draws_and_runs_alike(command: Command) -> None:
+    assert command("convert", "steps.py:build", "steps.hfg.yaml").out == ""
+    text = Path("steps.hfg.yaml").read_text()
+    assert "type: steps:third" in text
+    assert command("convert", "steps.hfg.yaml").out == text
+    for verb in (["run", "--clock", "virtual", "--json"], ["check"], ["draw"]):
+        code, file = (command(*verb, target) for target in ("steps.py:build", "steps.hfg.yaml"))
+        assert code.code == file.code == 0
+        if verb == ["check"]:
+            assert code.out == file.out
+        if verb == ["draw"]:
+            assert code.out == file.out
+
+
+def test_a_parameter_of_a_graph_file_is_set_for_a_run(command: Command) -> None:
+    command("convert", "steps.py:build", "steps.hfg.yaml")
+    shown = command("run", "steps.hfg.yaml", "--clock", "virtual", "--param", "steps.count=2")
+    assert shown.code == 0
+    assert shown.out.startswith("step 0\nstep 1\n")
+    assert "step 2" not in shown.out
+
+
+def test_the_schema_is_written(command: Command) -> None:
+    assert command("convert", "--schema").out == schema()
+    assert command("convert", "--schema", "graph.schema.json").code == 0
+    assert Path("graph.schema.json").read_text() == schema()
+    assert command("convert", "--schema", "no/such/folder.json").code == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["convert"], "there is no TARGET: write hfg convert graph.py graph.hfg.yaml"),
+        (["convert", "steps.py:build", "steps.yaml"], "steps.yaml is no name of a graph file; call it steps.hfg.yaml"),
+        (["convert", "--schema", "a", "b"], "--schema needs no TARGET"),
+        (["run", "steps.hfg.yaml", "--arg", "count=3"], "is a graph file, no function, so --arg count=3 means nothing"),
+        (["run", "steps.py:build", "--allow", "x"], "is code, which imports what it likes, so --allow x means nothing"),
+        (["run", "missing.hfg.yaml"], "missing.hfg.yaml: there is no such file"),
+    ],
+)
+def test_wrong_uses_get_one_sentence(arguments: list[str], sentence: str, command: Command) -> None:
+    shown = command(*arguments)
+    assert shown.code == 2
+    assert sentence in shown.err
+    assert shown.err.count("\n") == 1
