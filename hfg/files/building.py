@@ -28,6 +28,7 @@ from hfg.files.document import (
     GateDocument,
     InsideDocument,
     NodeDocument,
+    OperatorDocument,
 )
 from hfg.files.findings import Findings, Key, Lines, graph_path
 from hfg.files.missing import MissingNode, missing_node
@@ -475,10 +476,15 @@ class _Making:
         where = f'"{said.source}" -> "{said.target}"'
         options: dict[str, Any] = {name: getattr(said, name) for name in _EDGE_OPTIONS}
         options["initial"] = tuple(decoded(one, type_of(target), self.loading.find) for one in said.initial)
-        options["through"] = tuple(
-            find_operator(one.type, tuple(one.arguments), one.parameters, where) for one in said.through
-        )
+        options["through"] = tuple(self.operator(one, where) for one in said.through)
         declare_edge(level, source, target, options)
+
+    def operator(self, said: OperatorDocument, where: str) -> object:
+        """Make an operator; what it is given may say of itself of which type it is."""
+        find = self.loading.find
+        arguments = tuple(decoded(one, Any, find) for one in said.arguments)
+        parameters = {name: decoded(one, Any, find) for name, one in said.parameters.items()}
+        return find_operator(said.type, arguments, parameters, where)
 
     def promote(self, graph: Graph, box: BoxDocument, owner: Subgraph | None, name: str, path: str, key: Key) -> None:
         if owner is None:

@@ -136,6 +136,15 @@ def test_vectors_of_ports_keep_their_size() -> None:
     assert "numbers_3.out -> merged.values[2]" in text_of(describe(graph))
 
 
+def test_what_operators_are_given_comes_back_in_its_type() -> None:
+    graph = hfg.Graph()
+    graph.add(numbers())
+    ear = graph.add(Ear())
+    begun = hfg.operator(ops.start_with)((1, 2), Pose(3.0))
+    graph.connect(graph["numbers.out.sent"], ear.hear, through=[begun])
+    assert again(graph).edges[0].options.through == (begun,)
+
+
 def test_machines_are_states_and_edges() -> None:
     door = hfg.StateMachine(
         ["closed", "open"], [("push", "closed", "open"), ("pull", "open", "closed")], initial="closed", final=["closed"]
