@@ -26,9 +26,9 @@ from reactivex import operators
 
 import hfg
 from hfg.cli.live import live_table
+from hfg.images import Image
 from hfg.timeline import Timeline
 from hfg.trace import ActivityChanged, FiringStarted, TokenSent, TraceEvent
-from hfg.types import Image
 
 Clock = Literal["real", "virtual"]
 

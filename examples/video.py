@@ -20,7 +20,7 @@ import numpy as np
 import skimage.data
 
 import hfg
-from hfg.types import Image
+from hfg.images import Image
 
 HZ, FIND_HZ = 30, 5
 WIDTH = 256

@@ -14,7 +14,7 @@ Example:
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -60,46 +60,65 @@ class Rows(Shape):
         return tuple(shape for count in self.axes for shape in ((None, count), (None, 1, count)))
 
 
+if TYPE_CHECKING:
+    # Stubs such as those of OpenCV know no more of a result than that it is an array of numbers: to a type checker an
+    # image is an array of anything, and its pixels are checked where edges are drawn and on values.
+    _Uint8: TypeAlias = npt.NDArray[Any]
+    _Float32: TypeAlias = npt.NDArray[Any]
+    _Uint16: TypeAlias = npt.NDArray[Any]
+    _Int16: TypeAlias = npt.NDArray[Any]
+    _Int32: TypeAlias = npt.NDArray[Any]
+    _Coordinates: TypeAlias = npt.NDArray[Any]
+    _Reals: TypeAlias = npt.NDArray[Any]
+else:
+    _Uint8 = npt.NDArray[np.uint8]
+    _Float32 = npt.NDArray[np.float32]
+    _Uint16 = npt.NDArray[np.uint16]
+    _Int16 = npt.NDArray[np.int16]
+    _Int32 = npt.NDArray[np.int32]
+    _Coordinates = npt.NDArray[np.int32 | np.float32]
+    _Reals = npt.NDArray[np.float32 | np.float64]
+
 AnyImage: TypeAlias = Annotated[npt.NDArray[Any], Pixels(), Named("AnyImage")]
 """An image of any kind of pixel, with 1 to 4 channels."""
 
-Image: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(), Named("Image")]
+Image: TypeAlias = Annotated[_Uint8, Pixels(), Named("Image")]
 """An image of 8 bits, 0 to 255, with 1 to 4 channels: what cameras and files give."""
 
-Gray: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(1), Named("Gray")]
+Gray: TypeAlias = Annotated[_Uint8, Pixels(1), Named("Gray")]
 """An image of 8 bits and one channel."""
 
-Color: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(3), Named("Color")]
+Color: TypeAlias = Annotated[_Uint8, Pixels(3), Named("Color")]
 """An image of 8 bits and three channels: blue, green, red, unless its maker says otherwise."""
 
-ColorAlpha: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(4), Named("ColorAlpha")]
+ColorAlpha: TypeAlias = Annotated[_Uint8, Pixels(4), Named("ColorAlpha")]
 """An image of 8 bits and four channels: blue, green, red and how opaque it is."""
 
-Mask: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(1), Named("Mask")]
+Mask: TypeAlias = Annotated[_Uint8, Pixels(1), Named("Mask")]
 """Which pixels count: 0 is out, anything else is in, and 255 what is written for it. Any `Gray` image will do."""
 
-FloatImage: TypeAlias = Annotated[npt.NDArray[np.float32], Pixels(), Named("FloatImage")]
+FloatImage: TypeAlias = Annotated[_Float32, Pixels(), Named("FloatImage")]
 """An image of real numbers with 1 to 4 channels; where a range is meant it is 0 to 1."""
 
-Depth: TypeAlias = Annotated[npt.NDArray[np.float32], Pixels(1), Named("Depth")]
+Depth: TypeAlias = Annotated[_Float32, Pixels(1), Named("Depth")]
 """How far away each pixel is, in metres; 0 or NaN where nobody knows."""
 
-DepthMillimetres: TypeAlias = Annotated[npt.NDArray[np.uint16], Pixels(1), Named("DepthMillimetres")]
+DepthMillimetres: TypeAlias = Annotated[_Uint16, Pixels(1), Named("DepthMillimetres")]
 """How far away each pixel is, in millimetres, as depth cameras give it; 0 where nobody knows."""
 
-Disparity: TypeAlias = Annotated[npt.NDArray[np.int16], Pixels(1), Named("Disparity")]
+Disparity: TypeAlias = Annotated[_Int16, Pixels(1), Named("Disparity")]
 """How far each pixel moves from the left picture to the right one, in sixteenths of a pixel, as OpenCV gives it."""
 
-Labels: TypeAlias = Annotated[npt.NDArray[np.int32], Pixels(1), Named("Labels")]
+Labels: TypeAlias = Annotated[_Int32, Pixels(1), Named("Labels")]
 """The number of the region that each pixel belongs to."""
 
-FlowField: TypeAlias = Annotated[npt.NDArray[np.float32], Pixels(2), Named("FlowField")]
+FlowField: TypeAlias = Annotated[_Float32, Pixels(2), Named("FlowField")]
 """How far each pixel moves, in pixels: to the right, and down."""
 
-Points: TypeAlias = Annotated[npt.NDArray[np.int32 | np.float32], Rows(2), Named("Points")]
+Points: TypeAlias = Annotated[_Coordinates, Rows(2), Named("Points")]
 """Points of the plane, x and y in pixels: a contour, corners, a polygon."""
 
-Matrix: TypeAlias = Annotated[npt.NDArray[np.float32 | np.float64], Shape(None, None), Named("Matrix")]
+Matrix: TypeAlias = Annotated[_Reals, Shape(None, None), Named("Matrix")]
 """A matrix of real numbers."""
 
 _LETTERS: Final = {2: "height x width", 3: "height x width x {}"}

@@ -448,7 +448,11 @@ class Node:
         wrong = spec.check(value)
         if wrong is not None:
             raise ValueError(f'parameter "{_name(self)}.{name}" {wrong}')
-        self._parameters[name] = own_copy(value)
+        self._parameters[name] = kept = own_copy(value)
+        if spec.read_only:
+            tell = self._port("parameter", name)._tell
+            if tell is not None:
+                tell(kept)
 
     def _reset_states(self) -> None:
         """Begin a run: state afresh, and nothing left of what an earlier run wrote on the node.

@@ -18,7 +18,7 @@ from annotated_types import Ge, Interval
 import hfg
 from hfg.errors import DeclarationError, UsageError
 from hfg.functions import FunctionNode, NodeFunction
-from hfg.types import Image
+from hfg.images import Image
 
 if TYPE_CHECKING:
     from decimal import Decimal

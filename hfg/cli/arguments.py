@@ -72,7 +72,8 @@ def _value(where: str, name: str, text: str, hint: Any) -> Any:
         made = _made(hint, text)
         if made is not None and accepts(made, hint):
             return made
-    raise TargetError(f'{where}: argument "{name}" must be of type {describe(hint)}, got {text!r:.80}')
+    words = "true or false" if hint is bool else f"of type {describe(hint)}"
+    raise TargetError(f'{where}: argument "{name}" must be {words}, got {text!r:.80}')
 
 
 def _made(hint: Any, value: Any) -> Any:

@@ -6,7 +6,7 @@ Stands on `base`, `specs`, `kinds` and `conditions`, and on limits and types.
 from __future__ import annotations
 
 import typing
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar, cast, overload
 
 import annotated_types
@@ -29,13 +29,14 @@ T = TypeVar("T")
 class ParameterPort(Port, Source[T], Target[T]):
     """The parameter of one node: a value, an optional input and an output (rule P8)."""
 
-    __slots__ = ("spec",)
+    __slots__ = ("_tell", "spec")
 
     kind: ClassVar[Kind] = "parameter"
 
     def __init__(self, node: Owner, name: str, spec: ParameterSpec) -> None:
         super().__init__(node, name, spec.type)
         self.spec = spec
+        self._tell: Callable[[Any], None] | None = None  # what a run does when the node sets what is read-only
 
     @property
     def value(self) -> T:

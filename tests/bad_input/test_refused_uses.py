@@ -15,11 +15,14 @@ from contextlib import redirect_stderr
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from annotated_types import Ge, Interval
 
 import hfg
 from hfg import commands
 from hfg.cli import show
+from hfg.encoding import decode, encode
 from hfg.testing import diagrams, explore, fire, reference_run
 from hfg.trace import TraceEvent
 from tests.cli.conftest import STEPS, Command, command
@@ -110,6 +113,28 @@ def fed(do: Callable[[Any], Any]) -> Callable[[], Any]:
                 await result
 
     return lambda: virtual(main)
+
+
+class Draws(hfg.Node):
+    band = hfg.Parameter(hfg.Span(0.2, 0.8), Interval(ge=0, le=1))
+    frame = hfg.Parameter(hfg.Colour(255, 128, 0))
+    store = hfg.Parameter(Path("a.png"), pattern="*.png")
+    offset = hfg.Parameter(np.zeros(3))
+    method = hfg.Parameter(8, choices={"Otsu": 8, "Plain": 0})
+    done = hfg.Parameter(0.0, read_only=True)
+
+    def process(self, value: int) -> None:
+        self.done += 0.1
+
+
+def _into_read_only() -> None:
+    graph = hfg.Graph()
+    draws = graph.add(Draws())
+    graph.connect(draws.ports.parameters["band"], draws.ports.parameters["done"])
+
+
+def _declares(**said: Any) -> type:
+    return type("Declared", (hfg.Node,), {"a": hfg.Parameter(1, **said)})
 
 
 def edited(*given: Any) -> Callable[[], Any]:
@@ -363,6 +388,72 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "trace into nothing": (running(lambda run, g: run.trace(None)), "trace must be a function that takes each event"),
     "trace little": (running(lambda run, g: run.trace(print, size=0)), "size is how many events the consumer's buffer"),
     "set a value": (running(lambda run, g: run.set(g["count"].limit, 4)), 'node.ports.parameters["name"], got 3'),
+    "set what is read-only": (
+        running(lambda run, g: run.set(hfg.Graph().add(Draws()).ports.parameters["done"], 0.5)),
+        'parameter "draws.done" is read-only: its node alone sets it; read node.done, or connect node.ports.parameters',
+    ),
+    "give what is read-only": (lambda: Draws(done=0.5), 'parameter "draws.done" is read-only: its node alone sets it'),
+    "lead into what is read-only": (
+        lambda: _into_read_only(),
+        '"draws.band" cannot lead into the parameter "draws.done"',
+    ),
+    "give a pair for a span": (
+        lambda: Draws(band=(0.1, 0.2)),
+        'parameter "draws.band" must be hfg.Span(low, high) of fl',
+    ),
+    "give a span upside down": (
+        lambda: Draws(band=hfg.Span(0.9, 0.1)),
+        "must have low <= high, got Span(low=0.9, high=0",
+    ),
+    "give a text for a colour": (lambda: Draws(frame="red"), "must be a colour, as in hfg.Colour(255, 128, 0) or"),
+    "give a colour too bright": (
+        lambda: Draws(frame=hfg.Colour(0, 0, 256)),
+        "must have red, green and blue from 0 to 2",
+    ),
+    "read no colour": (lambda: hfg.Colour.of("red"), '\'red\' is no colour; write "#rrggbb", as in "#ff8000"'),
+    "give another kind of file": (
+        lambda: Draws(store=Path("a.gif")),
+        "must be the name of a file like *.png, got 'a.gi",
+    ),
+    "give another shape": (
+        lambda: Draws(offset=np.zeros(2)),
+        "must be of type Array[float64] and shape 3, got an array",
+    ),
+    "choose what is not there": (lambda: Draws(method=1), "must be one of 8 (Otsu), 0 (Plain), got 1"),
+    "declare a step of nothing": (lambda: _declares(step=0), "has a step of 0; a step is a number above 0"),
+    "declare by a limit": (lambda: hfg.Parameter(Ge(0)), "is a limit, where the default of a parameter should be; wri"),
+    "declare a pattern of a number": (
+        lambda: _declares(pattern="*.png"),
+        "but pattern=, directory= and save= are for p",
+    ),
+    "declare a choice of letters": (
+        lambda: _declares(choices="ab"),
+        "choices are several values, got 'ab'; write choi",
+    ),
+    "declare shown by nobody": (
+        lambda: _declares(shown_if="other"),
+        'is shown by "other", which is no parameter with a',
+    ),
+    "declare shown by code": (
+        lambda: _declares(shown_if={"other": bool}),
+        "what only code can tell, <class 'bool'>, an",
+    ),
+    "declare shown by itself": (
+        lambda: _declares(shown_if="a"),
+        "is shown by its own value, so that it could hide for",
+    ),
+    "store a lambda": (
+        lambda: encode(lambda: 1),
+        "cannot be found by a name, so it cannot be stored; define it in a mo",
+    ),
+    "store an object": (
+        lambda: encode(object()),
+        "is no data that can be stored; use plain values, arrays, dataclasses",
+    ),
+    "read data of code": (
+        lambda: decode({"$type": "os:system", "value": ""}),
+        'is of type "os:system", which is no type',
+    ),
     "set a wrong type": (
         running(lambda run, g: run.set(g["count"].ports.parameters["limit"], "x")),
         "parameter \"count.limit\" must be of type int, got 'x'",
@@ -551,7 +642,7 @@ LINES = {
     "draw steps.py --format pdf": "Invalid value for '--format': 'pdf' is not one of 'mmd', 'dot'",
     "draw missing.py": "missing.py: does not exist",
     "draw steps.py nowhere/x.mmd": "No such file or directory; name a file in a folder that you can write to",
-    "nodes missing": 'there is no module "missing" here or installed',
+    "nodes missing": 'there is no module, family or node type "missing" here or installed',
     "nodes text.txt": "text.txt is no Python file",
     "new node 3abc": '"3abc" names no module: letters, digits and _, as in map_lookup',
     "new node class": '"class" names no module: letters, digits and _, as in map_lookup',

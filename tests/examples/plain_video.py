@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from examples.video import FIND_HZ, HZ, SHOWN_EVERY, Corners, camera, draw, find
-from hfg.types import Image
+from hfg.images import Image
 
 
 class VideoError(Exception):

@@ -16,7 +16,7 @@ import pytest
 from annotated_types import Ge, Interval
 
 import hfg
-from hfg.types import Image
+from hfg.images import Image
 
 
 class Pose(NamedTuple):

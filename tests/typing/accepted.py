@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, assert_type
 
 import numpy as np
@@ -14,6 +15,7 @@ from reactivex import operators as ops
 import hfg
 from hfg.functions import FunctionNode
 from hfg.graph import Edge, GraphInput, GraphOutput, GroupSpec
+from hfg.images import Image
 from hfg.ports import (
     EventPort,
     InnerSource,
@@ -27,7 +29,6 @@ from hfg.ports import (
     Target,
 )
 from hfg.problem import Problem
-from hfg.types import Image
 
 T = TypeVar("T")
 
@@ -100,6 +101,12 @@ class MapLookup(hfg.Node):
     tolerance = hfg.Parameter(0.1, Interval(ge=0, le=1), unit="m")
     names = hfg.Parameter((), type=tuple[str, ...])
     mode = hfg.Parameter("fast", choices=("fast", "good"))
+    band = hfg.Parameter(hfg.Span(0.2, 0.8), unit="m", step=0.1, group="g", help="h", shown_if={"mode": "good"})
+    frame = hfg.Parameter(hfg.Colour(255, 128, 0))
+    method = hfg.Parameter(8, choices={"Otsu": 8})
+    store = hfg.Parameter(Path("a.png"), pattern="*.png", save=True)
+    folder = hfg.Parameter(type=Path, directory=True)
+    portion = hfg.Parameter(0.0, Interval(ge=0, le=1), read_only=True)
     total = hfg.State(0)
     seen = hfg.State[list[int]](factory=list)
     names_seen = hfg.State(factory=dict[str, int])
@@ -109,6 +116,13 @@ class MapLookup(hfg.Node):
     def setup(self) -> None:
         self.total += 1
         self.tolerance = 0.5
+        self.portion = 0.5
+        assert_type(self.band, hfg.Span[float])
+        assert_type(self.band.low, float)
+        assert_type(self.frame.bgr, tuple[int, int, int])
+        assert_type(self.method, int)
+        assert_type(self.store, Path)
+        assert_type(self.folder, Path)
 
     def process(self, key: int, map: dict[int, Pose] | None, either: int | str, anything: Any) -> None:  # noqa: A002
         if map:

@@ -32,6 +32,9 @@ lookup.unknown.trigger("three")  # error
 lookup.key.send(3)  # error
 lookup.total = "three"  # error
 lookup.tolerance = "three"  # error
+lookup.band = (0.1, 0.2)  # error
+lookup.frame = "#ff8000"  # error
+lookup.portion = "half"  # error
 lookup.key = 3  # error
 
 # Parameters of functions.

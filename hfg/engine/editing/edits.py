@@ -39,6 +39,7 @@ from hfg.graph.editing.changes import (
     Change,
     EdgeSwap,
     GroupsChange,
+    NodeCopied,
     NodeSwap,
     OptionsChange,
     ParameterChange,
@@ -48,8 +49,10 @@ from hfg.graph.editing.changes import (
 from hfg.graph.editing.commands import Command, encode
 from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat import FlatNode, flatten
+from hfg.graph.structure.membership import write_parameter
 from hfg.graph.structure.places import node_place
 from hfg.trace import ParameterSet, StructureChanged
+from hfg.values import same
 
 __all__ = ["Edits"]
 
@@ -65,6 +68,7 @@ class _Following:
       how: what that means to the plan.
       switched: who is enabled or disabled by it.
       values: parameters with which nobody works yet.
+      copied: of each copy that it makes what it is a copy of, and what the parameters of that were then.
       come: new nodes, of which the setup has begun.
       took_effect: from here on nothing is taken back.
     """
@@ -74,6 +78,7 @@ class _Following:
         self.how = PlanDiff()
         self.switched: _Switched = {}
         self.values: list[ParameterChange] = []
+        self.copied: list[tuple[NodeCopied, dict[str, Any]]] = []
         self.come: list[Worker] = []
         self.took_effect = False
 
@@ -158,6 +163,8 @@ class Edits:
                 await self._exchange_nodes(edit.how)
                 fresh = await self._begin_afresh(edit)
                 self._need_run()
+                if check:  # what is done again is as it was
+                    _take_values(edit)
                 for value in edit.values:
                     value.do()
                 edit.took_effect = held.done = True
@@ -188,6 +195,9 @@ class Edits:
         edit.switched = self._switched(edit.changes)
         edit.values = self._values_of_running_nodes(edit.changes)
         undo_all(edit.values)  # they work with the old ones until their firings are over
+        edit.copied = [
+            (change, dict(change.source._parameters)) for change in edit.changes if isinstance(change, NodeCopied)
+        ]
         self._refuse_without_effect(edit)
 
     async def _begin_afresh(self, edit: _Following) -> list[Worker]:
@@ -421,6 +431,16 @@ class Edits:
             if worker.flights is not None:
                 concurrency.abandon(worker)
                 worker.flights.drop_carriers()
+
+
+def _take_values(edit: _Following) -> None:
+    """A copy has the values that its model has as the edit takes effect, if they were set since it was asked for."""
+    said = {(change.node, change.name) for change in edit.changes if isinstance(change, ParameterChange)}
+    for change, before in edit.copied:
+        for name, value in change.source._parameters.items():
+            copy = change.copy
+            if (copy, name) not in said and value is not before[name] and same(copy._parameters[name], before[name]):
+                write_parameter(copy, name, value)
 
 
 def _refuse_for_good(change: Change) -> None:

@@ -234,9 +234,9 @@ class Writer:
             say("start = region.start")
         for number in range(len(self.entries)):
             say(f"entry{number} = names.entries[{number}]")
-        pipelined = [number for number, edge in enumerate(self.entries) if self._is_pipelined(edge)]
-        if pipelined:
-            say(f"pipelined = ({', '.join(f'entry{number}' for number in pipelined)},)")
+        for number, edge in enumerate(self.entries):
+            if self._is_pipelined(edge):
+                say(f"pipelined{number} = (entry{number},)")
         for k in range(len(self.order)):
             self._bindings_of(k)
         kinds = self._kinds()
@@ -329,6 +329,8 @@ class Writer:
                 say(f"entry{number}.token = None")
             else:
                 say(f"token{number} = take_queued(entry{number})")
+            if self._is_pipelined(edge):  # in the order of the inputs, as the others are freed (F5)
+                say(f"release(pipelined{number})")
         synchronous = sum(type(edge) is SyncEdge for edge in self.entries)
         if synchronous:
             say(f"inputs.missing += {synchronous}")
@@ -336,8 +338,6 @@ class Writer:
             say("stamp = token0.stamp")
         else:
             say(f"stamp = max({', '.join(f'token{number}.stamp' for number in range(len(self.entries)))})")
-        if any(self._is_pipelined(edge) for edge in self.entries):
-            say("release(pipelined)")
         given = {edge.position: f"token{number}.value" for number, edge in enumerate(self.entries)}
         arguments = [given.get(at, f"d0_{at}") for at in range(len(self.head.unset))]
         self._call(0, f"f0({', '.join(arguments)})")

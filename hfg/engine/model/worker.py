@@ -248,7 +248,7 @@ class Worker(Vertex):
     def lead_in(self, edge: Edge, kind: str, name: str) -> None:
         """An edge leads into one of its ports from now on, in the order of those."""
         super().lead_in(edge, kind, name)
-        if self.slot_edges and self.calls is None:
+        if self.calls is None and any(self.called_by()):
             self.calls = deque()
 
     def lead_out_of_event(self, edge: Edge, name: str, port: EventPort[Any] | None) -> None:
@@ -538,8 +538,7 @@ class Worker(Vertex):
 
     def expect_call(self, edge: Edge) -> None:
         """The newest token of the edge waits for a slot call (F9)."""
-        if self.calls is None:
-            self.calls = deque()
+        assert self.calls is not None
         self.calls.append(edge)
 
     def forget_call(self, edge: Edge) -> None:

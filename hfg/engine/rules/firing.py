@@ -25,6 +25,7 @@ from hfg.ports.edges import AnyEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringKind, FiringOutcome, FiringStarted, TokenTaken
 from hfg.types import accepts, describe, describe_value
+from hfg.values import own_copy
 
 __all__ = [
     "arguments_of",
@@ -427,7 +428,8 @@ def _add_parameters(worker: Worker, written: list[Any] | None, parameters: dict[
     if written is None:
         written = [None] * len(worker.out_edges)
     for position in range(len(worker.type.outputs), len(worker.out_names)):
-        written[position] = (parameters[worker.out_names[position]], None, None)
+        value = parameters[worker.out_names[position]]
+        written[position] = (own_copy(value), None, None)  # the node may change its own (T1)
     return written
 
 

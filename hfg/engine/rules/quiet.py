@@ -6,7 +6,7 @@ Decides only; `run` asks when it sees that no code runs, no worker is queued and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from hfg.engine.model.core import Core
@@ -43,6 +43,7 @@ __all__ = [
     "only_futile_in_flight",
     "only_waiting_for_room",
     "stall",
+    "unread",
     "waits_for",
 ]
 
@@ -213,6 +214,26 @@ def stall(core: Core) -> Stalled | None:
         f"missing, or run with allow_idle=True "
         f"if something outside will"
     )
+
+
+def unread(core: Core, read: Collection[Worker]) -> list[Worker]:
+    """Give the graph outputs that nobody reads and that hold somebody back who could move (P10).
+
+    Args:
+      core: the run, which is quiet.
+      read: the outputs that are read now.
+    """
+    found = [worker for worker in core.readers if worker not in read and worker.inputs_ready()]
+    if not found:
+        return []
+    core.settle_barriers()
+    held = any(
+        worker.outputs.missing and not worker.inputs.missing and not worker.blocked
+        for worker in core.workers
+        if not worker.is_boundary_output
+    )
+    held = held or any(feed.outputs.missing for feed in core.feeds)  # whose sender waits until it is processed
+    return found if held else []
 
 
 def _lies_for_good(edge: AnyEdge) -> bool:

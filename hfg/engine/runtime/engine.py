@@ -33,7 +33,7 @@ from hfg.engine.runtime.upstairs import Deciders
 from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
-from hfg.logs import current_log
+from hfg.logs import Log, current_log
 from hfg.nodetype import Node
 from hfg.ports import EventPort
 
@@ -47,6 +47,8 @@ _VIRTUAL_LOOK_WAVES = 8  # it ends sooner only where code has spent virtual time
 _VIRTUAL_LOOKS_BESIDE_WORK = 256  # how long it goes on beside work in a thread before it waits for that
 
 _MOST_AT_ONE_INSTANT = 3_000_000  # firings, before a run with `until_s` is taken to stand still
+
+_LOGGER = Log("hfg.engine")
 
 Done = Callable[[Any, BaseException | None], None]
 
@@ -125,6 +127,7 @@ class Engine:
         self.readers: list[Worker] = []
         self.read_out: set[Worker] = set()
         self.senders: list[Worker] = []  # feeds for which somebody outside has a token, once for each
+        self._told_unread: set[str] = set()
         self._quiet_waiters: list[asyncio.Future[None]] = []
         self.ended_how: tuple[str, HfgError | None] | None = None
         self.ending: asyncio.Event = asyncio.Event()
@@ -466,6 +469,8 @@ class Engine:
         if quiet.grow(core) or core.timers:
             return
         self._answer_quiet()
+        if self.holds and core.readers:
+            self._tell_unread()
         if self.holds or any(reader.inputs_ready() for reader in self.readers):
             return
         if quiet.give_up(core) or quiet.complete_operators(core):
@@ -478,6 +483,19 @@ class Engine:
             return
         stalled = quiet.stall(core)
         self.finish("done" if stalled is None else "stalled", stalled)
+
+    def _tell_unread(self) -> None:
+        """P10: a graph that stands still for want of a reader looks like any quiet one, so that is told, once."""
+        for worker in quiet.unread(self.core, self.readers):
+            name = worker.port_name
+            if name not in self._told_unread:
+                self._told_unread.add(name)
+                _LOGGER.warning(
+                    'graph output "%s" is not read, and the graph stands still until it is: read it beside the rest, '
+                    '`async for value in run.read("%s")`, or leave the output out',
+                    name,
+                    name,
+                )
 
     def _answer_quiet(self) -> None:
         waiters, self._quiet_waiters = self._quiet_waiters, []

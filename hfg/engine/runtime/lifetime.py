@@ -76,6 +76,8 @@ class Lifetime:
         core.started = True
         self._discard_initial(core)
         self._connect_operators(core)
+        for worker in core.workers:  # who holds initial tokens is enabled before `start` lays anything (F9, A10)
+            consider(worker)
         assert core.boundary is not None
         start = engine_ports.bind_start(core.boundary, engine.graph.start)
         if start is not None:

@@ -16,9 +16,11 @@ from hfg.engine.rules import beside, concurrency, firing
 from hfg.engine.rules.sending import trigger
 from hfg.engine.rules.sharing import need_unwritten
 from hfg.engine.runtime import plan, relays
+from hfg.errors import UsageError
 from hfg.ports.automatic import is_automatic_event
 from hfg.ports.events import EventPort
 from hfg.token import Token
+from hfg.trace import ParameterSet
 from hfg.types import accepts, describe, describe_value
 
 __all__ = ["bind", "bind_automatic", "bind_event", "bind_start", "release_ports"]
@@ -39,6 +41,30 @@ def bind(worker: Worker) -> None:
         ports.outputs[name]._emit = emit if worker.tasks is None else beside.refusing(worker, position, emit)
     for name in node_type.events:
         bind_event(worker, name)
+    for name, spec in node_type.parameters.items():
+        if spec.read_only:
+            ports.parameters[name]._tell = partial(_show, worker, name)
+
+
+def _show(worker: Worker, name: str, value: Any) -> None:
+    """R7: a node has set what it alone sets; whoever watches sees it, from a thread in order with what it sends."""
+    core = worker.core
+    if core.trace is None:
+        return
+    if core.host.on_loop():
+        _trace_set(worker, name, value)
+        return
+    tell = partial(_trace_set, worker, name, value)
+    try:
+        worker.group.signal(tell)  # type: ignore[attr-defined]
+    except (AttributeError, UsageError):  # a thread of the node's own
+        core.host.bring_in(tell)
+
+
+def _trace_set(worker: Worker, name: str, value: Any) -> None:
+    core = worker.core
+    if core.trace is not None:
+        core.trace(ParameterSet(core.now(), worker.path, name, value))
 
 
 def bind_event(worker: Worker, name: str) -> RunningEvent:
@@ -154,6 +180,9 @@ def release_ports(worker: Worker) -> None:
             port._scheduler = port._thread = port._look = None
             port._complete()
     if node is not None and not worker.silent_code:
+        for name, spec in worker.type.parameters.items():
+            if spec.read_only:
+                node.ports.parameters[name]._tell = None
         for name in worker.type.outputs:
             port = node.ports.outputs[name]
             port._emit = port._refuse

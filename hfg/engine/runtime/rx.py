@@ -142,7 +142,9 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callab
     scheduler = _EdgeScheduler(host, edge.target.within)
 
     def connect() -> None:
+        nonlocal newest
         subject: Subject[Any] = Subject()
+        newest = None
 
         def into(token: Token[Any]) -> None:
             nonlocal newest

@@ -31,6 +31,7 @@ __all__ = [
     "GateChange",
     "GroupsChange",
     "NodeChange",
+    "NodeCopied",
     "NodeSwap",
     "NotesChange",
     "OptionsChange",
@@ -245,6 +246,22 @@ class GateChange(Change):
     @override
     def inverse(self) -> Self:
         return replace(self, added=not self.added)
+
+
+@dataclass(eq=False)
+class NodeCopied(Change):
+    """A node that was added is a copy of another: said for a run, where the other may be set until both are there."""
+
+    source: Node
+    copy: Node
+
+    @override
+    def do(self) -> None:
+        pass
+
+    @override
+    def inverse(self) -> Self:
+        return self
 
 
 @dataclass(eq=False)

@@ -21,6 +21,7 @@ from hfg.graph.editing.changes import (
     GateChange,
     GroupsChange,
     NodeChange,
+    NodeCopied,
     NodeSwap,
     NotesChange,
     OptionsChange,
@@ -53,7 +54,7 @@ from hfg.graph.structure.promoting import refuse_promotion, refuse_standing, sta
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
 from hfg.ports import ParameterPort, Port
-from hfg.values import same
+from hfg.values import own_copy, same
 
 __all__ = ["perform"]
 
@@ -182,6 +183,7 @@ class _Hand:
         self.do(NodeChange(around, name, copy, node._options, len(around.nodes), inner, added=True))
         for one, other in zip(nodes_within(node), nodes_within(copy), strict=True):
             self._note_of(other, self.root.whole.notes.get(one, {}))
+            self.changes.append(NodeCopied(one, other))
 
     def _rename(self, command: c.Rename) -> None:
         node = node_at(self.root, command.path)
@@ -380,7 +382,9 @@ class _Hand:
             port.value = value
         except ValueError as error:
             raise GraphError(str(error)) from error
-        self.changes += [ParameterChange(node, name, value, node._parameters[name]) for node, name, value in before]
+        self.changes += [
+            ParameterChange(node, name, value, own_copy(node._parameters[name])) for node, name, value in before
+        ]
 
     def _promote(self, command: c.Promote) -> None:
         outer, inner = parameter_at(self.root, command.path), parameter_at(self.root, command.inner)

@@ -81,13 +81,13 @@ def refuse(level: Level, source: SourceEnd, target: TargetEnd, options: EdgeOpti
     if is_port(source):
         _need_membership(level, source, target)
     _need_membership(level, target, source)
-    if is_port(source):
-        _need_types(source, target)
     if target.kind == "parameter" and target.node._type.parameters[target.name].read_only:
         raise errors.ConnectionError(
             f'"{end_path(source)}" cannot lead into the parameter "{target.path}", which is read-only: its node alone '
             "sets it; let an edge begin there, or declare it without read_only=True (rule P8)"
         )
+    if is_port(source):
+        _need_types(source, target)
     if target.kind == "parameter" and target.node._type.given_parameters_once:
         raise errors.ConnectionError(
             f'"{target.path}" belongs to a generator function, which is given it when it begins and sees no value '

@@ -141,8 +141,8 @@ def switch(value: T, *, predicate: bool = True) -> tuple[T | None, T | None]:
     Args:
       value: anything.
       predicate: whether the value goes by `true`.
-      true: the value, if the predicate holds.
-      false: the value, if it does not.
+      true: the value, if the predicate is true.
+      false: the value, if it is not.
 
     CS::APEX: csapex::Switch.
     """

@@ -176,6 +176,7 @@ class Calling(Firing):
         station.ending = station.ended = station.given_up = station.stops_itself = False
         station.unready = False
         station.set_up = True
+        self.renew_operators(station)
         if station.leaf.inside is None:
             station.node._reset_states()
             hook = station.node._hook("setup")

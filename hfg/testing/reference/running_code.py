@@ -12,12 +12,14 @@ import asyncio
 import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from hfg.clock import time_told_by
 from hfg.errors import UsageError
 from hfg.testing.reference.sending import Sending
 from hfg.testing.reference.state import Flight, Station
+from hfg.trace import ParameterSet
 
 __all__ = ["RunningCode"]
 
@@ -49,6 +51,17 @@ class RunningCode(Sending):
             port = station.node.ports.events[name]
             port._emit = self._trigger_of(station, name)
             port._emit_wait = self._waiting_trigger_of(station, name)
+        for name, spec in station.type.parameters.items():
+            if spec.read_only:
+                station.node.ports.parameters[name]._tell = partial(self._show, station, name)
+
+    def _show(self, station: Station, name: str, value: Any) -> None:
+        """The node has set what it alone sets (P8, R7)."""
+        flight = self.flight_of(station)
+        if flight is not None and flight.in_thread:
+            flight.signals.append((name, value, None, None))
+        else:
+            self.observe(ParameterSet(self.now, station.path, name, value))
 
     def _writer(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], None]:
         def write(value: Any, activity: int | None, stamp: float | None) -> None:
@@ -161,7 +174,10 @@ class RunningCode(Sending):
         if flight.task is None:
             if flight.signals:
                 name, value, activity, stamp = flight.signals.pop(0)
-                self.trigger(flight.station.leaf.index, name, value, activity, stamp, flight)
+                if name in flight.station.type.parameters and name not in flight.station.type.events:
+                    self.observe(ParameterSet(self.now, flight.station.path, name, value))
+                else:
+                    self.trigger(flight.station.leaf.index, name, value, activity, stamp, flight)
             else:
                 flight.in_thread = False
                 self.land(flight, flight.result, flight.error)

@@ -333,9 +333,10 @@ class Sending(State):
                     pass
                 station.ended = True
                 self.observe(NodeEnded(self.now, station.path))
+                self.note_places()  # of those who wait for END, before anything else is sent (F9)
                 if not station.flights:
                     self.flush_changes(station)  # what its END has changed is told before its events complete
-                self.note_places()  # of those who wait for END, before operators give out what they hold (F9)
+                    self.note_places()
                 self.complete_operators(station)
                 waiting, station.drained_modifiers = station.drained_modifiers, []
                 for modifier in waiting:
@@ -420,8 +421,19 @@ class Sending(State):
         """Put the operators of P9 in front of their queues."""
         for line in self.lines:
             if line.edge.through:
-                line.operators = Operators(line.edge.through, partial(self._out_of_operators, line))
-                line.operators.connect()
+                self._make_operators(line)
+
+    def renew_operators(self, station: Station) -> None:
+        """P9: when the node begins afresh, so do the operators behind its events that have completed."""
+        for line in self.lines:
+            if line.edge.source.owner == station.leaf.index and line.completed:
+                line.completed = False
+                self._make_operators(line)
+
+    def _make_operators(self, line: Line) -> None:
+        line.operators = Operators(line.edge.through, partial(self._out_of_operators, line))
+        line.operators.tell_time(self.now)
+        line.operators.connect()
 
     def _out_of_operators(self, line: Line, token: Token[Any]) -> None:
         if self.reaches(line):
