@@ -544,8 +544,8 @@ class _Applying:
         for worker in self.found.gone:
             if worker.active and worker.scope is None:
                 core.lost_activity += 1
-                if core.trace is not None:
-                    core.trace(ActivityLost(core.now(), worker.path))
+                if core.seldom is not None:
+                    core.seldom(ActivityLost(core.now(), worker.path))
         touch(core, [scope for scope in self.scopes if scope.watched])
 
     def changed_nodes(self) -> set[Any]:

@@ -169,8 +169,8 @@ class Edits:
                     value.do()
                 edit.took_effect = held.done = True
                 note()
-                if engine.core.trace is not None:
-                    engine.core.trace(StructureChanged(engine.core.now(), what))
+                if engine.core.seldom is not None:
+                    engine.core.seldom(StructureChanged(engine.core.now(), what))
                 self._switch(edit.switched, fresh)
                 self._take_effect(edit)
         except BaseException:
@@ -354,11 +354,11 @@ class Edits:
 
     def _tell_parameters(self, changes: Sequence[Change]) -> None:
         core = self._engine.core
-        for change in changes if core.trace is not None else ():
+        for change in changes if core.seldom is not None else ():
             if isinstance(change, ParameterChange) and change.node._place is not None:
                 here = core.by_path.get(change.node._place.path)
-                if here is not None and here.node is change.node and core.trace is not None:
-                    core.trace(ParameterSet(core.now(), here.path, change.name, change.after))
+                if here is not None and here.node is change.node and core.seldom is not None:
+                    core.seldom(ParameterSet(core.now(), here.path, change.name, change.after))
 
     def _switched(self, changes: Sequence[Change]) -> _Switched:
         """The nodes, then the subgraphs, that are enabled or disabled, and which of both in the end."""

@@ -59,8 +59,8 @@ def _write(worker: Worker, node: Node, name: str, value: Any) -> None:
     """Let the node work with the value from now on."""
     core = worker.core
     node._parameters[name] = own_copy(value)
-    if core.trace is not None:
-        core.trace(ParameterSet(core.now(), worker.path, name, value))
+    if core.seldom is not None:
+        core.seldom(ParameterSet(core.now(), worker.path, name, value))
 
 
 def _between_firings(worker: Worker, write: Callable[[], None]) -> None:

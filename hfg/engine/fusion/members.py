@@ -47,12 +47,12 @@ def _values_in_and_out(worker: Worker) -> bool:
 
 
 def _nobody_looks(worker: Worker) -> bool:
-    """No edit waits for it, nobody at its barriers, no breakpoint, no tap."""
+    """No edit waits for it, nobody at its barriers, no breakpoint; and no tap where a wave runs in a thread."""
     return (
         not worker.observed
         and worker.on_idle is None
         and worker.halt is None
-        and all(edge.tap is None for edges in worker.out_edges for edge in edges)
+        and not (worker.group.threaded and any(edge.tap is not None for edges in worker.out_edges for edge in edges))
     )
 
 

@@ -91,6 +91,7 @@ class _Names:
         self.calls = [_code_of(worker) for worker in order]
         self.unset = [worker.unset for worker in order]
         self.edges = [[edge for edge, _, _ in out] for out in region.schedule.outs]
+        self.taps = [[edge.tap for edge, _, _ in out] for out in region.schedule.outs]
         self.listeners = [worker.listeners for worker in order]
         self.took = [worker.meter.took if measured else None for worker in order]
         self.splits = [worker.node._split for worker in order]
@@ -132,8 +133,8 @@ def _put_heard(listeners: Any, value: Any, stamp: float) -> None:
         put(edge, value, 0, stamp)
 
 
-_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, _put_heard, _take_queued, _values)
-_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, monotonic, put, release, put_heard, take_queued, values_of"
+_TOOLS = (_EXCEPTIONAL, NO_MESSAGE, Token, monotonic, put, release, _put_heard, _take_queued, _values)
+_TOOL_NAMES = "EXCEPTIONAL, NO_MESSAGE, Token, monotonic, put, release, put_heard, take_queued, values_of"
 
 
 @functools.lru_cache(maxsize=512)
@@ -259,9 +260,11 @@ class Writer:
         for output in range(len(worker.out_edges)):
             if asks_who_hears(worker, output):
                 say(f"heard{k}_{output} = names.listeners[{k}][{output}]")
-        for number, (_, output, to) in enumerate(self.outs[k]):
-            if to is None and not asks_who_hears(worker, output):
+        for number, (edge, output, to) in enumerate(self.outs[k]):
+            if (to is None or edge.tap is not None) and not asks_who_hears(worker, output):
                 say(f"e{k}_{number} = names.edges[{k}][{number}]")
+            if to is not None and edge.tap is not None:
+                say(f"tap{k}_{number} = names.taps[{k}][{number}]")
 
     def _with_default(self, k: int) -> list[int]:
         """Which inputs of a member may be absent; a source that leads has none."""
@@ -398,7 +401,7 @@ class Writer:
         return int(value[1:].partition("_")[0]) not in self.over_if_silent
 
     def _silences_all_behind(self, k: int) -> bool:
-        """If it is silent, so is everybody behind it, and nothing of theirs or its own leaves the region."""
+        """If it is silent, so is everybody behind it, and nothing of theirs or its own leaves the region or is seen."""
         if not self.single[k]:
             return False
         silent = {k}
@@ -406,8 +409,8 @@ class Writer:
             fed = self.order[t].slot_edges or [edge for edge in self.order[t].live_inputs if edge.mandatory]
             if any(self.position[edge.source] in silent for edge in fed):
                 silent.add(t)
-        border = any(to is None for out in self.outs[k:] for _, _, to in out)
-        return len(silent) == len(self.order) - k and not border
+        seen = any(to is None or edge.tap is not None for out in self.outs[k:] for edge, _, to in out)
+        return len(silent) == len(self.order) - k and not seen
 
     def _call(self, k: int, call: str, *, within: bool = False) -> None:
         """Call a member, look at what it gives back, and let that leave."""
@@ -481,9 +484,9 @@ class Writer:
             say(f"v{k}_{output} = values[{output}]")
 
     def _put(self, k: int) -> None:
-        """Over the border of the region."""
+        """Over the border of the region; who looks at an edge inside sees a token, which nobody else needs."""
         heard: set[int] = set()
-        for number, (_, output, to) in enumerate(self.outs[k]):
+        for number, (edge, output, to) in enumerate(self.outs[k]):
             value = f"v{k}_{output}"
             if asks_who_hears(self.order[k], output):
                 if output not in heard:
@@ -491,6 +494,10 @@ class Writer:
                     self.say(f"put_heard(heard{k}_{output}, NO_MESSAGE if {value} is None else {value}, stamp)")
             elif to is None:
                 self.say(f"put(e{k}_{number}, NO_MESSAGE if {value} is None else {value}, 0, stamp)")
+            elif edge.tap is not None:
+                sequence = f"e{k}_{number}.sent + region.waves + done + 1"
+                token = f"Token(NO_MESSAGE if {value} is None else {value}, 0, stamp, {sequence})"
+                self.say(f"tap{k}_{number}({token})")
         if self.is_async and (heard or any(to is None for _, _, to in self.outs[k])):
             self.say("if region.amid: region.sent_on()")
 

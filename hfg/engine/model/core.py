@@ -245,6 +245,8 @@ class Core:
       host: the waiting part of the engine.
       code: what runs the nodes' code; given by the host.
       trace: receives every event of the run, or None: nobody listens and nothing is built (R7).
+      seldom: receives what has to do with no single token or firing: changes of activity, parameters, structure; also
+        for those who want no more than that, and so keep nobody from the fast paths.
       in_flight: firings, calls and hooks that wait or run in a thread.
       tasks: that nodes have started beside these; a pause does not wait for them, quiet does.
       timers: pending calls that could start something.
@@ -258,6 +260,7 @@ class Core:
         self.upstairs = upstairs
         self.now = host.now
         self.trace: Callable[[TraceEvent], None] | None = None
+        self.seldom: Callable[[TraceEvent], None] | None = None
         self.debug = False
         self.sharing: Any = None  # in debug mode: who uses which values (T1)
         self.fast = True

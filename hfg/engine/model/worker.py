@@ -35,6 +35,7 @@ __all__ = [
     "FULL",
     "FUTILE",
     "RATE",
+    "RECORDED",
     "REMOVED",
     "RESTING",
     "SAME_MOMENT_S",
@@ -61,8 +62,9 @@ FUTILE: Final = 512  # a source that works for ended nodes alone, as all do that
 TORN_DOWN: Final = 1024  # the run is ending (R5, X3)
 REMOVED: Final = 2048  # an edit took it out of the graph (R4)
 CROWDED: Final = 4096  # as many firings are under way as may be, or somebody waits until none is (F14)
+RECORDED: Final = 8192  # what it sends is recorded without loss, and the disk is behind
 
-CALLS_BLOCKED: Final = FULL | BACKOFF | TORN_DOWN
+CALLS_BLOCKED: Final = FULL | BACKOFF | TORN_DOWN | RECORDED
 
 Entry: TypeAlias = "tuple[Any, int | None, float | None]"  # what is written to an output: value, modifier, stamp
 

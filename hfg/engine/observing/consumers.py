@@ -12,7 +12,7 @@ import inspect
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import anyio
@@ -51,10 +51,12 @@ class Listener:
     Attributes:
       consumer: what was given.
       error: what it raised, for which it was removed; None else.
+      seldom: it wants no events of single tokens, firings and calls, so that nobody leaves his fast path for it.
     """
 
-    def __init__(self, consumer: Any, consumers: Consumers) -> None:
+    def __init__(self, consumer: Any, consumers: Consumers, *, seldom: bool = False) -> None:
         self.consumer = consumer
+        self.seldom = seldom
         self.error: BaseException | None = None
         self._consumers = consumers
         self._open = True
@@ -248,28 +250,23 @@ class Consumers:
             listener = _InThread(consumer, self, size, self._engine)
         else:
             listener = Listener(consumer, self)
+        self.join(listener)
+        return listener
+
+    def join(self, listener: Listener) -> None:
+        """It is among those who listen from now on."""
         self._listeners.append(listener)
         self.changed()
-        return listener
 
     def changed(self) -> None:
         """One came or went. Nobody listens: nothing is built. One: it is called. Several: one after the other."""
         self._listeners = [listener for listener in self._listeners if listener.is_open]
-        takes = tuple(listener.take for listener in self._listeners)
-        if len(takes) < 2:
-            self._listen(takes[0] if takes else None)
-            return
-
-        def tell(event: TraceEvent) -> None:
-            for take in takes:
-                take(event)
-
-        self._listen(tell)
-
-    def _listen(self, take: Take | None) -> None:
-        """From now on `take` gets every event; None: nobody listens, and nothing is built (R7)."""
         core = self._engine.core
-        core.trace = take
+        core.seldom = _all_of([listener.take for listener in self._listeners])
+        before = core.trace
+        core.trace = _all_of([listener.take for listener in self._listeners if not listener.seldom])
+        if core.trace is before:
+            return
         core.speaker = None
         if core.started:
             for worker in core.workers:
@@ -280,3 +277,15 @@ class Consumers:
         async with anyio.create_task_group() as ending:
             for listener in list(self._listeners):
                 ending.start_soon(listener.end)
+
+
+def _all_of(takes: Sequence[Take]) -> Take | None:
+    """What gives an event to each of them."""
+    if len(takes) < 2:
+        return takes[0] if takes else None
+
+    def tell(event: TraceEvent) -> None:
+        for take in takes:
+            take(event)
+
+    return tell

@@ -53,7 +53,8 @@ class NodeStatistics(msgspec.Struct, frozen=True):
       doing: "working", or what it waits for now (see `waiting`).
       waiting: seconds of the run's clock by what it waited for: "turn" (others of its group are at work), "input x"
         (a token there), "output x" (its token there is not processed yet), "rate", "queue" (one of its events' is
-        full), "gate", "ready", "restart", "signal" (it has slots only), "start", "unconnected", "disabled", "ended".
+        full), "recorder" (without loss, of its ports), "gate", "ready", "restart", "signal" (it has slots only),
+        "start", "unconnected", "disabled", "ended".
       active_share: of the time since measuring began, how much it was active.
       queued: untaken tokens in front of it.
       tasks: what its code has started by `start_soon` and is under way, by name.

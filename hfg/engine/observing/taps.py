@@ -10,7 +10,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.worker import RunningEvent, Worker
@@ -27,7 +27,7 @@ from hfg.nodetype import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 from hfg.token import Token
 
-__all__ = ["Tap", "Taps"]
+__all__ = ["Looker", "Tap", "Taps"]
 
 _SIZE = 100
 
@@ -106,6 +106,16 @@ class Tap:
         self._detach()
 
 
+class Looker(Protocol):
+    """Who looks at what passes."""
+
+    def put(self, token: Token[Any]) -> None:
+        """A token passes."""
+
+    def end(self) -> None:
+        """No more will pass."""
+
+
 class _Buffer:
     """What a tap keeps; held by what it looks at, while the tap is held by whoever reads it."""
 
@@ -134,7 +144,7 @@ class Taps:
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        self._buffers: dict[_Buffer, tuple[Any, list[tuple[Any, Look]]]] = {}  # what each looks at, and where that is
+        self._buffers: dict[Looker, tuple[Any, list[tuple[Any, Look]]]] = {}  # what each looks at, and where that is
         self._looks: dict[Any, list[Look]] = {}  # by edge, event, or (worker, slot) for edges still to come
         engine.callbacks.finished.append(self._end)
         engine.callbacks.edited.append(self._find_again)
@@ -151,13 +161,31 @@ class Taps:
             raise UsageError(f"size is how many tokens a tap keeps, 1 or more, got {size!r}")
         if max_rate_hz is not None and not (isinstance(max_rate_hz, int | float) and max_rate_hz > 0):
             raise UsageError(f"max_rate_hz is how many tokens a second a tap gives at most, got {max_rate_hz!r}")
-        what = self._outside(what) or place_of(self._engine, what)
-        places = self._places(what)
         buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1))
-        self._attach(buffer, what, places)
+        return Tap(buffer, max_rate_hz, self.look(what, buffer))
+
+    def look(self, what: Any, looker: Looker) -> Callable[[], None]:
+        """Let somebody look at a port or an edge from now on; gives back what ends that.
+
+        Raises:
+          UsageError: nothing passes there.
+          GraphError: there is no such path.
+        """
+        what = self._outside(what) or place_of(self._engine, what)
+        self._attach(looker, what, self._places(what))
         if self._engine.core.over:
-            buffer.end()
-        return Tap(buffer, max_rate_hz, partial(self._remove, buffer))
+            looker.end()
+        return partial(self._remove, looker)
+
+    def workers(self, looker: Looker) -> list[Worker]:
+        """Those whose tokens somebody looks at, as the graph is now."""
+        found: dict[Worker, None] = {}
+        for place, _ in self._buffers.get(looker, (None, []))[1]:
+            if isinstance(place, RunningEvent):
+                found[place.worker] = None
+            elif not isinstance(place, tuple):
+                found[place.source] = None
+        return list(found)
 
     def _find_again(self, edited: Edited) -> None:
         """The graph was edited: what is looked at may be elsewhere, or nowhere for now (R4)."""
@@ -172,7 +200,7 @@ class Taps:
                 places = []
             self._attach(buffer, what, places)
 
-    def _attach(self, buffer: _Buffer, what: Any, places: list[tuple[Any, list[Any]]]) -> None:
+    def _attach(self, buffer: Looker, what: Any, places: list[tuple[Any, list[Any]]]) -> None:
         looks = [(place, _first_live(group, place, buffer.put) if group else buffer.put) for place, group in places]
         self._buffers[buffer] = (what, looks)
         for place, look in looks:
@@ -190,7 +218,7 @@ class Taps:
         for buffer in self._buffers:
             buffer.end()
 
-    def _remove(self, buffer: _Buffer) -> None:
+    def _remove(self, buffer: Looker) -> None:
         gone = [look for _, look in self._buffers.pop(buffer, (None, []))[1]]
         for place in list(self._looks) if gone else ():
             left = [look for look in self._looks[place] if look not in gone]
@@ -286,9 +314,9 @@ class Taps:
 
 
 def _with_same_tokens(edges: Iterable[Any]) -> list[tuple[Any, list[Any]]]:
-    """Each edge with those that carry the same tokens: of one output."""
+    """Each edge with those that carry the same tokens: of one output; first those that carry activity too."""
     carrying: dict[str, list[Any]] = {}
-    for edge in edges:
+    for edge in sorted(edges, key=lambda edge: not edge.active):
         carrying.setdefault(edge.label.partition(" -> ")[0], []).append(edge)
     return [(edge, group if len(group) > 1 else []) for group in carrying.values() for edge in group]
 

@@ -135,5 +135,5 @@ def set_parameter(worker: Worker, name: str, value: object) -> None:
     except Exception as error:
         worker.core.upstairs.fail(worker, f"parameter {name}", error, answer=False)
         return
-    if worker.core.trace is not None:
-        worker.core.trace(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))
+    if worker.core.seldom is not None:
+        worker.core.seldom(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))

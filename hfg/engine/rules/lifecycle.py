@@ -137,8 +137,8 @@ def disable(worker: Worker) -> None:
         return
     core = worker.core
     worker.block(DISABLED)
-    if core.trace is not None:
-        core.trace(NodeEnabled(core.now(), worker.path, False))
+    if core.seldom is not None:
+        core.seldom(NodeEnabled(core.now(), worker.path, False))
     end_tasks([worker])
     _settle_disabled([worker])
     derive_scopes(core)
@@ -228,8 +228,8 @@ def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> 
             return
         worker.allow(DISABLED | ENDED)
         worker.not_ended()
-        if itself and core.trace is not None:  # else the subgraph around it was, and that is told
-            core.trace(NodeEnabled(core.now(), worker.path, True))
+        if itself and core.seldom is not None:  # else the subgraph around it was, and that is told
+            core.seldom(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
         consider(worker)
         judge_sources(core)

@@ -52,8 +52,8 @@ def set_active(worker: Worker, active: bool, cause: ActivityCause) -> None:
     # under the virtual clock code in a thread sees what was when it began, or chance would say what it sees (R6)
     if node is not None and (worker.job is None or worker.job.held is None):
         node._active = active
-    if core.trace is not None:
-        core.trace(ActivityChanged(core.now(), worker.path, active, cause))
+    if core.seldom is not None:
+        core.seldom(ActivityChanged(core.now(), worker.path, active, cause))
     if not worker.watched:
         return
     core.upstairs.activity_changed(worker, active)
@@ -128,12 +128,12 @@ def lose(edge: Edge) -> None:
     """Nobody can have the activity that came over the edge."""
     core: Core = edge.target.core
     core.lost_activity += 1
-    if core.trace is not None:
-        core.trace(ActivityLost(core.now(), edge.label))
+    if core.seldom is not None:
+        core.seldom(ActivityLost(core.now(), edge.label))
 
 
 def report_error(worker: Worker, what: str, error: str, policy: str) -> None:
     """Tell whoever listens that a node's code failed."""
     core = worker.core
-    if core.trace is not None:
-        core.trace(ErrorRaised(core.now(), worker.path, what, error, policy))
+    if core.seldom is not None:
+        core.seldom(ErrorRaised(core.now(), worker.path, what, error, policy))

@@ -18,6 +18,7 @@ from hfg.engine.model.worker import (
     FULL,
     FUTILE,
     RATE,
+    RECORDED,
     RESTING,
     UNREADY,
     UNWIRED,
@@ -79,8 +80,8 @@ def grow(core: Core, among: Sequence[Worker] | None = None) -> bool:
         )
         return True
     edge.grow()
-    if core.trace is not None:
-        core.trace(QueueGrown(core.now(), edge.label, edge.capacity))
+    if core.seldom is not None:
+        core.seldom(QueueGrown(core.now(), edge.label, edge.capacity))
     freed(edge)
     core.host.kick()
     return True
@@ -259,6 +260,7 @@ _WAITS = (
     (ENDED, "has ended"),
     (UNREADY, "says by ready() that it is not ready"),
     (FULL, "is held back by a full queue"),
+    (RECORDED, "waits for its recorder"),
     (BACKOFF, "is being restarted"),
     (RESTING, "rests, for its gate is closed"),
     (FUTILE, "has nobody left to work for"),

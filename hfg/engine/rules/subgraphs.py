@@ -73,8 +73,8 @@ def disable_scope(scope: Scope) -> None:
         return
     scope.enabled = False
     core = scope.worker.core
-    if core.trace is not None and _is_alone_in_it(scope):
-        core.trace(NodeEnabled(core.now(), scope.path, False))
+    if core.seldom is not None and _is_alone_in_it(scope):
+        core.seldom(NodeEnabled(core.now(), scope.path, False))
     wiring.refresh_via(scope)
     lifecycle.disable_around((*scope.inside(), scope.worker))
     derive_scopes(core)
@@ -97,8 +97,8 @@ def enable_scope(scope: Scope, then: Callable[[], None], fresh: Collection[Worke
         return
     scope.enabled = True
     core = scope.worker.core
-    if core.trace is not None and _is_alone_in_it(scope):
-        core.trace(NodeEnabled(core.now(), scope.path, True))
+    if core.seldom is not None and _is_alone_in_it(scope):
+        core.seldom(NodeEnabled(core.now(), scope.path, True))
     wiring.refresh_via(scope)
     for owner in (*scope.inside(), scope.worker):
         if owner.scope is not None and all(one.enabled for one in owner.around):

@@ -71,8 +71,8 @@ class Lifetime:
             return
         if engine.settings.until_s is not None:
             engine.loop.call_at(engine.loop.time() + engine.settings.until_s, self._until)
-        if core.trace is not None:
-            core.trace(RunStarted(engine.now()))
+        if core.seldom is not None:
+            core.seldom(RunStarted(engine.now()))
         core.started = True
         self._discard_initial(core)
         self._connect_operators(core)
@@ -246,8 +246,8 @@ class Lifetime:
         if problems and error is None:
             error, outcome = TeardownError(problems), "failed"
         engine.ended_how = (outcome, error)
-        if core.trace is not None:
-            core.trace(RunEnded(engine.now(), outcome))
+        if core.seldom is not None:
+            core.seldom(RunEnded(engine.now(), outcome))
         await self._last()
 
     def _let_go(self) -> None:

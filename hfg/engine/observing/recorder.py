@@ -1,0 +1,301 @@
+"""Hands what passes chosen ports of a run to a thread that writes it down (rule R7).
+
+All that is done for a token on the loop is to put it into a list with the time; values that somebody may change later
+are copied. The thread takes what is there in batches. Where it cannot keep up, either the nodes whose ports are
+recorded start nothing new until it can (lossless: back-pressure, counted as waiting for the "recorder"), or what finds
+no place is left out and counted. In virtual time, where chance must not tell, the loop itself waits for the thread.
+Stands on taps and consumers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections import deque
+from collections.abc import Callable
+from time import monotonic
+from typing import Any, Final, Protocol
+
+from hfg.engine.model.worker import RECORDED, Worker
+from hfg.engine.observing.consumers import Consumers, Listener
+from hfg.engine.observing.taps import Taps
+from hfg.engine.rules.agenda import unblock
+from hfg.engine.runtime.engine import Engine
+from hfg.logs import Log
+from hfg.token import Marker, Token
+from hfg.trace import TraceEvent
+
+__all__ = ["MOST_BYTES", "MOST_ITEMS", "Item", "Place", "Recorder", "RecordingThread"]
+
+_LOGGER = Log("hfg.engine")
+
+MOST_ITEMS: Final = 50_000
+"""Tokens that may lie before the thread."""
+
+MOST_BYTES: Final = 128 * 1024 * 1024
+"""What their values may take, as far as that is known."""
+
+_WAKE_AFTER: Final = 2000  # items: the thread looks ten times a second anyway
+_JOIN_S: Final = 0.002
+
+Item = tuple[Any, Any, float]
+"""Where it passed (a `Place`; None: an event of the run itself), what, and when on the run's clock."""
+
+
+class Place(Protocol):
+    """A port or an edge that is recorded.
+
+    Attributes:
+      path: of the port.
+      keep: makes of a value something that nobody changes, and says how many bytes that takes, more or less; None: its
+        values are small, and cannot be changed anyway.
+      left_out: how many tokens there was no room for.
+      refused: how many values could not be kept.
+    """
+
+    path: str
+    keep: Callable[[Any], tuple[Any, int]] | None
+    left_out: int
+    refused: int
+
+
+class RecordingThread(Protocol):
+    """Who writes.
+
+    Attributes:
+      items: what lies before it; it takes from the front.
+      sizes: in the same order, of those values that were kept by `Place.keep`.
+      bytes_taken: the sum of those that it has taken.
+      error: why it writes no more; None while it does.
+    """
+
+    items: list[Item]
+    sizes: deque[int]
+    bytes_taken: int
+    error: BaseException | None
+
+    def wake(self) -> None:
+        """There is something to write."""
+
+    def is_alive(self) -> bool:
+        """Whether it still writes."""
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for its end."""
+
+    def finish(self) -> None:
+        """Nothing more will come: write what is left and close the file."""
+
+
+class _Looker:
+    """Looks at one place."""
+
+    __slots__ = ("end", "place", "put")
+
+    def __init__(self, place: Place, put: Callable[[Token[Any]], None]) -> None:
+        self.place = place
+        self.put = put
+        self.end = _nothing
+
+
+class Recorder(Listener):
+    """Everything of one recording that is done on the loop of the run.
+
+    Attributes:
+      held_s: how long nodes were held back all together.
+      times_held: how often.
+    """
+
+    def __init__(
+        self, engine: Engine, consumers: Consumers, taps: Taps, thread: RecordingThread, *, lossless: bool
+    ) -> None:
+        super().__init__(self._seldom_event, consumers, seldom=True)
+        self._engine = engine
+        self._taps = taps
+        self._thread = thread
+        self._lossless = lossless
+        self._items = thread.items
+        self._lookers: dict[_Looker, Callable[[], None]] = {}
+        self._bytes_put = 0
+        self._mark = _WAKE_AFTER
+        self._full = False
+        self._held: list[Worker] = []
+        self._held_since: float | None = None
+        self._room = threading.Event()
+        self.held_s = 0.0
+        self.times_held = 0
+        self.on_structure: Callable[[], None] = _nothing
+        self.on_refused: Callable[[Place, Exception], None] = _no_word
+
+    @property
+    def thread_waits_for(self) -> Callable[[], None]:
+        """What the thread calls when it has taken something."""
+        return self._taken
+
+    def now(self) -> float:
+        """On the run's clock."""
+        return self._engine.now()
+
+    def look_at(self, what: Any, place: Place) -> None:
+        """Record what passes there from now on.
+
+        Raises:
+          UsageError: nothing passes there.
+          GraphError: there is no such path.
+        """
+        looker = _Looker(place, self._look(place))
+        self._lookers[looker] = self._taps.look(what, looker)
+
+    def _look(self, place: Place) -> Callable[[Token[Any]], None]:
+        append, items, sizes = self._items.append, self._items, self._thread.sizes
+        now = self._engine.now
+        real = self._engine.epoch is not None
+        epoch = self._engine.epoch or 0.0
+        keep = place.keep
+
+        def put(token: Token[Any]) -> None:
+            if self._full:
+                place.left_out += 1
+                return
+            append((place, token, monotonic() + epoch if real else now()))
+            if len(items) > self._mark:
+                self._crowded()
+
+        def keep_and_put(token: Token[Any]) -> None:
+            if self._full:
+                place.left_out += 1
+                return
+            value = token.value
+            if type(value) is not Marker:
+                try:
+                    kept, size = keep(value)  # type: ignore[misc]
+                except Exception as error:
+                    place.refused += 1
+                    self.on_refused(place, error)
+                    return
+                token = Token(kept, token.activity, token.stamp, token.sequence)
+                self._bytes_put += size
+                sizes.append(size)
+            append((place, token, now()))
+            if len(items) > self._mark or self._bytes_put - self._thread.bytes_taken > MOST_BYTES:
+                self._crowded()
+
+        return put if keep is None else keep_and_put
+
+    # --- where the thread is behind -----------------------------------------------------------------------------------
+
+    def _is_full(self) -> bool:
+        return len(self._items) > MOST_ITEMS or self._bytes_put - self._thread.bytes_taken > MOST_BYTES
+
+    def _has_room(self) -> bool:
+        return len(self._items) < MOST_ITEMS // 2 and self._bytes_put - self._thread.bytes_taken < MOST_BYTES // 2
+
+    def _crowded(self) -> None:
+        """Much lies before the thread."""
+        self._mark = len(self._items) + _WAKE_AFTER
+        if not self._thread.is_alive():
+            self._items.clear()  # it has failed, and says so
+            return
+        self._thread.wake()
+        if not self._is_full() or self._held or not self._open:
+            return
+        self._room.clear()
+        if not self._lossless:
+            self._full = True
+        elif self._engine.virtual:
+            self._wait()
+        else:
+            self._held = [*dict.fromkeys(one for looker in self._lookers for one in self._taps.workers(looker))]
+            self._engine.core.flags.append("recorder")  # the slice of the pump is over by that
+            self._engine.soon(self._hold)
+
+    def _wait(self) -> None:
+        """In virtual time: let the loop wait, and nothing is another by that."""
+        began = monotonic()
+        while self._thread.is_alive() and not self._has_room():
+            self._room.wait(0.1)
+            self._room.clear()
+        self._note_held(monotonic() - began)
+
+    def _hold(self) -> None:
+        """Let those whose ports are recorded start nothing new."""
+        core = self._engine.core
+        if core.over or self._held_since is not None:
+            return
+        self._held_since = monotonic()
+        core.set_out()  # the run is not quiet meanwhile
+        for worker in self._held:
+            worker.block(RECORDED)
+        if not self.times_held:
+            _LOGGER.warning(
+                "the recording cannot be written as fast as it comes, so nodes wait for it; record less, or allow that "
+                "something is left out, lossless=False"
+            )
+        self._taken()
+
+    def _taken(self) -> None:
+        """From the thread: it has taken something."""
+        self._mark = _WAKE_AFTER
+        if self._full and self._has_room():
+            self._full = False
+        self._room.set()
+        if self._held_since is not None and (self._has_room() or not self._thread.is_alive()):
+            self._engine.from_any_thread(self._let_go)
+
+    def _let_go(self) -> None:
+        if self._held_since is None:
+            return
+        self._note_held(monotonic() - self._held_since)
+        self._held_since = None
+        held, self._held = self._held, []
+        if self._engine.core.over:
+            return
+        self._engine.core.come_back()
+        for worker in held:
+            unblock(worker, RECORDED)
+        self._engine.kick()
+
+    def _note_held(self, seconds: float) -> None:
+        self.held_s += seconds
+        self.times_held += 1
+
+    # --- what else is recorded, and the end ---------------------------------------------------------------------------
+
+    def _seldom_event(self, event: TraceEvent) -> None:
+        self._items.append((None, event, event.time))
+        if type(event).__name__ == "StructureChanged":
+            self._engine.soon(self._structure_changed)
+
+    def _structure_changed(self) -> None:
+        if self._open and not self._engine.core.over:
+            self.on_structure()
+
+    def stop(self) -> None:
+        """Look at nothing any more; what lies before the thread is still written. Does nothing the second time."""
+        if not self._open:
+            return
+        for remove in self._lookers.values():
+            remove()
+        self._lookers.clear()
+        self.remove()
+        self._let_go()
+        self._thread.finish()
+
+    async def end(self) -> None:
+        """The run is over: the file is whole when this returns."""
+        self.stop()
+        await self.written()
+
+    async def written(self) -> None:
+        """Wait until all is written; however long that takes, other tasks go on."""
+        while self._thread.is_alive():
+            self._thread.join(_JOIN_S)
+            await asyncio.sleep(0)
+
+
+def _nothing() -> None:
+    pass
+
+
+def _no_word(_place: Place, _error: Exception) -> None:
+    pass
