@@ -25,9 +25,13 @@ from hfg.logs import Log
 from hfg.token import Marker, Token
 from hfg.trace import TraceEvent
 
-__all__ = ["MOST_BYTES", "MOST_ITEMS", "Item", "Place", "Recorder", "RecordingThread"]
+__all__ = ["ITEM", "MOST_BYTES", "MOST_ITEMS", "Place", "Recorder", "RecordingThread"]
 
 _LOGGER = Log("hfg.engine")
+
+ITEM: Final = 3
+"""What lies before the thread is one flat list, so that nothing is made for a token that Python's garbage collector
+would have to look at: where it passed (a `Place`; None: an event of the run itself), what, when on the run's clock."""
 
 MOST_ITEMS: Final = 50_000
 """Tokens that may lie before the thread."""
@@ -35,11 +39,9 @@ MOST_ITEMS: Final = 50_000
 MOST_BYTES: Final = 128 * 1024 * 1024
 """What their values may take, as far as that is known."""
 
-_WAKE_AFTER: Final = 2000  # items: the thread looks ten times a second anyway
+_WAKE_AFTER: Final = 4000 * ITEM  # the thread looks ten times a second anyway
 _JOIN_S: Final = 0.002
 
-Item = tuple[Any, Any, float]
-"""Where it passed (a `Place`; None: an event of the run itself), what, and when on the run's clock."""
 
 
 class Place(Protocol):
@@ -69,7 +71,7 @@ class RecordingThread(Protocol):
       error: why it writes no more; None while it does.
     """
 
-    items: list[Item]
+    items: list[Any]
     sizes: deque[int]
     bytes_taken: int
     error: BaseException | None
@@ -147,7 +149,7 @@ class Recorder(Listener):
         self._lookers[looker] = self._taps.look(what, looker)
 
     def _look(self, place: Place) -> Callable[[Token[Any]], None]:
-        append, items, sizes = self._items.append, self._items, self._thread.sizes
+        extend, items, sizes = self._items.extend, self._items, self._thread.sizes
         now = self._engine.now
         real = self._engine.epoch is not None
         epoch = self._engine.epoch or 0.0
@@ -157,7 +159,7 @@ class Recorder(Listener):
             if self._full:
                 place.left_out += 1
                 return
-            append((place, token, monotonic() + epoch if real else now()))
+            extend((place, token, monotonic() + epoch if real else now()))
             if len(items) > self._mark:
                 self._crowded()
 
@@ -176,7 +178,7 @@ class Recorder(Listener):
                 token = Token(kept, token.activity, token.stamp, token.sequence)
                 self._bytes_put += size
                 sizes.append(size)
-            append((place, token, now()))
+            extend((place, token, now()))
             if len(items) > self._mark or self._bytes_put - self._thread.bytes_taken > MOST_BYTES:
                 self._crowded()
 
@@ -185,10 +187,10 @@ class Recorder(Listener):
     # --- where the thread is behind -----------------------------------------------------------------------------------
 
     def _is_full(self) -> bool:
-        return len(self._items) > MOST_ITEMS or self._bytes_put - self._thread.bytes_taken > MOST_BYTES
+        return len(self._items) > ITEM * MOST_ITEMS or self._bytes_put - self._thread.bytes_taken > MOST_BYTES
 
     def _has_room(self) -> bool:
-        return len(self._items) < MOST_ITEMS // 2 and self._bytes_put - self._thread.bytes_taken < MOST_BYTES // 2
+        return len(self._items) < ITEM * MOST_ITEMS // 2 and self._bytes_put - self._thread.bytes_taken < MOST_BYTES // 2
 
     def _crowded(self) -> None:
         """Much lies before the thread."""
@@ -262,7 +264,7 @@ class Recorder(Listener):
     # --- what else is recorded, and the end ---------------------------------------------------------------------------
 
     def _seldom_event(self, event: TraceEvent) -> None:
-        self._items.append((None, event, event.time))
+        self._items.extend((None, event, event.time))
         if type(event).__name__ == "StructureChanged":
             self._engine.soon(self._structure_changed)
 

@@ -1,0 +1,222 @@
+"""What a token looks like in the file: one kind of message for each kind of port. Stands on `schemas` and `values`.
+
+Markers are no values, so that a channel holds values alone, which other programs can plot: they have a channel of
+their own, and so has what happens to the graph itself.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from math import isfinite
+from typing import Any, Final, Literal
+
+import msgspec
+import numpy as np
+
+from hfg.errors import UsageError
+from hfg.recording import schemas
+from hfg.recording.values import CannotKeep, Codec, is_plain
+from hfg.token import Token
+from hfg.types import describe, describe_value
+
+__all__ = [
+    "EVENTS",
+    "MARKERS",
+    "Images",
+    "Marked",
+    "Timed",
+    "TokenReader",
+    "TokenWriter",
+]
+
+MARKERS: Final = "hfg/markers"
+"""Channel of markers: silence and the ends of streams."""
+
+EVENTS: Final = "hfg/events"
+"""Channel of what happens in a run apart from tokens: activity, parameters, structure, errors."""
+
+Images = Literal["raw", "png", "jpeg"]
+
+
+class Marked(msgspec.Struct, omit_defaults=True):
+    """A marker that has passed a port."""
+
+    port: str
+    marker: str
+    stamp: float
+    activity: int = 0
+    sequence: int = 0
+    time: float | None = None
+
+
+class Timed(msgspec.Struct):
+    """A token that passed at another time than that of its stamp, in virtual time, which is exact."""
+
+    value: Any
+    activity: int
+    stamp: float
+    sequence: int
+    time: float
+
+
+class _Time(msgspec.Struct):
+    sec: int
+    nsec: int
+
+
+class _Raw(msgspec.Struct, omit_defaults=True):
+    timestamp: _Time
+    frame_id: str
+    width: int
+    height: int
+    encoding: str
+    step: int
+    data: Any
+    dtype: str
+    shape: tuple[int, ...]
+    stamp: float
+    activity: int = 0
+    sequence: int = 0
+    time: float | None = None
+
+
+class _Compressed(msgspec.Struct, omit_defaults=True):
+    timestamp: _Time
+    frame_id: str
+    data: Any
+    format: str
+    shape: tuple[int, ...]
+    stamp: float
+    activity: int = 0
+    sequence: int = 0
+    time: float | None = None
+
+
+class TokenWriter:
+    """Makes messages of the tokens of one port.
+
+    Attributes:
+      keep: makes of a value what nobody changes any more, and its size, on the loop of the run; None: nobody can
+        change it anyway.
+      metadata: of its channel.
+      channel: its number in the file; 0 before the first value.
+      values: how many were written.
+      markers: how many.
+      left_out: how many tokens there was no time for.
+      refused: how many values are no data.
+      schema_name: of its channel.
+      schema: of its channel.
+    """
+
+    def __init__(self, path: str, hint: Any, *, images: Images, may_pickle: bool) -> None:
+        self.path = path
+        self.channel = 0
+        self.values = 0
+        self.markers = 0
+        self.left_out = 0
+        self.refused = 0
+        self.images = images
+        self.is_image = schemas.is_image(hint)
+        codec = Codec(hint, may_pickle=may_pickle)
+        self.keep: Callable[[Any], tuple[Any, int]] | None = None
+        self.metadata: dict[str, str] = {}
+        if self.is_image:
+            self.keep = self._keep_image
+            self.schema_name = "foxglove.RawImage" if images == "raw" else "foxglove.CompressedImage"
+            schema = schemas.RAW_IMAGE if images == "raw" else schemas.COMPRESSED_IMAGE
+            self.schema = msgspec.json.encode(schema)
+        else:
+            if not is_plain(hint):
+                self.keep = self._keep
+            self.schema_name = f"hfg.{describe(hint)}"
+            self.schema = schemas.message_schema(hint)
+        self._codec = codec
+
+    def _keep(self, value: Any) -> tuple[Any, int]:
+        codec = self._codec
+        before = codec.bytes_kept
+        return codec.encode(value), codec.bytes_kept - before
+
+    def _keep_image(self, value: Any) -> tuple[np.ndarray[Any, Any], int]:
+        if not isinstance(value, np.ndarray) or schemas.encoding_of(value) is None:
+            raise CannotKeep(f"{describe_value(value)} is no image")
+        return np.array(value, order="C", copy=True), value.nbytes
+
+    def message(self, token: Token[Any], time: float | None) -> Any:
+        """Give what is to be encoded; `time`: when it passed, if that is to be written."""
+        if self.is_image:
+            return self._image(token, time)
+        value = token.value
+        kind = type(value)
+        if self.keep is None and (kind is str or (kind is float and not isfinite(value))):
+            value = self._codec.encode(value)
+            token = Token(value, token.activity, token.stamp, token.sequence)
+        if time is None:
+            return token
+        return Timed(value, token.activity, token.stamp, token.sequence, time)
+
+    def _image(self, token: Token[Any], time: float | None) -> Any:
+        value = token.value
+        height, width = value.shape[:2]
+        seconds = max(token.stamp, 0.0)
+        stamp = _Time(int(seconds), min(int((seconds % 1.0) * 1e9), 999_999_999))
+        rest: dict[str, Any] = {
+            "shape": value.shape,
+            "stamp": token.stamp,
+            "activity": token.activity,
+            "sequence": token.sequence,
+            "time": time,
+        }
+        if self.images == "raw":
+            step = value.nbytes // height if height else 0
+            encoding = schemas.encoding_of(value) or ""
+            return _Raw(stamp, "", width, height, encoding, step, value.tobytes(), value.dtype.str, **rest)
+        return _Compressed(stamp, "", _compress(value, self.images), self.images, **rest)
+
+
+class TokenReader:
+    """Makes tokens of the messages of one channel."""
+
+    def __init__(self, schema_name: str, hint: Any, *, may_pickle: bool) -> None:
+        self._schema_name = schema_name
+        self._codec = Codec(hint, may_pickle=may_pickle)
+
+    def token(self, message: dict[str, Any]) -> Token[Any]:
+        """Read one.
+
+        Raises:
+          CannotKeep: the value cannot be read here.
+        """
+        if self._schema_name == "foxglove.RawImage":
+            data = base64.b64decode(message["data"])
+            value: Any = np.frombuffer(bytearray(data), message["dtype"]).reshape(message["shape"])
+        elif self._schema_name == "foxglove.CompressedImage":
+            value = _decompress(message["data"], message["shape"])
+        else:
+            value = self._codec.decode(message["value"])
+        return Token(value, message.get("activity", 0), message["stamp"], message.get("sequence", 0))
+
+
+def _compress(value: np.ndarray[Any, Any], how: Images) -> bytes:
+    cv2 = _opencv()
+    done, data = cv2.imencode(f".{how}", value)
+    if not done:
+        raise CannotKeep(f"an image of {value.dtype} cannot be written as {how}")
+    return bytes(data)
+
+
+def _decompress(data: str, shape: list[int]) -> np.ndarray[Any, Any]:
+    cv2 = _opencv()
+    value: np.ndarray[Any, Any] = cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_UNCHANGED)
+    return value.reshape(shape)
+
+
+def _opencv() -> Any:
+    try:
+        import cv2
+    except ImportError:
+        raise UsageError('compressed images in recordings need OpenCV: pip install "hfg[vision]"') from None
+    return cv2
+
+

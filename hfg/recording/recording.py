@@ -1,0 +1,371 @@
+"""Recording a run: which ports, into which file, and what came of it. Stands on the engine and on `writing`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+import msgspec
+
+from hfg.engine import Run
+from hfg.engine.observing.recorder import Place, Recorder
+from hfg.errors import GraphError, UsageError
+from hfg.graph import commands
+from hfg.graph.flat import flatten
+from hfg.graph.structure.naming import suggest
+from hfg.logs import Log
+from hfg.ports import Port
+from hfg.recording.messages import Images, TokenWriter
+from hfg.recording.values import reference
+from hfg.recording.writing import RecordingWriter, open_new
+from hfg.types import describe
+
+__all__ = ["Recording", "ports_of", "record"]
+
+_LOGGER = Log("hfg.recording")
+_PATTERN: Final = frozenset("*?[")
+VERSION: Final = 1
+
+
+class Recording:
+    """A recording under way, or what came of it; use it with `with` or `async with`, or leave its end to the run's.
+
+    Attributes:
+      path: of the file.
+    """
+
+    def __init__(self, run: Run, writer: RecordingWriter, recorder: Recorder, select: Sequence[str], how: _How) -> None:
+        self.path = writer.path
+        self._run = run
+        self._writer = writer
+        self._recorder = recorder
+        self._select = select
+        self._how = how
+        self._places: dict[Any, TokenWriter] = {}
+        self._told: set[TokenWriter] = set()
+        recorder.on_structure = self._look_again
+        recorder.on_refused = self._refused
+        writer.taken = recorder.thread_waits_for
+        writer.last_words = self._last_words
+
+    # --- for users ----------------------------------------------------------------------------------------------------
+
+    @property
+    def ports(self) -> list[str]:
+        """The paths of the ports that are recorded."""
+        return [place.path for place in self._places.values()]
+
+    @property
+    def error(self) -> BaseException | None:
+        """Why nothing more is written; None if all is well."""
+        return self._writer.error
+
+    @property
+    def tokens(self) -> int:
+        """How many tokens were written, markers too."""
+        return sum(place.values + place.markers for place in list(self._places.values()))
+
+    @property
+    def bytes_written(self) -> int:
+        """How long the file is by now."""
+        return self._writer.bytes_written
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Tokens for which there was no time, or no way to write them, by port."""
+        found = {place.path: place.left_out + place.refused for place in self._places.values()}
+        return {path: count for path, count in found.items() if count}
+
+    @property
+    def held_s(self) -> float:
+        """For how long nodes had to wait for the recording."""
+        return self._recorder.held_s
+
+    def stop(self) -> None:
+        """Record nothing more; what has passed is still written. Does nothing the second time."""
+        self._recorder.stop()
+
+    async def close(self) -> None:
+        """Record nothing more, and wait until the file is whole."""
+        self.stop()
+        await self._recorder.written()
+
+    async def __aenter__(self) -> Recording:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    # --- inside -------------------------------------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Look at what is selected.
+
+        Raises:
+          UsageError: nothing is, or values of a port cannot be recorded.
+        """
+        for port in self._selected():
+            self._add(port)
+
+    def _selected(self) -> list[Any]:
+        known = ports_of(self._run)
+        found: dict[int, Any] = {}
+        for pattern in self._select:
+            if not _PATTERN & set(pattern) and pattern not in known and not _inside(pattern, known):
+                port = self._named(pattern, known)
+                found[id(port)] = port
+                continue
+            matching = [port for path, port in known.items() if _fits(path, pattern)]
+            if not matching:
+                raise UsageError(f'no port fits "{pattern}"; the ports that send here are {_listed(known)}')
+            found |= {id(port): port for port in matching}
+        return list(found.values())
+
+    def _named(self, path: str, known: dict[str, Any]) -> Any:
+        """A port that nobody lists: an input, a slot, an automatic event."""
+        try:
+            port: Any = self._run.graph[path]
+        except Exception:  # whatever is wrong with the path
+            port = None
+        if not isinstance(port, Port):
+            raise UsageError(f'there is no port "{path}" to record; {suggest(path, known)}')
+        return port
+
+    def _add(self, port: Any) -> None:
+        if port in self._places:
+            return
+        hint = port.type
+        how = self._how
+        _need_data(port.path, hint, how.pickle)
+        place = TokenWriter(port.path, hint, images=how.images, may_pickle=how.pickle)
+        node = getattr(port, "node", None)
+        kind = getattr(node, "_type", None)
+        place.metadata = {
+            "kind": port.kind,
+            "type": "None" if hint is None else describe(hint),
+            "node": node.place.path if kind is not None else "",
+            "port": port.name,
+            "node_type": (kind.reference or "") if kind is not None else "",
+        }
+        typed: Place = place
+        self._recorder.look_at(port, typed)
+        self._writer.places.append(place)
+        self._places[port] = place
+
+    def _look_again(self) -> None:
+        """The graph was edited: what has come and is selected is recorded too."""
+        known = ports_of(self._run)
+        for path, port in known.items():
+            if any(_fits(path, pattern) for pattern in self._select):
+                try:
+                    self._add(port)
+                except UsageError as error:
+                    _LOGGER.warning('"%s" is not recorded: %s', path, error)
+
+    def _refused(self, place: Any, error: Exception) -> None:
+        if place not in self._told:
+            self._told.add(place)
+            _LOGGER.error("%s", _cannot(place.path, error))
+
+    def _last_words(self) -> dict[str, str]:
+        left_out = {place.path: place.left_out for place in self._places.values() if place.left_out}
+        refused = {place.path: place.refused for place in self._places.values() if place.refused}
+        report = self._run.report()
+        return {
+            "outcome": report.outcome,
+            "ended": repr(self._run.now()),
+            "left_out": msgspec.json.encode(left_out).decode(),
+            "refused": msgspec.json.encode(refused).decode(),
+            "held_s": f"{self._recorder.held_s:.3f}",
+        }
+
+
+class _How(msgspec.Struct, frozen=True):
+    images: Images
+    pickle: bool
+
+
+def record(
+    run: Run,
+    file: str | os.PathLike[str],
+    *,
+    select: str | Iterable[str] = "*",
+    lossless: bool = True,
+    images: Images = "raw",
+    pickle: bool = False,
+    force: bool = False,
+) -> Recording:
+    """Write what passes ports of a run to an MCAP file, from now on; `run.record` does the same.
+
+    Args:
+      run: the run; before its nodes are set up (`begin=`) nothing is missed.
+      file: where to; it is made, and can be read at any time up to its last second.
+      select: paths of ports or nodes, or patterns of them, "camera/*"; by default all outputs and events.
+      lossless: nothing is left out: nodes whose ports are recorded wait where the disk is slower. Else the graph is
+        never slowed, and what there is no time for is counted.
+      images: how images are written: "raw", "png" (smaller, slower, the same to the bit), "jpeg" (with losses).
+      pickle: write values that are no data with pickle; reading such a file runs code.
+      force: write over a file that is there.
+
+    Raises:
+      UsageError: no port fits, values of one cannot be recorded, or the file is there already or cannot be made.
+      NotRunning: the run is over.
+    """
+    run._need_running("nothing will pass any more")
+    patterns = [select] if isinstance(select, str) else list(select)
+    if not patterns:
+        raise UsageError('select= says which ports are recorded, as in select="camera/*"; it is empty')
+    if images not in ("raw", "png", "jpeg"):
+        raise UsageError(f'images= is "raw", "png" or "jpeg", got {images!r}')
+    path = Path(file)
+    parts, engine = run._parts, run._engine
+    probe = _Probe()
+    dry = Recording.__new__(Recording)
+    dry._run, dry._select = run, patterns
+    for port in dry._selected():  # refuse before there is a file
+        _need_data(port.path, port.type, pickle)
+        probe.look(parts, port)
+    stream = open_new(path, force=force)
+    writer = RecordingWriter(path, stream, exact_times=engine.virtual, began=_beginning(run, lossless, images))
+    recorder = Recorder(engine, parts.consumers, parts.taps, writer, lossless=lossless)
+    recording = Recording(run, writer, recorder, patterns, _How(images, pickle))
+    recording.begin()
+    writer.start()
+    parts.consumers.join(recorder)
+    return recording
+
+
+class _Probe:
+    """Looks once, to see whether that can be."""
+
+    def put(self, token: Any) -> None:
+        """A token passes."""
+
+    def end(self) -> None:
+        """No more will."""
+
+    def look(self, parts: Any, port: Any) -> None:
+        """Refuse what nobody can look at."""
+        parts.taps.look(port, self)()
+
+
+def ports_of(run: Run) -> dict[str, Any]:
+    """Give the ports that send in a run, by path: outputs with an edge, and events that node types declare."""
+    found: dict[str, Any] = {}
+    for edge in run._engine.core.edges:
+        if edge.segments and edge.source_port.kind == "output":
+            found[edge.source_port.path] = edge.source_port
+    for worker in run._engine.core.workers:
+        if worker.node is not None and worker.type is not None and worker.scope is None:
+            for name in worker.type.events:
+                port = worker.node._port("event", name)
+                found[port.path] = port
+    return found
+
+
+def _fits(path: str, pattern: str) -> bool:
+    return fnmatchcase(path, pattern) or _is_inside(pattern, path)
+
+
+def _is_inside(node: str, path: str) -> bool:
+    """Whether a port belongs to a node, or to one inside of it."""
+    return path.startswith((f"{node}.", f"{node}/"))
+
+
+def _inside(pattern: str, known: dict[str, Any]) -> bool:
+    return any(_is_inside(pattern, path) for path in known)
+
+
+def _listed(known: dict[str, Any]) -> str:
+    names = [f'"{path}"' for path in known]
+    more = len(names) - 12
+    return ", ".join(names[:12]) + (f" and {more} more" if more > 0 else "") if names else "none"
+
+
+def _need_data(path: str, hint: Any, may_pickle: bool) -> None:
+    """Refuse a port whose values can never be written."""
+    if may_pickle or not isinstance(hint, type) or hint in (object, Any):
+        return
+    if hint.__module__ == "builtins" or hint.__flags__ & (1 << 20):  # an abstract class: what comes may be data
+        return
+    if getattr(hint, "_is_protocol", False) or _is_data(hint):
+        return
+    raise UsageError(_cannot(path, f"{reference(hint)} is no data that JSON can hold"))
+
+
+def _is_data(hint: type) -> bool:
+    import datetime
+    import decimal
+    import enum
+    import pathlib
+    import uuid
+    from collections import deque
+
+    import numpy as np
+
+    from hfg.recording.values import fields_of
+
+    known = (
+        enum.Enum,
+        np.ndarray,
+        np.generic,
+        datetime.date,
+        datetime.time,
+        datetime.timedelta,
+        decimal.Decimal,
+        uuid.UUID,
+        pathlib.PurePath,
+        deque,
+    )
+    has_subclasses = bool(hint.__subclasses__())
+    return fields_of(hint) is not None or issubclass(hint, known) or has_subclasses
+
+
+def _cannot(path: str, error: object) -> str:
+    return (
+        f'values of "{path}" cannot be recorded: {error}; make it a dataclass, record without this port, or allow '
+        "pickle=True, which other programs cannot read"
+    )
+
+
+def _beginning(run: Run, lossless: bool, images: str) -> dict[str, str]:
+    """What is said about the run at the beginning of the file: the graph itself, with the values of parameters."""
+    flat = flatten(run.graph)
+    nodes = {
+        node.path: {
+            "type": node.node._type.reference,
+            "parameters": {name: _shown(value) for name, value in node.node._parameters.items()},
+            "group": node.options.group,
+        }
+        for node in flat.nodes
+    }
+    edges = [{"edge": edge.label, "active": edge.active} for edge in flat.edges]
+    try:
+        made_by = commands.encode(run.graph.as_commands())
+    except GraphError:  # types or operators without a name: what nodes and edges there are is said all the same
+        made_by = ""
+    return {
+        "version": str(VERSION),
+        "graph": run.graph.name,
+        "clock": "virtual" if run._engine.virtual else "real",
+        "began": repr(run.now() - run.elapsed()),
+        "lossless": str(lossless).lower(),
+        "images": images,
+        "nodes": msgspec.json.encode(nodes, enc_hook=repr).decode(),
+        "edges": msgspec.json.encode(edges).decode(),
+        "commands": made_by,
+    }
+
+
+def _shown(value: Any) -> Any:
+    """A parameter's value as JSON, or as text if it is no data."""
+    try:
+        return msgspec.Raw(msgspec.json.encode(value))
+    except Exception:
+        return repr(value)

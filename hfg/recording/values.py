@@ -1,0 +1,458 @@
+"""Values as JSON and back, to the bit: what comes out is equal, of the same types, and made afresh.
+
+For each type of a port a pair of functions is made. What is exactly of the type is written plainly, a struct as an
+object of its fields, a tuple as a list, so that other programs can read it; whatever is not (a whole number where the
+type says float, not a number at all) is written with its type beside it, `{"$type": "tuple", "value": [1, 2]}`. What
+is made shares nothing with the value that others may go on changing. Nothing that is read is ever executed, apart from
+pickle where somebody has asked for it. Stands on `generics` and numpy.
+"""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import datetime
+import decimal
+import enum
+import pathlib
+import pickle
+import struct
+import sys
+import types
+import typing
+import uuid
+from collections import abc, deque
+from collections.abc import Callable
+from math import isfinite
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+import numpy as np
+
+from hfg.errors import HfgError
+
+__all__ = ["PLAIN_TYPES", "CannotKeep", "Codec", "array_fields", "bare", "fields_of", "is_plain", "reference"]
+
+_TAG: Final = "$type"
+_NONE: Final = type(None)
+PLAIN_TYPES: Final = frozenset({bool, int, float, str})
+"""Types whose values nobody changes and JSON knows."""
+
+
+class CannotKeep(HfgError):
+    """A value that has no place in a recording."""
+
+
+def bare(hint: Any) -> Any:
+    """Give a type without what is said about it."""
+    while True:
+        if typing.get_origin(hint) is Annotated:
+            hint = typing.get_args(hint)[0]
+        elif isinstance(hint, typing.NewType):
+            hint = hint.__supertype__
+        elif type(hint).__name__ == "TypeAliasType":
+            hint = hint.__value__
+        else:
+            return hint
+
+
+def is_plain(hint: Any) -> bool:
+    """Whether values of a type are numbers, truth values or text, and so can be kept as they are."""
+    hint = bare(hint)
+    if typing.get_origin(hint) is Literal:
+        return all(type(one) in PLAIN_TYPES for one in typing.get_args(hint))
+    return hint in PLAIN_TYPES
+
+
+def reference(kind: type) -> str:
+    """Give the name by which a class is found again."""
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def fields_of(kind: Any) -> dict[str, Any] | None:
+    """Give the fields of a struct, dataclass or NamedTuple with their types; None of anything else."""
+    if not isinstance(kind, type):
+        return None
+    if issubclass(kind, msgspec.Struct):
+        names: tuple[str, ...] = kind.__struct_fields__
+    elif dataclasses.is_dataclass(kind):
+        names = tuple(one.name for one in dataclasses.fields(kind))
+    elif issubclass(kind, tuple) and hasattr(kind, "_fields"):
+        names = kind._fields
+    else:
+        return None
+    try:
+        hints = typing.get_type_hints(kind, include_extras=True)
+    except Exception:  # names that only a type checker knows
+        hints = {}
+    return {name: hints.get(name, Any) for name in names}
+
+
+def array_fields(value: np.ndarray[Any, Any]) -> dict[str, Any]:
+    """Give what an array consists of, as data of its own."""
+    if value.dtype.hasobject:
+        raise CannotKeep("an array of objects has no fixed bytes")
+    descr: Any = value.dtype.str if value.dtype.fields is None else np.lib.format.dtype_to_descr(value.dtype)
+    return {"dtype": descr, "shape": list(value.shape), "data": value.tobytes()}
+
+
+def _array(fields: Any) -> np.ndarray[Any, Any]:
+    descr = fields["dtype"]
+    dtype = np.dtype(descr) if isinstance(descr, str) else np.lib.format.descr_to_dtype(_as_tuples(descr))
+    return np.frombuffer(bytearray(base64.b64decode(fields["data"])), dtype).reshape(fields["shape"])
+
+
+def _as_tuples(descr: Any) -> Any:
+    if isinstance(descr, str):
+        return descr
+    return [
+        tuple(_as_tuples(one) if number == 1 else _shape(one) for number, one in enumerate(field)) for field in descr
+    ]
+
+
+def _shape(one: Any) -> Any:
+    return tuple(one) if isinstance(one, list) else one
+
+
+Encode = Callable[[Any], Any]
+
+
+class Codec:
+    """Writes and reads values of one type.
+
+    Attributes:
+      encode: makes data that JSON knows, and bytes, of a value.
+      decode: makes the value of the data.
+      bytes_kept: of all arrays and bytes that were written.
+    """
+
+    def __init__(self, hint: Any, *, may_pickle: bool = False) -> None:
+        self.bytes_kept = 0
+        self._may_pickle = may_pickle
+        self._classes: dict[str, type] = {}
+        self._encoders: dict[Any, Encode] = {}
+        self._decoders: dict[Any, Encode] = {}
+        self.encode = self._encoder(hint)
+        self.decode = self._decoder(hint)
+
+    # --- writing ------------------------------------------------------------------------------------------------------
+
+    def _encoder(self, hint: Any) -> Encode:
+        hint = bare(hint)
+        try:
+            made = self._encoders.get(hint)
+        except TypeError:  # with a part that cannot be hashed
+            return self._any
+        if made is None:
+            self._encoders[hint] = lambda value: self._encoders[hint](value)  # of a type that contains itself
+            made = self._encoders[hint] = self._make_encoder(hint)
+        return made
+
+    def _make_encoder(self, hint: Any) -> Encode:
+        exactly = self._any
+        origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+        other = _optional(hint)
+        if other is not None:
+            inner = self._encoder(other)
+            return lambda value: None if value is None else inner(value)
+        fields = fields_of(hint)
+        if fields is not None:
+            self._classes[reference(hint)] = hint
+            parts = [(name, self._encoder(one)) for name, one in fields.items()]
+
+            def of_fields(value: Any) -> Any:
+                if type(value) is not hint:
+                    return self._apart(value, dict)
+                return {name: encode(getattr(value, name)) for name, encode in parts}
+
+            return of_fields
+        if isinstance(hint, type) and issubclass(hint, enum.Enum):
+            self._classes[reference(hint)] = hint
+            return lambda value: value.name if type(value) is hint and value.name else self._apart(value, str)
+        if hint is bytes:
+            return lambda value: value if type(value) is bytes else self._apart(value, str)
+        if hint in (list, abc.Sequence) or origin in (list, abc.Sequence):
+            item = self._encoder(arguments[0]) if arguments else exactly
+            return lambda value: [item(one) for one in value] if type(value) is list else exactly(value)
+        if hint is tuple or origin is tuple:
+            return self._of_tuples(arguments)
+        if origin is dict and arguments and bare(arguments[0]) is str:
+            item = self._encoder(arguments[1])
+
+            def of_dicts(value: Any) -> Any:
+                if type(value) is not dict or not _has_names(value):
+                    return self._any(value)
+                return {key: item(one) for key, one in value.items()}
+
+            return of_dicts
+        if hint is np.ndarray or origin is np.ndarray:
+            return lambda value: self._array(value) if type(value) is np.ndarray else self._apart(value, dict)
+        return exactly
+
+    def _of_tuples(self, arguments: tuple[Any, ...]) -> Encode:
+        items, rest = _tuple_items(arguments)
+        encoders, of_rest = [self._encoder(one) for one in items], self._encoder(rest)
+
+        def of_tuples(value: Any) -> Any:
+            if type(value) is not tuple or (items and len(value) != len(items)):
+                return self._apart(value, list)
+            if items:
+                return [encode(one) for encode, one in zip(encoders, value, strict=True)]
+            return [of_rest(one) for one in value]
+
+        return of_tuples
+
+    def _apart(self, value: Any, kind: Any) -> Any:
+        """What would be taken for a value of the type is written with its own."""
+        if type(value) is not kind:
+            return self._any(value)
+        if kind is str:
+            return {_TAG: "str", "value": _text(value)}
+        if kind is list:
+            return {_TAG: "list", "value": [self._any(one) for one in value]}
+        return {_TAG: "dict", "value": [[self._any(key), self._any(one)] for key, one in value.items()]}
+
+    def _any(self, value: Any) -> Any:
+        kind = type(value)
+        if kind is str:
+            return _text(value)
+        if kind is float:
+            return value if isfinite(value) else {_TAG: "float", "value": struct.pack(">d", value).hex()}
+        if kind in (int, bool, _NONE):
+            return value
+        if kind is list:
+            return [self._any(one) for one in value]
+        if kind is dict:
+            if not _has_names(value):
+                return self._apart(value, dict)
+            return {key: self._any(one) for key, one in value.items()}
+        if kind is np.ndarray:
+            return {_TAG: "array", **self._array(value)}
+        known = _KINDS.get(kind)
+        if known is not None:
+            name, write, _ = known
+            if kind in (bytes, bytearray):
+                self.bytes_kept += len(value)
+            plain = write(value)
+            return {_TAG: name, "value": [self._any(one) for one in plain] if type(plain) is list else plain}
+        return self._of_class(value, kind)
+
+    def _array(self, value: np.ndarray[Any, Any]) -> dict[str, Any]:
+        self.bytes_kept += value.nbytes
+        return array_fields(value)
+
+    def _of_class(self, value: Any, kind: Any) -> Any:
+        if isinstance(value, np.generic) and not value.dtype.hasobject and value.dtype.fields is None:
+            return {_TAG: "number", "dtype": value.dtype.str, "data": value.tobytes()}
+        if isinstance(value, pathlib.PurePath):
+            return {_TAG: "path", "value": _text(str(value))}
+        if _is_found(kind):
+            if isinstance(value, enum.Enum) and value.name:
+                return {_TAG: "enum", "class": reference(kind), "name": value.name}
+            fields = fields_of(kind)
+            if fields is not None:
+                parts = {name: self._any(getattr(value, name)) for name in fields}
+                return {_TAG: "object", "class": reference(kind), "fields": parts}
+        if not self._may_pickle:
+            raise CannotKeep(f"{kind.__module__}.{kind.__qualname__} is no data that JSON can hold")
+        try:
+            return {_TAG: "pickle", "data": pickle.dumps(value)}
+        except Exception as error:
+            raise CannotKeep(f"{kind.__qualname__} cannot be pickled: {error}") from error
+
+    # --- reading ------------------------------------------------------------------------------------------------------
+
+    def _decoder(self, hint: Any) -> Encode:
+        hint = bare(hint)
+        try:
+            made = self._decoders.get(hint)
+        except TypeError:
+            return self._revived
+        if made is None:
+            self._decoders[hint] = lambda data: self._decoders[hint](data)
+            made = self._decoders[hint] = self._make_decoder(hint)
+        return made
+
+    def _make_decoder(self, hint: Any) -> Encode:
+        revived = self._revived
+        origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+        other = _optional(hint)
+        if other is not None:
+            inner = self._decoder(other)
+            return lambda data: None if data is None else inner(data)
+        fields = fields_of(hint)
+        if fields is not None:
+            parts = {name: self._decoder(one) for name, one in fields.items()}
+            return lambda data: (
+                _made(hint, {name: decode(data[name]) for name, decode in parts.items()})
+                if type(data) is dict and _TAG not in data
+                else revived(data)
+            )
+        if isinstance(hint, type) and issubclass(hint, enum.Enum):
+            return lambda data: hint[data] if type(data) is str else revived(data)
+        if hint is bytes:
+            return lambda data: base64.b64decode(data) if type(data) is str else revived(data)
+        if hint in (list, abc.Sequence) or origin in (list, abc.Sequence):
+            item = self._decoder(arguments[0]) if arguments else revived
+            return lambda data: [item(one) for one in data] if type(data) is list else revived(data)
+        if hint is tuple or origin is tuple:
+            items, rest = _tuple_items(arguments)
+            decoders, of_rest = [self._decoder(one) for one in items], self._decoder(rest)
+            return lambda data: (
+                revived(data)
+                if type(data) is not list
+                else tuple(decode(one) for decode, one in zip(decoders, data, strict=True))
+                if items
+                else tuple(map(of_rest, data))
+            )
+        if origin is dict and arguments and bare(arguments[0]) is str:
+            item = self._decoder(arguments[1])
+            return lambda data: (
+                {key: item(one) for key, one in data.items()}
+                if type(data) is dict and _TAG not in data
+                else revived(data)
+            )
+        if hint is np.ndarray or origin is np.ndarray:
+            return lambda data: _array(data) if type(data) is dict and _TAG not in data else revived(data)
+        return revived
+
+    def _revived(self, data: Any) -> Any:
+        kind = type(data)
+        if kind is list:
+            return [self._revived(one) for one in data]
+        if kind is not dict:
+            return data
+        name = data.get(_TAG)
+        if name is None:
+            return {key: self._revived(one) for key, one in data.items()}
+        match name:
+            case "str":
+                return data["value"]
+            case "float":
+                return struct.unpack(">d", bytes.fromhex(data["value"]))[0]
+            case "list":
+                return [self._revived(one) for one in data["value"]]
+            case "dict":
+                return {self._revived(key): self._revived(one) for key, one in data["value"]}
+            case "array":
+                return _array(data)
+            case "number":
+                return np.frombuffer(base64.b64decode(data["data"]), data["dtype"])[0]
+            case "path":
+                return pathlib.Path(data["value"])
+            case "enum":
+                return self._class(data["class"])[data["name"]]  # type: ignore[index]
+            case "object":
+                fields = {key: self._revived(one) for key, one in data["fields"].items()}
+                return _made(self._class(data["class"]), fields)
+            case "pickle":
+                return self._unpickled(data)
+        read = _READ.get(name)
+        if read is None:
+            raise CannotKeep(f'values of kind "{name}" are unknown here: was it recorded by a newer hfg?')
+        plain = data["value"]
+        return read([self._revived(one) for one in plain] if type(plain) is list else plain)
+
+    def _unpickled(self, data: Any) -> Any:
+        if not self._may_pickle:
+            raise CannotKeep("it is pickled, and reading that runs code: allow it, pickle=True, if you trust the file")
+        return pickle.loads(base64.b64decode(data["data"]))
+
+    def _class(self, name: str) -> type:
+        """A class that somebody has imported already, never another."""
+        found = self._classes.get(name) or _found(name)
+        if found is None:
+            raise CannotKeep(f"its type {name} is unknown here: import the module that has it first")
+        return found
+
+
+def _made(kind: Any, fields: dict[str, Any]) -> Any:
+    """Make an object of its fields, as it was; a dataclass without what its class does with new ones."""
+    if issubclass(kind, tuple):
+        return tuple.__new__(kind, fields.values())
+    if issubclass(kind, msgspec.Struct):
+        return kind(**fields)
+    made = object.__new__(kind)
+    for name, value in fields.items():
+        object.__setattr__(made, name, value)
+    return made
+
+
+def _optional(hint: Any) -> Any:
+    """The only other member of a union with None."""
+    if typing.get_origin(hint) not in (typing.Union, types.UnionType):
+        return None
+    others = [one for one in typing.get_args(hint) if one is not _NONE]
+    return others[0] if len(others) == 1 else None
+
+
+def _tuple_items(arguments: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
+    if not arguments:
+        return (), Any
+    return ((), arguments[0]) if arguments[-1] is Ellipsis else (arguments, Any)
+
+
+def _has_names(value: dict[Any, Any]) -> bool:
+    """Whether all keys can be names in JSON, and none is the one that says a type."""
+    return _TAG not in value and all(type(key) is str and type(_text(key)) is str for key in value)
+
+
+def _text(value: str) -> Any:
+    try:
+        value.encode()
+    except UnicodeEncodeError:  # half a character, which JSON cannot write
+        return {_TAG: "text", "value": value.encode("utf-16-le", "surrogatepass").hex()}
+    return value
+
+
+def _is_found(kind: Any) -> bool:
+    return _found(reference(kind)) is kind
+
+
+def _found(name: str) -> Any:
+    module, _, qualname = name.partition(":")
+    found: Any = sys.modules.get(module)
+    for part in qualname.split("."):
+        found = getattr(found, part, None)
+    return found if isinstance(found, type) else None
+
+
+def _base64(value: bytes | bytearray) -> bytes:
+    return bytes(value)
+
+
+_KINDS: Final[dict[Any, tuple[str, Callable[[Any], Any], Callable[[Any], Any]]]] = {
+    tuple: ("tuple", list, tuple),
+    set: ("set", list, set),
+    frozenset: ("frozenset", list, frozenset),
+    deque: ("deque", list, deque),
+    bytes: ("bytes", _base64, base64.b64decode),
+    bytearray: ("bytearray", _base64, lambda data: bytearray(base64.b64decode(data))),
+    complex: (
+        "complex",
+        lambda value: struct.pack(">dd", value.real, value.imag).hex(),
+        lambda data: complex(*struct.unpack(">dd", bytes.fromhex(data))),
+    ),
+    datetime.datetime: (
+        "datetime",
+        lambda value: f"{value.fold}{value.isoformat()}",
+        lambda data: datetime.datetime.fromisoformat(data[1:]).replace(fold=int(data[0])),
+    ),
+    datetime.date: ("date", datetime.date.isoformat, datetime.date.fromisoformat),
+    datetime.time: (
+        "time",
+        lambda value: f"{value.fold}{value.isoformat()}",
+        lambda data: datetime.time.fromisoformat(data[1:]).replace(fold=int(data[0])),
+    ),
+    datetime.timedelta: (
+        "timedelta",
+        lambda value: [value.days, value.seconds, value.microseconds],
+        lambda data: datetime.timedelta(*data),
+    ),
+    decimal.Decimal: ("decimal", str, decimal.Decimal),
+    uuid.UUID: ("uuid", str, uuid.UUID),
+    range: ("range", lambda value: [value.start, value.stop, value.step], lambda data: range(*data)),
+}
+_READ: Final = {name: read for name, _, read in _KINDS.values()} | {
+    "text": lambda data: bytes.fromhex(data).decode("utf-16-le", "surrogatepass")
+}

@@ -1,0 +1,244 @@
+"""The thread that writes a recording: encodes what the run hands over, and puts it into the file chunk by chunk.
+
+A chunk is written when it is large enough or a second old, and handed to the system at once: whatever becomes of the
+process, the file opens up to its last chunk. Batches are small, and between them others have a turn at the interpreter.
+Stands on `mcap` and `messages`.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
+from math import isfinite
+from pathlib import Path
+from typing import Any, BinaryIO, Final
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from hfg.engine.observing.recorder import ITEM
+from hfg.errors import UsageError
+from hfg.recording.mcap import Writer
+from hfg.recording.messages import EVENTS, MARKERS, Marked, TokenWriter
+from hfg.token import Marker
+
+__all__ = ["PROFILE", "RecordingWriter", "open_new"]
+
+PROFILE: Final = "hfg"
+_CHUNK_BYTES: Final = 1024 * 1024
+_CHUNK_MESSAGES: Final = 20_000
+_CHUNK_S: Final = 1.0
+_LOOK_S: Final = 0.1
+_BATCH: Final = 1024
+_NUMBERS: Final = frozenset({int, float, bool})
+_MARKED_SCHEMA: Final = b'{"title":"hfg marker","type":"object"}'
+_EVENT_SCHEMA: Final = b'{"title":"hfg event","type":"object"}'
+
+
+class RecordingWriter:
+    """Writes one file in a thread of its own.
+
+    Attributes:
+      items: what lies before it.
+      sizes: of the values among them that were kept by copying.
+      places: what is recorded; each has its channel from the beginning, also if nothing passes.
+      bytes_taken: of the values that it has taken, as they were counted when they came.
+      error: why it writes no more; None while it does.
+      bytes_written: length of the file.
+    """
+
+    def __init__(self, path: Path, stream: BinaryIO, *, exact_times: bool, began: Mapping[str, str]) -> None:
+        self.path = path
+        self.items: list[Any] = []
+        self.sizes: deque[int] = deque()
+        self.bytes_taken = 0
+        self.error: BaseException | None = None
+        self.places: list[TokenWriter] = []
+        self.last_words: Callable[[], Mapping[str, str]] = dict
+        self.taken: Callable[[], None] = _nothing
+        self._stream = stream
+        self._exact = exact_times
+        self._encode = msgspec.json.Encoder(enc_hook=_text)
+        self._something = threading.Event()
+        self._finishing = False
+        self._chunk_since = 0.0
+        self._last_ns: Any = 0
+        self._schemas: dict[tuple[str, bytes], int] = {}
+        self._own: dict[str, int] = {}
+        self._declared = 0
+        self._file = Writer(stream, library=f"hfg {version('hfg')}", profile=PROFILE)
+        self._file.add_metadata("hfg", began)
+        self._thread = threading.Thread(target=self._live, name=f"hfg recording {path.name}", daemon=True)
+
+    @property
+    def bytes_written(self) -> int:
+        """Length of the file."""
+        return self._file.bytes_written
+
+    def start(self) -> None:
+        """Begin to write."""
+        self._thread.start()
+
+    def wake(self) -> None:
+        """There is something to write."""
+        self._something.set()
+
+    def is_alive(self) -> bool:
+        """Whether it still writes."""
+        return self._thread.is_alive()
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for its end."""
+        self._thread.join(timeout)
+
+    def finish(self) -> None:
+        """Write what is left and close the file."""
+        self._finishing = True
+        self._something.set()
+
+    # --- in the thread ------------------------------------------------------------------------------------------------
+
+    def _live(self) -> None:
+        try:
+            self._write_all()
+        except BaseException as error:  # the disk is full, above all: whoever records is told
+            self.error = error
+        finally:
+            try:
+                self._stream.close()
+            except OSError as error:
+                self.error = self.error or error
+            self.items.clear()
+            self.taken()
+
+    def _write_all(self) -> None:
+        items = self.items
+        while True:
+            finishing = self._finishing
+            if not items and not finishing:
+                self._something.wait(_LOOK_S)
+            self._something.clear()
+            while items:
+                batch = items[: _BATCH * ITEM]
+                del items[: len(batch)]
+                self._write(batch)
+                self.taken()
+                time.sleep(0)  # let the run's own thread have the interpreter
+            if self._file.chunk_messages and time.monotonic() - self._chunk_since > _CHUNK_S:
+                self._file.end_chunk()
+            if finishing:
+                self._declare_places()
+                self._file.end_chunk()
+                self._file.add_metadata("hfg:end", self.last_words())
+                self._file.finish()
+                return
+
+    def _write(self, batch: list[Any]) -> None:
+        """Encode what was handed over, all together, and put it into the chunk."""
+        self._declare_places()
+        if not self._file.chunk_messages:
+            self._chunk_since = time.monotonic()
+        places, tokens, whens = batch[::ITEM], batch[1::ITEM], batch[2::ITEM]
+        columns = self._plain_columns(places, tokens, whens) or self._columns(places, tokens, whens)
+        bodies, channels, sequences, stamps = columns
+        lines = self._encode.encode_lines(bodies).split(b"\n")
+        lines.pop()  # behind the last line
+        passed = np.maximum.accumulate(np.maximum(_nanoseconds(whens), self._last_ns))
+        self._last_ns = passed[-1]
+        self._file.add_messages(channels, sequences, passed, _nanoseconds(stamps), lines)
+        if self._file.chunk_bytes > _CHUNK_BYTES or self._file.chunk_messages > _CHUNK_MESSAGES:
+            self._file.end_chunk()
+
+    def _declare_places(self) -> None:
+        while self._declared < len(self.places):
+            place = self.places[self._declared]
+            schema = self._schema(place.schema_name, place.schema)
+            place.channel = self._file.add_channel(place.path, schema, "json", place.metadata)
+            self._declared += 1
+
+    def _plain_columns(self, places: Sequence[Any], tokens: Sequence[Any], whens: Sequence[float]) -> Any:
+        """Where all are finite numbers, tokens are what is encoded; None: somewhere there is something else."""
+        if None in places or any([place.keep is not None for place in places]):  # noqa: C419 - faster
+            return None
+        values = [token.value for token in tokens]
+        if not _NUMBERS.issuperset(map(type, values)):
+            return None
+        stamps = [token.stamp for token in tokens]
+        try:
+            if not isfinite(sum(values)) or (self._exact and stamps != whens):
+                return None
+        except OverflowError:
+            return None
+        channels = [place.channel for place in places]
+        for place, count in Counter(places).items():
+            place.values += count
+        return tokens, channels, [token.sequence for token in tokens], stamps
+
+    def _columns(self, places: Sequence[Any], tokens: Sequence[Any], whens: Sequence[float]) -> Any:
+        bodies: list[Any] = []
+        rest: list[tuple[int, int, float]] = []
+        for place, token, when in zip(places, tokens, whens, strict=True):
+            if place is None:
+                bodies.append(token)
+                rest.append((self._own_channel(EVENTS), 0, when))
+                continue
+            passed = when if self._exact and when != token.stamp else None
+            if type(token.value) is Marker:
+                bodies.append(
+                    Marked(place.path, token.value.value, token.stamp, token.activity, token.sequence, passed)
+                )
+                place.markers += 1
+                rest.append((self._own_channel(MARKERS), token.sequence, token.stamp))
+                continue
+            if place.keep is not None:
+                self.bytes_taken += self.sizes.popleft()
+            bodies.append(place.message(token, passed))
+            place.values += 1
+            rest.append((place.channel, token.sequence, token.stamp))
+        return bodies, *zip(*rest, strict=True)
+
+    def _own_channel(self, topic: str) -> int:
+        number = self._own.get(topic)
+        if number is None:
+            schema = self._schema(topic.replace("/", "."), _EVENT_SCHEMA if topic == EVENTS else _MARKED_SCHEMA)
+            number = self._own[topic] = self._file.add_channel(topic, schema, "json", {})
+        return number
+
+    def _schema(self, name: str, schema: bytes) -> int:
+        number = self._schemas.get((name, schema))
+        if number is None:
+            number = self._schemas[name, schema] = self._file.add_schema(name, "jsonschema", schema)
+        return number
+
+
+def open_new(path: Path, *, force: bool) -> BinaryIO:
+    """Open a file that is to be made.
+
+    Raises:
+      UsageError: it is there already, or cannot be made.
+    """
+    try:
+        return path.open("wb" if force else "xb")
+    except FileExistsError:
+        raise UsageError(f"{path} is there already: choose another name, or write over it, force=True") from None
+    except OSError as error:
+        raise UsageError(f"the recording cannot be written to {path}: {error.strerror}") from None
+
+
+def _nanoseconds(seconds: Sequence[float]) -> npt.NDArray[np.uint64]:
+    return (np.maximum(np.array(seconds), 0.0) * 1e9).astype(np.uint64)
+
+
+def _text(value: Any) -> Any:
+    """Describe what JSON does not know; of an event, whose values are for reading only."""
+    return f"{value!r:.200}"
+
+
+def _nothing() -> None:
+    pass
+
+
