@@ -62,6 +62,7 @@ SAME_FLOOR_PAIRS = {
     ("hfg.cli", "hfg.studio"),
     ("hfg.__main__", "hfg.cli"),
     ("hfg.testing", "hfg"),
+    ("hfg.nodes", "hfg.recording"),  # a family of it is made there
     ("hfg.files", "hfg.catalogue"),  # which packages a graph file may name
 }
 # The wings of a floor, in the same way: a module imports what lies in its own wing or in a lower one.

@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hfg.cli import check, convert, draw, new, nodes, run, show, tap, top
+from hfg.cli import check, convert, draw, info, new, nodes, play, record, run, show, tap, top
 from hfg.cli.interrupt import Interrupt
 from hfg.errors import FileError, HfgError, TargetError
 
@@ -35,6 +35,9 @@ app.command("convert")(convert.convert)
 app.command("draw")(draw.draw)
 app.command("nodes")(nodes.nodes)
 app.command("tap")(tap.tap)
+app.command("record")(record.record)
+app.command("play")(play.play)
+app.command("info")(info.info)
 app.command("top")(top.top)
 app.add_typer(new.new, name="new")
 

@@ -1,13 +1,17 @@
 """Recording what passes ports of a run to MCAP files, and playing it back.
 
-    recording   which ports, what is said about the run      `hfg.record`, `run.record`
-    writing     the thread that encodes and writes
-    mcap        the file: chunks, indexes, summary
-    messages    what a token looks like in it
-    schemas     JSON schemas, those of Foxglove for images
-    values      values as JSON and back, to the bit
+playing     nodes that send what was recorded             `hfg play`
+reading     files, also those that were cut off           `hfg info`
+recording   which ports, what is said about the run       `run.record`, `hfg record`
+writing     the thread that encodes and writes
+mcap        the file: chunks, indexes, summary
+messages    what a token looks like in it
+schemas     JSON schemas, those of Foxglove for images
+values      values as JSON and back, to the bit
 """
 
+from hfg.recording.playing import Playback, Playing, play_into
+from hfg.recording.reading import File, PortInfo, RecordingInfo
 from hfg.recording.recording import Recording, record
 
-__all__ = ["Recording", "record"]
+__all__ = ["File", "Playback", "Playing", "PortInfo", "Recording", "RecordingInfo", "play_into", "record"]

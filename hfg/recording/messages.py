@@ -218,5 +218,3 @@ def _opencv() -> Any:
     except ImportError:
         raise UsageError('compressed images in recordings need OpenCV: pip install "hfg[vision]"') from None
     return cv2
-
-

@@ -13,6 +13,7 @@ import dataclasses
 import itertools
 import os
 import sys
+import types
 from collections.abc import Iterator, Mapping, Set
 from pathlib import Path
 from typing import Any, Final
@@ -78,7 +79,7 @@ class Track:
           may_pickle: whether pickled values are read.
         """
         self._file = file
-        self.began = float(file.metadata.get("hfg", {}).get("began", 0.0))
+        self.began = file.began()
         self._readers: dict[int, tuple[Any, TokenReader, Any]] = {}
         self._paths = set(ports)
         self._exact = file.metadata.get("hfg", {}).get("clock") == "virtual"
@@ -158,8 +159,14 @@ class Player:
         self._speed = speed
         run: Any = None if node._place is None else level_of(node._place.graph).whole.run
         self._engine: Any = None if run is None else run._engine
-        self._worker: Any = None if run is None else self._engine.worker_of(node)
-        self._start = 0.0 if run is None else self._engine.now() - run.elapsed()
+        self._worker: Any = None
+        self._start: float | None = None  # when its graph began to move
+        if run is not None:
+            worker: Any = run._engine.worker_of(node)
+            self._worker = worker
+            # what it had for a rate is in the recording, and would only hold up who plays faster
+            worker.options = msgspec.structs.replace(worker.options, max_rate_hz=None)
+            worker.paced = bool(worker.gates_over)
         self._waits = False
 
     def ready(self) -> bool:
@@ -210,6 +217,8 @@ class Player:
 
     def _due(self, when: float) -> float:
         """When on the clock of this run that is which was `when` on that of the recording."""
+        if self._start is None:
+            self._start = self._engine.now()
         if self._speed == 1.0 and self._start == self._began:
             return when  # to the bit
         return self._start + (when - self._began) / (self._speed or 1.0)
@@ -346,7 +355,7 @@ def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any]
         "teardown": Playback.teardown,
         "_slot_call": lambda self, name: _hear_nothing,  # what its slots did is in what was recorded
     }
-    made_class: Any = type(Node)(qualname, (Node,), body, _made=made)
+    made_class: Any = types.new_class(qualname, (Node,), {"_made": made}, lambda names: names.update(body))
     setattr(sys.modules[__name__], qualname, made_class)
     return f"{__name__}:{qualname}"
 
@@ -411,9 +420,7 @@ def play_into(
     return _replace(graph, path, recorded, spoke, _How(speed, pickle))
 
 
-def _feed(
-    graph: Graph, file: str, recorded: dict[str, Any], ports: Mapping[str, str], speed: float | None
-) -> Playing:
+def _feed(graph: Graph, file: str, recorded: dict[str, Any], ports: Mapping[str, str], speed: float | None) -> Playing:
     done = Playing()
     edit: list[commands.Command] = []
     drawn = {edge.target.path: edge for edge in _edges_within(graph)}
@@ -448,11 +455,15 @@ def _replace(graph: Graph, file: str, recorded: dict[str, Any], spoke: Set[str],
     missing: list[str] = []
     for port, channel in recorded.items():
         about = channel.metadata
-        path, name, kind = about.get("node", port.rpartition(".")[0]), about.get("port", ""), about.get("kind", "output")
+        path, name, kind = (
+            about.get("node", port.rpartition(".")[0]),
+            about.get("port", ""),
+            about.get("kind", "output"),
+        )
         if kind not in ("output", "event"):
             continue
-        node = nodes.get(path)
-        if node is None or name not in getattr(node.node._type, f"{kind}s"):
+        there = nodes.get(path)
+        if there is None or name not in getattr(there.node._type, f"{kind}s"):
             missing.append(port)
         else:
             of_node.setdefault(path, {})[port] = name

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import BinaryIO, Final
 
 import msgspec
 from mcap.data_stream import ReadDataStream
@@ -146,6 +146,16 @@ class File:
                 if channels is None or message[0] in channels:
                     yield message
 
+    def began(self) -> float:
+        """When its graph began to move, on its clock; when the recording did if that was later."""
+        events = frozenset(number for number, one in self.channels.items() if one.topic == EVENTS)
+        for _, _, data in self.messages(events):
+            event = msgspec.json.decode(data)
+            if event.get("type") == "RunStarted":
+                return float(event["time"])
+            break
+        return float(self.metadata.get("hfg", {}).get("began", 0.0))
+
     def info(self) -> RecordingInfo:
         """Say what is known of it; all messages are counted."""
         counts: Counter[int] = Counter()
@@ -156,15 +166,15 @@ class File:
                 first = when if first is None else min(first, when)
                 last = when if last is None else max(last, when)
         duration = ((last or 0) - (first or 0)) / 1e9
-        began, ended = self.metadata.get("hfg", {}), self.metadata.get("hfg:end", {})
+        about, ended = self.metadata.get("hfg", {}), self.metadata.get("hfg:end", {})
         return RecordingInfo(
             path=str(self.path),
             bytes=self.path.stat().st_size,
             whole=self.whole,
             library=self.library,
-            graph=began.get("graph", ""),
-            clock=began.get("clock", ""),
-            began=float(began.get("began", (first or 0) / 1e9)),
+            graph=about.get("graph", ""),
+            clock=about.get("clock", ""),
+            began=self.began() if about else (first or 0) / 1e9,
             duration_s=duration,
             outcome=ended.get("outcome", ""),
             chunks=len(self._chunks),
@@ -178,7 +188,7 @@ class File:
                 for number, one in self.channels.items()
                 if one.topic not in (MARKERS, EVENTS)
             ],
-            commands=began.get("commands", ""),
+            commands=about.get("commands", ""),
         )
 
     def _port(self, number: int, count: int, duration: float) -> PortInfo:

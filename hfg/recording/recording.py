@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import TracebackType
@@ -36,6 +36,7 @@ class Recording:
 
     Attributes:
       path: of the file.
+      when_failed: called on the loop of the run when nothing can be written any more.
     """
 
     def __init__(self, run: Run, writer: RecordingWriter, recorder: Recorder, select: Sequence[str], how: _How) -> None:
@@ -47,9 +48,11 @@ class Recording:
         self._how = how
         self._places: dict[Any, TokenWriter] = {}
         self._told: set[TokenWriter] = set()
+        self.when_failed: Callable[[], None] | None = None
         recorder.on_structure = self._look_again
         recorder.on_refused = self._refused
         writer.taken = recorder.thread_waits_for
+        writer.failed = self._has_failed
         writer.last_words = self._last_words
 
     # --- for users ----------------------------------------------------------------------------------------------------
@@ -144,7 +147,7 @@ class Recording:
         how = self._how
         _need_data(port.path, hint, how.pickle)
         place = TokenWriter(port.path, hint, images=how.images, may_pickle=how.pickle)
-        node = getattr(port, "node", None)
+        node: Any = getattr(port, "node", None)
         kind = getattr(node, "_type", None)
         place.metadata = {
             "kind": port.kind,
@@ -167,6 +170,12 @@ class Recording:
                     self._add(port)
                 except UsageError as error:
                     _LOGGER.warning('"%s" is not recorded: %s', path, error)
+
+    def _has_failed(self, error: BaseException) -> None:
+        """From the thread."""
+        _LOGGER.error("the recording in %s is not whole, nothing more is written: %s", self.path, error)
+        if self.when_failed is not None:
+            self._run._engine.from_any_thread(self.when_failed)
 
     def _refused(self, place: Any, error: Exception) -> None:
         if place not in self._told:

@@ -22,7 +22,10 @@ __all__ = ["COMPRESSED_IMAGE", "RAW_IMAGE", "encoding_of", "is_image", "message_
 _TIME: Final = {
     "type": "object",
     "title": "time",
-    "properties": {"sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0, "maximum": 999999999}},
+    "properties": {
+        "sec": {"type": "integer", "minimum": 0},
+        "nsec": {"type": "integer", "minimum": 0, "maximum": 999999999},
+    },
 }
 _TOKEN: Final[dict[str, Any]] = {
     "activity": {"type": "integer", "enum": [-1, 0, 1], "description": "The token's activity modifier"},
@@ -112,7 +115,13 @@ def _schema(hint: Any, depth: int) -> dict[str, Any]:
         return {}
     if hint in (int, float, str, bool):
         # a whole number where the type says float is written as it is, what is not finite as an object
-        return {"type": "integer"} if hint is int else {"type": [_PLAIN[hint], "object"]} if hint in (float, str) else {"type": "boolean"}
+        return (
+            {"type": "integer"}
+            if hint is int
+            else {"type": [_PLAIN[hint], "object"]}
+            if hint in (float, str)
+            else {"type": "boolean"}
+        )
     if origin is Literal:
         return {}
     fields = fields_of(hint)
@@ -131,7 +140,7 @@ def _schema(hint: Any, depth: int) -> dict[str, Any]:
             "type": "object",
             "title": "array",
             "properties": {
-                "dtype": {"description": "As numpy writes it, \"<f8\""},
+                "dtype": {"description": 'As numpy writes it, "<f8"'},
                 "shape": {"type": "array", "items": {"type": "integer"}},
                 "data": {**_BYTES, "description": "In C order"},
             },

@@ -60,6 +60,7 @@ class RecordingWriter:
         self.places: list[TokenWriter] = []
         self.last_words: Callable[[], Mapping[str, str]] = dict
         self.taken: Callable[[], None] = _nothing
+        self.failed: Callable[[BaseException], None] = _nothing_to_say
         self._stream = stream
         self._exact = exact_times
         self._encode = msgspec.json.Encoder(enc_hook=_text)
@@ -107,6 +108,7 @@ class RecordingWriter:
             self._write_all()
         except BaseException as error:  # the disk is full, above all: whoever records is told
             self.error = error
+            self.failed(error)
         finally:
             try:
                 self._stream.close()
@@ -224,13 +226,16 @@ def open_new(path: Path, *, force: bool) -> BinaryIO:
     try:
         return path.open("wb" if force else "xb")
     except FileExistsError:
-        raise UsageError(f"{path} is there already: choose another name, or write over it, force=True") from None
+        raise UsageError(
+            f"{path} is there already: choose another name, or write over it, --force or force=True"
+        ) from None
     except OSError as error:
         raise UsageError(f"the recording cannot be written to {path}: {error.strerror}") from None
 
 
 def _nanoseconds(seconds: Sequence[float]) -> npt.NDArray[np.uint64]:
-    return (np.maximum(np.array(seconds), 0.0) * 1e9).astype(np.uint64)
+    found: npt.NDArray[np.uint64] = (np.maximum(np.array(seconds), 0.0) * 1e9).astype(np.uint64)
+    return found
 
 
 def _text(value: Any) -> Any:
@@ -242,3 +247,5 @@ def _nothing() -> None:
     pass
 
 
+def _nothing_to_say(_error: BaseException) -> None:
+    pass

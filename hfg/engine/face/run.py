@@ -6,10 +6,11 @@ A thin face: what is asked for is done by the parts of `composition`.
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from functools import partial
 from types import ModuleType
-from typing import Any, TypeVar, overload
+from typing import Any, ClassVar, Literal, TypeVar, overload
 
 from hfg.engine.editing.pausing import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
@@ -19,6 +20,7 @@ from hfg.engine.face.composition import Composition
 from hfg.engine.model.worker import UNREADY
 from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance, glance_at
+from hfg.engine.observing.recorder import RunRecording
 from hfg.engine.observing.report import Report
 from hfg.engine.observing.statistics import Statistics
 from hfg.engine.observing.taps import Tap
@@ -46,6 +48,8 @@ T = TypeVar("T")
 
 class Run:
     """A graph that runs; made by `running`."""
+
+    _recorder: ClassVar[Callable[..., Any]]  # what records stands above, and is put in by the package itself
 
     def __init__(self, graph: Graph, parts: Composition) -> None:
         self.graph = graph
@@ -182,6 +186,39 @@ class Run:
           UsageError: it cannot take events.
         """
         return self._parts.consumers.add(consumer, size)
+
+    def record(
+        self,
+        file: str | os.PathLike[str],
+        *,
+        select: str | Iterable[str] = "*",
+        lossless: bool = True,
+        images: Literal["raw", "png", "jpeg"] = "raw",
+        pickle: bool = False,
+        force: bool = False,
+    ) -> RunRecording:
+        """Write what passes ports to an MCAP file from now on: tokens, activity, parameters, the graph itself.
+
+        In `begin=`, before nodes are set up, nothing is missed. It ends with the run, which waits until the file is
+        whole; `stop()`, `close()` or the end of an `async with` block end it sooner.
+
+        Args:
+          file: where to; it can be read at any time up to its last second, whatever becomes of the program.
+          select: paths of ports or nodes, or patterns of them, "camera/*"; by default all outputs and events.
+          lossless: nothing is left out: nodes whose ports are recorded wait where the disk is slower. Else the graph is
+            never slowed, and what there is no time for is counted.
+          images: how images are written: "raw", "png" (smaller, slower, the same to the bit), "jpeg" (with losses).
+          pickle: write values that are no data with pickle; reading such a file runs code.
+          force: write over a file that is there.
+
+        Raises:
+          UsageError: no port fits, values of one cannot be recorded, or the file is there already or cannot be made.
+          NotRunning: the run is over.
+        """
+        recording: RunRecording = self._recorder(
+            self, file, select=select, lossless=lossless, images=images, pickle=pickle, force=force
+        )
+        return recording
 
     @overload
     def set(self, parameter: ParameterPort[T], value: T) -> None: ...

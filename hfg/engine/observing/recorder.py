@@ -13,7 +13,9 @@ import asyncio
 import threading
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 from time import monotonic
+from types import TracebackType
 from typing import Any, Final, Protocol
 
 from hfg.engine.model.worker import RECORDED, Worker
@@ -25,7 +27,7 @@ from hfg.logs import Log
 from hfg.token import Marker, Token
 from hfg.trace import TraceEvent
 
-__all__ = ["ITEM", "MOST_BYTES", "MOST_ITEMS", "Place", "Recorder", "RecordingThread"]
+__all__ = ["ITEM", "MOST_BYTES", "MOST_ITEMS", "Place", "Recorder", "RecordingThread", "RunRecording"]
 
 _LOGGER = Log("hfg.engine")
 
@@ -41,7 +43,6 @@ MOST_BYTES: Final = 128 * 1024 * 1024
 
 _WAKE_AFTER: Final = 4000 * ITEM  # the thread looks ten times a second anyway
 _JOIN_S: Final = 0.002
-
 
 
 class Place(Protocol):
@@ -87,6 +88,49 @@ class RecordingThread(Protocol):
 
     def finish(self) -> None:
         """Nothing more will come: write what is left and close the file."""
+
+
+class RunRecording(Protocol):
+    """What `run.record` gives: a recording under way, or what came of it. `hfg.recording` has its class."""
+
+    @property
+    def path(self) -> Path:
+        """Of the file."""
+
+    @property
+    def ports(self) -> list[str]:
+        """The paths of the ports that are recorded."""
+
+    @property
+    def error(self) -> BaseException | None:
+        """Why nothing more is written; None if all is well."""
+
+    @property
+    def tokens(self) -> int:
+        """How many tokens were written, markers too."""
+
+    @property
+    def bytes_written(self) -> int:
+        """How long the file is by now."""
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Tokens for which there was no time, or no way to write them, by port."""
+
+    @property
+    def held_s(self) -> float:
+        """For how long nodes had to wait for the recording."""
+
+    def stop(self) -> None:
+        """Record nothing more; what has passed is still written. Does nothing the second time."""
+
+    async def close(self) -> None:
+        """Record nothing more, and wait until the file is whole."""
+
+    async def __aenter__(self) -> RunRecording: ...
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None: ...
 
 
 class _Looker:
@@ -190,7 +234,9 @@ class Recorder(Listener):
         return len(self._items) > ITEM * MOST_ITEMS or self._bytes_put - self._thread.bytes_taken > MOST_BYTES
 
     def _has_room(self) -> bool:
-        return len(self._items) < ITEM * MOST_ITEMS // 2 and self._bytes_put - self._thread.bytes_taken < MOST_BYTES // 2
+        return (
+            len(self._items) < ITEM * MOST_ITEMS // 2 and self._bytes_put - self._thread.bytes_taken < MOST_BYTES // 2
+        )
 
     def _crowded(self) -> None:
         """Much lies before the thread."""

@@ -1,0 +1,56 @@
+"""`hfg info FILE`: says what is in a recording. Stands on `hfg.recording` and `show`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hfg.cli import show
+from hfg.engine.observing.tables import table
+from hfg.errors import TargetError, UsageError
+from hfg.recording import File, RecordingInfo
+
+__all__ = ["info"]
+
+
+def info(
+    file: Annotated[Path, typer.Argument(help="a recording, or any MCAP file")],
+    json: Annotated[bool, typer.Option("--json", help="Write it as JSON.")] = False,
+) -> int:
+    """Say what is in a recording: ports, types, counts, rates, and whether it is whole."""
+    try:
+        with File(file) as recording:
+            found = recording.info()
+    except UsageError as error:
+        raise TargetError(str(error)) from None
+    if json:
+        show.json(found)
+    else:
+        sys.stdout.write("\n".join(_lines(found)) + "\n")
+    return 0
+
+
+def _lines(found: RecordingInfo) -> list[str]:
+    whole = "whole" if found.whole else "cut off: what came behind its last chunk is lost"
+    lines = [f"{found.path}: {found.bytes / 1e6:.3f} MB, {found.duration_s:.3f} s, {whole}"]
+    if found.graph:
+        outcome = f", {found.outcome}" if found.outcome else ""
+        lines.append(f'graph "{found.graph}", {found.clock} clock{outcome}')
+    else:
+        lines.append(f"written by {found.library or 'somebody who does not say'}")
+    rows = [(one.path, one.kind, one.type or one.schema, one.values, f"{one.rate_hz:.4g}") for one in found.ports]
+    lines += ["", *table(("port", "kind", "type", "values", "Hz"), rows)]
+    if found.markers:
+        lines.append(f"and {found.markers} markers")
+    lines += [
+        f'{count} tokens of "{path}" were left out, for the disk was too slow' for path, count in found.left_out.items()
+    ]
+    lines += [
+        f'{count} values of "{path}" were left out, for they are no data' for path, count in found.refused.items()
+    ]
+    if found.held_s:
+        lines.append(f"nodes waited {found.held_s:.3f} s for the recording")
+    return lines
