@@ -17,6 +17,7 @@ A graph is built (floors 0-3) without any engine; the engine runs what it finds 
 from hfg import starting as starting  # before all that takes its time to import
 
 # isort: split
+from hfg import composing as composing  # what stands high and is called from below
 from hfg import errors
 from hfg.activity import StateMachine
 from hfg.clock import elapsed, now
@@ -73,13 +74,3 @@ __all__ = [
     "save",
     "slot",
 ]
-
-
-def _record(*arguments: object, **options: object) -> object:
-    """Stand behind `run.record`: who records nothing does not import what that needs."""
-    from hfg import recording
-
-    return recording.record(*arguments, **options)  # type: ignore[arg-type]  # `Run.record` has the types
-
-
-Run._recorder = staticmethod(_record)

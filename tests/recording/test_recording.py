@@ -44,6 +44,7 @@ def messages(file: Path) -> list[tuple[str, int, Any]]:
         summary = reader.get_summary()
         found, checked = [], set()
         for schema, channel, message in reader.iter_messages():
+            assert schema is not None
             body = json.loads(message.data)
             if channel.topic not in checked:  # one of each kind: the check is slow
                 checked.add(channel.topic)
@@ -150,7 +151,8 @@ def test_images_have_the_schemas_of_foxglove_and_are_copied(tmp_path: Path, imag
     with (tmp_path / "run.mcap").open("rb") as stream:
         found = [
             (schema.name, json.loads(message.data))
-            for schema, channel, message in make_reader(stream).iter_messages(topics=["frames.out"])
+            for schema, _, message in make_reader(stream).iter_messages(topics=["frames.out"])
+            if schema is not None
         ]
     assert {name for name, _ in found} == {"foxglove.RawImage" if images == "raw" else "foxglove.CompressedImage"}
     if images == "raw":
@@ -290,7 +292,7 @@ def test_without_loss_nothing_is_missing_however_far_the_disk_is_behind(
         graph = build(count=5000, rate=None)
         found: list[Recording] = []
         file = tmp_path / f"{clock}.mcap"
-        hfg.run(graph, clock=clock, begin=lambda run, file=file, found=found: found.append(record(run, file)))  # type: ignore[misc, arg-type]
+        hfg.run(graph, clock=clock, begin=lambda run, file=file, found=found: found.append(record(run, file)))  # type: ignore[misc]
         assert found[0].left_out == {}
         assert found[0].held_s > 0
         values = [body["value"] for topic, _, body in messages(file) if topic == "camera.out"]

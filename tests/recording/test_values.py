@@ -43,7 +43,7 @@ class Scan:
 
 
 class Found(NamedTuple):
-    count: int
+    number: int
     name: str
 
 
