@@ -9,7 +9,7 @@
     background  work beside the stream
 
 All of them pass on values, never token objects (rule A4), so activity goes through them by active edges alone, as it
-does through any node. `docs/howto/library.md` shows how to choose, and which nodes of CS::APEX they stand for.
+does through any node. `docs/howto/library.md` shows how to choose.
 """
 
 from hfg.nodes.flow.background import Background
