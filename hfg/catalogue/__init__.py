@@ -22,7 +22,7 @@ from hfg.catalogue.describing import (
     undocumented,
 )
 from hfg.catalogue.finding import Catalogue, installed, types_of
-from hfg.catalogue.offers import Offer, allowed_packages, is_allowed, offers
+from hfg.catalogue.offers import Offer, offers
 from hfg.catalogue.searching import categories, named, search
 
 __all__ = [
@@ -32,11 +32,9 @@ __all__ = [
     "ParameterDescription",
     "PortDescription",
     "TypeDescription",
-    "allowed_packages",
     "categories",
     "describe_type",
     "installed",
-    "is_allowed",
     "named",
     "offers",
     "search",

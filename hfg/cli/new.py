@@ -1,10 +1,12 @@
-"""`hfg new node|graph NAME`: begins a file, and its test beside it. Stands on `templates`."""
+"""`hfg new node|graph|plugin NAME`: begins a file and its test, or a package. Stands on `templates`."""
 
 from __future__ import annotations
 
 import keyword
 import re
 import sys
+from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +17,7 @@ from hfg.errors import TargetError
 
 __all__ = ["new"]
 
-new = typer.Typer(help="Begin a node type or a graph: a file that works, and its test.")
+new = typer.Typer(help="Begin a node type, a graph or a package of node types: files that work, and their test.")
 
 Name = Annotated[str, typer.Argument(help="as in map_lookup, MapLookup or nodes/map_lookup.py")]
 
@@ -34,39 +36,74 @@ def _graph(name: Name) -> int:
     return _write(name, templates.GRAPH, templates.GRAPH_TEST, "run")
 
 
+@new.command("plugin")
+def _plugin(
+    name: Annotated[str, typer.Argument(help="of the package, as in my_lamps, MyLamps or plugins/my-lamps")],
+) -> int:
+    """Write a package with a node type, its test and the entry point by which hfg finds it."""
+    parent, module = _place(name)
+    if find_spec(module) is not None:
+        raise TargetError(f'there is a module "{module}" already, which the package would hide: take another name')
+    folder = parent / module.replace("_", "-")
+    if folder.is_symlink() or folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        raise TargetError(f"{folder} is there already and not empty: hfg new overwrites nothing; take another name")
+    words = _words(module) | {"distribution": folder.name}
+    files = {folder / place.format(**words): text for place, text in templates.PLUGIN.items()}
+    _write_all({file: text.format(**words) for file, text in files.items()})
+    sys.stdout.write(
+        f"{folder} is there; try pip install -e {folder}, then hfg nodes {words['Name']} and pytest {folder}\n"
+    )
+    return 0
+
+
+def _words(module: str) -> dict[str, str]:
+    return {"module": module, "Name": "".join(word.capitalize() for word in module.split("_"))}
+
+
+def _write_all(files: Mapping[Path, str]) -> None:
+    """Write files that are not there yet, with the folders they lie in."""
+    for file, text in files.items():
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with file.open("x", encoding="utf-8") as stream:
+                stream.write(text)
+        except OSError as error:
+            raise TargetError(f"{file} cannot be written: {error.strerror}") from None
+
+
 def _write(named: str, code: str, test: str, verb: str) -> int:
     file = _file(named)
     tests = file.with_name(f"test_{file.name}")
     for one in (file, tests):
         if one.exists() or one.is_symlink():
             raise TargetError(f"{one} is there already: hfg new overwrites nothing; take another name")
-    words = {"module": file.stem, "Name": "".join(word.capitalize() for word in file.stem.split("_"))}
-    for one, template in ((file, code), (tests, test)):
-        try:
-            with one.open("x", encoding="utf-8") as stream:
-                stream.write(template.format(**words))
-        except OSError as error:
-            raise TargetError(f"{one} cannot be written: {error.strerror}") from None
+    words = _words(file.stem)
+    _write_all({one: template.format(**words) for one, template in ((file, code), (tests, test))})
     next_step = f"hfg run {file}" if verb else f"hfg nodes {file}"
     sys.stdout.write(f"{file} and {tests} are there; try {next_step} and pytest {tests}\n")
     return 0
 
 
 def _file(named: str) -> Path:
-    """The file that is meant, in snake case.
+    """The file that is meant, in snake case."""
+    parent, module = _place(named.removesuffix(".py"))
+    return parent / f"{module}.py"
+
+
+def _place(named: str) -> tuple[Path, str]:
+    """Give the folder and the name of the module that is meant, in snake case.
 
     Raises:
       TargetError: no module can be named so.
     """
     place = Path(named)
-    stem = place.stem if place.suffix == ".py" else place.name
-    module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", stem).replace("-", "_").lower()
+    module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", place.name).replace("-", "_").lower()
     if not module.isidentifier() or keyword.iskeyword(module) or module.startswith(("_", "test_")):
         raise TargetError(f'"{named}" names no module: letters, digits and _, as in map_lookup')
     if not module.isascii() or len(module) > _LONGEST_NAME:
         raise TargetError(f'"{named}" is no good name for a file: take up to {_LONGEST_NAME} letters of a to z')
     if module in sys.stdlib_module_names or module == "hfg":
-        raise TargetError(f'a file {module}.py would hide the module "{module}" of Python or hfg: take another name')
+        raise TargetError(f'a module {module} would hide the module "{module}" of Python or hfg: take another name')
     if not place.parent.is_dir():
         raise TargetError(f"there is no folder {place.parent}: make it first")
-    return place.with_name(f"{module}.py")
+    return place.parent, module

@@ -1,10 +1,10 @@
-"""What `hfg new` writes: the text of a node type or a graph, and of its test. Stands on nothing."""
+"""What `hfg new` writes: the text of a node type, a graph or a package, and of its test. Stands on nothing."""
 
 from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["GRAPH", "GRAPH_TEST", "NODE", "NODE_TEST"]
+__all__ = ["GRAPH", "GRAPH_TEST", "NODE", "NODE_TEST", "PLUGIN"]
 
 NODE: Final = '''\
 """A node type; `hfg nodes {module}.py` tells what goes in and out."""
@@ -138,3 +138,157 @@ def test_high_samples_are_seen() -> None:
 def test_there_is_nothing_to_complain_about() -> None:
     assert build().check() == []
 '''
+
+_PLUGIN_PROJECT: Final = """\
+[build-system]
+requires = ["hatchling>=1.27"]
+build-backend = "hatchling.build"
+
+[project]
+name = "{distribution}"
+version = "0.1.0"
+description = "Node types for hfg"
+readme = "README.md"
+requires-python = ">=3.11"
+dependencies = ["hfg"]
+
+[project.optional-dependencies]
+test = ["hypothesis", "pytest"]
+
+# By this hfg finds the node types: of a module, or of a package and all modules in it.
+[project.entry-points."hfg.nodes"]
+{module} = "{module}.nodes"
+
+[tool.hatch.build.targets.wheel]
+packages = ["src/{module}"]
+
+[tool.pytest.ini_options]
+testpaths = ["tests"]
+"""
+
+_PLUGIN_README: Final = """\
+# {distribution}
+
+Node types for hfg.
+
+```console
+pip install -e ".[test]"
+hfg nodes {module}.nodes     # what is in it
+hfg nodes {Name}             # and what that does
+pytest
+```
+
+Graphs use them as any others, `from {module}.nodes import {Name}`, and graph files by reference,
+`{module}.nodes:{Name}`.
+"""
+
+_PLUGIN_INIT: Final = '''\
+"""Node types for hfg."""
+'''
+
+_PLUGIN_NODES: Final = '''\
+"""The node types; `hfg nodes {module}.nodes` lists them."""
+
+from __future__ import annotations
+
+import hfg
+from annotated_types import Gt
+
+__all__ = ["{Name}", "scaled"]
+
+
+@hfg.node
+def scaled(value: float, *, factor: float = 2.0) -> float:
+    """Multiply each value by a factor.
+
+    Silence stays silence.
+
+    Args:
+      value: any number.
+      factor: by what it is multiplied.
+      out: the product.
+    """
+    return factor * value
+
+
+class {Name}(hfg.Node):
+    """Tell how far the values went, and when they went too far.
+
+    Attributes:
+      value: where it is now, in metres.
+      way: how far it went since it began or was reset, in metres.
+      far: the way, when it is longer than the limit for the first time.
+      limit: how far it may go.
+      again: begins at 0 again.
+    """
+
+    value = hfg.Input(float)
+    way = hfg.Output(float)
+    far = hfg.Event(float)
+    limit = hfg.Parameter(10.0, Gt(0), unit="m")
+    last = hfg.State[float | None](None)
+    gone = hfg.State(0.0)
+
+    def process(self, value: float) -> float:
+        before, step = self.gone, 0.0 if self.last is None else abs(value - self.last)
+        self.last, self.gone = value, before + step
+        if before <= self.limit < self.gone:
+            self.far.trigger(self.gone)
+        return self.gone
+
+    @hfg.slot
+    def again(self) -> None:
+        self.last, self.gone = None, 0.0
+'''
+
+_PLUGIN_TEST: Final = '''\
+"""What the node types do, firing by firing, and that hfg finds them: `pytest`."""
+
+from __future__ import annotations
+
+import pytest
+from hfg.catalogue import offers, types_of, undocumented
+from hfg.testing import fire, try_type
+
+from {module} import nodes
+
+TYPES = types_of(nodes).types
+
+
+def test_scaled_multiplies() -> None:
+    assert fire(nodes.scaled(factor=3.0), value=2.0).outputs == {{"out": 6.0}}
+
+
+def test_the_way_is_counted_and_told_of_once() -> None:
+    node = nodes.{Name}(limit=3.0)
+    ways = [fire(node, value=value).outputs["way"] for value in (1.0, 3.0, 1.0)]
+    assert ways == [0.0, 2.0, 4.0]
+    fire(node, slot="again")
+    assert fire(node, value=0.0).events == []
+    assert fire(node, value=5.0).events == [("far", 5.0)]
+    assert fire(node, value=6.0).events == []
+
+
+@pytest.mark.parametrize("reference", [one.reference for one in TYPES])
+def test_types_keep_their_word(reference: str) -> None:
+    """With any values of the types and limits that they declare."""
+    assert try_type(reference).usable
+
+
+def test_everything_is_documented() -> None:
+    assert [line for one in TYPES for line in undocumented(one)] == []
+
+
+def test_hfg_finds_the_package() -> None:
+    found = [offer.module for offer in offers()]
+    assert nodes.__name__ in found, "install it first: pip install -e ."
+'''
+
+PLUGIN: Final = {
+    "pyproject.toml": _PLUGIN_PROJECT,
+    "README.md": _PLUGIN_README,
+    "src/{module}/__init__.py": _PLUGIN_INIT,
+    "src/{module}/nodes.py": _PLUGIN_NODES,
+    "src/{module}/py.typed": "",
+    "tests/test_{module}.py": _PLUGIN_TEST,
+}

@@ -150,16 +150,16 @@ class _Trying:
             self._in_a_graph(data, parameters)
             return
         node: Node | None = None
+        alike = data.draw(Alike.strategy())
         for _ in range(self.firings):
-            node = self._round(data, node, parameters)
+            node = self._round(data, node, parameters, alike)
         if node is not None:
             for hook in ("end", "teardown"):
                 if hook in self.type.hooks:
                     self._attempt(node, parameters, {}, hook=hook)
 
-    def _round(self, data: st.DataObject, node: Node | None, parameters: dict[str, Any]) -> Node | None:
+    def _round(self, data: st.DataObject, node: Node | None, parameters: dict[str, Any], alike: Alike) -> Node | None:
         """Fire once, or call its slots; give the node if it can go on."""
-        alike = data.draw(Alike.strategy())
         if node is None:
             node = self._made(parameters)
             if node is None:

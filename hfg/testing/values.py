@@ -67,13 +67,18 @@ class Alike:
 
     @staticmethod
     def strategy() -> st.SearchStrategy[Alike]:
-        """Draw it."""
-        return st.builds(
-            Alike,
-            count=st.sampled_from(_LENGTHS[:-1]),
-            channels=st.sampled_from((1, 3, 4)),
-            dtype=st.sampled_from((np.uint8, np.float32)),
-        )
+        """Draw one of a few."""
+        return _ALIKE
+
+
+_ALIKE: Final = st.sampled_from(
+    [
+        Alike(count=count, channels=channels, dtype=dtype)
+        for channels in (1, 3)
+        for dtype in (np.uint8, np.float32)
+        for count in (12, 4)
+    ]
+)
 
 
 def values_of(
@@ -136,6 +141,20 @@ def values_of_parameter(spec: ParameterSpec, *, alike: Alike | None = None) -> s
 
 
 def _values(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchStrategy[Any]:
+    try:
+        hash((hint, limits))
+    except TypeError:  # such as a limit that holds a list
+        return _made(hint, limits, alike)
+    return _kept(hint, limits, alike)
+
+
+@functools.lru_cache(maxsize=4096, typed=True)
+def _kept(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchStrategy[Any]:
+    """Make each strategy once: Hypothesis looks at a new one for longer than it draws from it."""
+    return _made(hint, limits, alike)
+
+
+def _made(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchStrategy[Any]:
     facts = array_facts(hint)
     if facts is not None:
         limits += _opened(hint)[1]
@@ -306,6 +325,7 @@ def _lengths(limits: tuple[Any, ...], usual: int) -> tuple[int, int]:
     return least, max(least, usual) if most is None else max(least, min(most, least + usual))
 
 
+@functools.lru_cache
 def _anything(*, hashable: bool = False) -> st.SearchStrategy[Any]:
     """Values of many types, never None: in an output None is silence (rule T2)."""
     plain = st.one_of(st.integers(-10, 10), _floats(()), _texts(str, ()), st.booleans())
