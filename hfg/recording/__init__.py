@@ -10,8 +10,8 @@ schemas     JSON schemas, those of Foxglove for images
 values      values as JSON and back, to the bit
 """
 
-from hfg.recording.playing import Playback, Playing, play_into
+from hfg.recording.playing import Playing, play_into
 from hfg.recording.reading import File, PortInfo, RecordingInfo
 from hfg.recording.recording import Recording, record
 
-__all__ = ["File", "Playback", "Playing", "PortInfo", "Recording", "RecordingInfo", "play_into", "record"]
+__all__ = ["File", "Playing", "PortInfo", "Recording", "RecordingInfo", "play_into", "record"]

@@ -28,16 +28,16 @@ from hfg.graph.flat import flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node, NodeType
-from hfg.ports import Event, Output, Parameter
 from hfg.recording.messages import EVENTS, MARKERS, TokenReader
 from hfg.recording.reading import File
 from hfg.recording.values import CannotKeep
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.types import accepts, describe
 
-__all__ = ["Playback", "Player", "Playing", "Track", "play_into"]
+__all__ = ["Player", "Playing", "Track", "play_into", "recorded_ports"]
 
 _SAME_MOMENT_S: Final = 1e-9
+_PLAYBACK: Final = "hfg.nodes.recordings:Playback"
 
 
 class _Record(msgspec.Struct):
@@ -238,55 +238,19 @@ class Player:
             port.trigger(token.value, activity=token.activity, stamp=token.stamp)
 
 
-class Playback(Node):
-    """Send what was recorded of one port, when it was: a source.
+def _ready(self: Any) -> bool:
+    ready: bool = self._player.ready()
+    return ready
 
-    Each firing sends one recorded token, with its stamp and modifier, at the time at which it passed, counted from the
-    beginning of the run; silence is silence again. Recorded signals of an event leave by `signal`, tokens of an output
-    by `out`. It ends with the recording. On the real clock `speed` says how much faster time goes, in virtual time
-    nothing is waited for; a `speed` of 0 gives all at once, as fast as the graph takes it.
 
-    Attributes:
-      file: the recording, as `hfg record` writes it.
-      port: the path of the recorded port, "camera.out".
-      speed: how many recorded seconds pass in one second; 0: as fast as can be.
-      out: what an output has sent.
-      signal: what an event has triggered.
+def _process(self: Any) -> None:
+    self._player.play()
 
-    Raises:
-      UsageError: the file cannot be read, or has no such port.
-    """
 
-    file = Parameter("")
-    port = Parameter("")
-    speed = Parameter(1.0)
-    out = Output(Any)
-    signal = Event(Any)
-
-    def setup(self) -> None:
-        """Open the recording."""
-        self._recording = File(self.file)
-        known = _recorded(self._recording)
-        if self.port not in known:
-            raise UsageError(f'no port "{self.port}" was recorded in {self.file}; {suggest(self.port, known)}')
-        kind = known[self.port].metadata.get("kind")
-        names = {self.port: "signal" if kind == "event" else "out"}
-        track = Track(self._recording, {self.port: Any}, may_pickle=False)
-        self._player = Player(self, track, names, self.speed or None)
-
-    def ready(self) -> bool:
-        """Whether the next token is due."""
-        return self._player.ready()
-
-    def process(self) -> None:
-        """Send it."""
-        self._player.play()
-
-    def teardown(self) -> None:
-        """Close the recording."""
-        recording = getattr(self, "_recording", None)
-        if recording is not None:
-            recording.close()
+def _teardown(self: Any) -> None:
+    recording = getattr(self, "_recording", None)
+    if recording is not None:
+        recording.close()
 
 
 def _spoke(file: File) -> set[str]:
@@ -301,7 +265,7 @@ def _spoke(file: File) -> set[str]:
     return found
 
 
-def _recorded(file: File) -> dict[str, Any]:
+def recorded_ports(file: File) -> dict[str, Any]:
     """The channels of ports, by path."""
     return {one.topic: one for one in file.channels.values() if one.topic not in (MARKERS, EVENTS)}
 
@@ -350,9 +314,9 @@ def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any]
         "__module__": __name__,
         "__qualname__": qualname,
         "setup": setup,
-        "ready": Playback.ready,
-        "process": Playback.process,
-        "teardown": Playback.teardown,
+        "ready": _ready,
+        "process": _process,
+        "teardown": _teardown,
         "_slot_call": lambda self, name: _hear_nothing,  # what its slots did is in what was recorded
     }
     made_class: Any = types.new_class(qualname, (Node,), {"_made": made}, lambda names: names.update(body))
@@ -413,7 +377,7 @@ def play_into(
         raise UsageError(f"speed= says how much faster than recorded it is played, above 0, or None; got {speed!r}")
     path = os.fspath(Path(file).resolve())
     with File(path) as recording:
-        recorded = _recorded(recording)
+        recorded = recorded_ports(recording)
         spoke = _spoke(recording)
     if ports:
         return _feed(graph, path, recorded, ports, speed)
@@ -438,9 +402,7 @@ def _feed(graph: Graph, file: str, recorded: dict[str, Any], ports: Mapping[str,
         if edge is not None and getattr(edge.target, "kind", "") != "slot":
             edit.append(commands.Disconnect(edge.source.path, target))
             options = {"active": edge.active}
-        edit.append(
-            commands.Add(f"{__name__}:Playback", name, {"file": file, "port": source, "speed": float(speed or 0.0)})
-        )
+        edit.append(commands.Add(_PLAYBACK, name, {"file": file, "port": source, "speed": float(speed or 0.0)}))
         port = "signal" if recorded[source].metadata.get("kind") == "event" else "out"
         edit.append(commands.Connect(f"{name}.{port}", target, **options))
         done.played[source] = target

@@ -11,7 +11,8 @@ import pytest
 import hfg
 from hfg.errors import UsageError
 from hfg.graph.flat import flatten
-from hfg.recording import Playback, play_into, record
+from hfg.nodes.recordings import Playback
+from hfg.recording import play_into, record
 from hfg.testing import Recorder
 from hfg.testing.making import SYNCHRONOUS, random_plan
 from hfg.testing.nodes import Script, Tally, ascript, double, sink

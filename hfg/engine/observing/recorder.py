@@ -41,7 +41,7 @@ MOST_ITEMS: Final = 50_000
 MOST_BYTES: Final = 128 * 1024 * 1024
 """What their values may take, as far as that is known."""
 
-_WAKE_AFTER: Final = 4000 * ITEM  # the thread looks ten times a second anyway
+_WAKE_AFTER: Final = 4000 * ITEM  # the thread looks a few times a second anyway
 _JOIN_S: Final = 0.002
 
 
