@@ -105,8 +105,8 @@ def main() -> None:
         for name, function in (("no work", idle), ("10 us each", works)):
             found = ratios(function, Path(folder), pairs=chosen.pairs, seconds=chosen.seconds)
             print(
-                f"{name:12} process {1e3 * found['process_without_s']:6.1f} -> {1e3 * found['process_recorded_s']:6.1f} "
-                f"ms/s (x {found['process_ratio']:.2f})   graph's thread {1e3 * found['thread_without_s']:6.1f} -> "
+                f"{name:12} process {1e3 * found['process_without_s']:6.1f} -> "
+                f"{1e3 * found['process_recorded_s']:6.1f} ms/s (x {found['process_ratio']:.2f})   graph's thread {1e3 * found['thread_without_s']:6.1f} -> "
                 f"{1e3 * found['thread_recorded_s']:6.1f} ms/s (x {found['thread_ratio']:.2f})"
             )
 

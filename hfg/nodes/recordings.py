@@ -5,7 +5,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
+
+from annotated_types import Ge
 
 from hfg.errors import UsageError
 from hfg.graph.structure.naming import suggest
@@ -27,7 +30,7 @@ class Playback(Node):
 
     Attributes:
       file: the recording, as `hfg record` writes it.
-      port: the path of the recorded port, "camera.out".
+      port: the path of the recorded port, "camera.out"; empty: the only one.
       speed: how many recorded seconds pass in one second; 0: as fast as can be.
       out: what an output has sent.
       signal: what an event has triggered.
@@ -36,9 +39,9 @@ class Playback(Node):
       UsageError: the file cannot be read, or has no such port.
     """
 
-    file = Parameter("")
+    file = Parameter(Path("recording.mcap"))
     port = Parameter("")
-    speed = Parameter(1.0)
+    speed = Parameter(1.0, Ge(0.0), step=0.5)
     out = Output(Any)
     signal = Event(Any)
 
@@ -46,11 +49,11 @@ class Playback(Node):
         """Open the recording."""
         self._recording = File(self.file)
         known = recorded_ports(self._recording)
-        if self.port not in known:
-            raise UsageError(f'no port "{self.port}" was recorded in {self.file}; {suggest(self.port, known)}')
-        kind = known[self.port].metadata.get("kind")
-        names = {self.port: "signal" if kind == "event" else "out"}
-        track = Track(self._recording, {self.port: Any}, may_pickle=False)
+        port = next(iter(known)) if not self.port and len(known) == 1 else self.port
+        if port not in known:
+            raise UsageError(f'no port "{port}" was recorded in {self.file}; {suggest(port, known)}')
+        names = {port: "signal" if known[port].metadata.get("kind") == "event" else "out"}
+        track = Track(self._recording, {port: Any}, may_pickle=False)
         self._player = Player(self, track, names, self.speed or None)
 
     def ready(self) -> bool:

@@ -18,13 +18,16 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 import numpy as np
 
+import hfg
 from hfg import catalogue
+from hfg.testing.nodes import script, sink
 from hfg.testing.trying import NotUsable, Trial, try_type
 
 __all__ = ["main", "try_all"]
@@ -142,6 +145,15 @@ def _work(firings: int, seed: int) -> None:
         answers.flush()
 
 
+@cache
+def _recording() -> bytes:
+    """Record three numbers."""
+    graph = hfg.Graph("recorded")
+    graph.add(script()) >> graph.add(sink())
+    hfg.run(graph, clock="virtual", begin=lambda run: run.record("recording.mcap", force=True))
+    return Path("recording.mcap").read_bytes()
+
+
 def _lay_out_files() -> None:
     """Write the small files that paths are drawn from; nodes may have changed them."""
     Path("folder").mkdir(exist_ok=True)
@@ -151,6 +163,7 @@ def _lay_out_files() -> None:
     Path("value.json").write_text('{"a": [1, 2.5, "b", null]}\n', encoding="utf-8")
     for name in ("picture.png", "folder/1.png", "folder/2.png"):
         Path(name).write_bytes(_PICTURE)
+    Path("recording.mcap").write_bytes(_recording())
     np.save("array.npy", np.arange(6.0).reshape(2, 3))
     np.savez("arrays.npz", first=np.arange(3), second=np.zeros((2, 2)))
 

@@ -41,7 +41,17 @@ _TEXTS: Final = ("1", "-2.5", "true", "a, b", '{"a": 1}', "a b\nc", "x" * 100)
 _LETTERS: Final = "aB1 .,:;-+_/\\'\"{}[]()%$\n\t\0\x7f\u00e9\u00df\u6f22\U0001f642"
 """What texts have gone wrong with; all of Unicode takes Hypothesis seconds to prepare."""
 _PATHS: Final = (
-    *("lines.txt", "table.csv", "lines.jsonl", "value.json", "picture.png", "array.npy", "arrays.npz", "folder"),
+    *(
+        "lines.txt",
+        "table.csv",
+        "lines.jsonl",
+        "value.json",
+        "picture.png",
+        "array.npy",
+        "arrays.npz",
+        "folder",
+        "recording.mcap",
+    ),
     *("new", "new.png", "new.txt", "new/one.json", "no/such"),
 )
 """Files that whoever tries a type may lay in the working directory, and some that are not there."""

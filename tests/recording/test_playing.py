@@ -89,7 +89,7 @@ def test_a_hundred_random_graphs_are_the_same_on_every_edge_when_they_are_played
 def test_silence_stamps_and_the_end_are_played_at_their_times(tmp_path: Path) -> None:
     run(mixed(), tmp_path / "run.mcap")
     graph = hfg.Graph()
-    player = graph.add(Playback(file=str(tmp_path / "run.mcap"), port="ascript.out"), name="player")
+    player = graph.add(Playback(file=tmp_path / "run.mcap", port="ascript.out"), name="player")
     graph.connect(player.out, graph.add(sink()).ports.inputs["value"])
     seen = run(graph)
     sent = [event for event in seen.of(hfg_trace_sent()) if event.edge.startswith("player.out")]
