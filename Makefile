@@ -25,8 +25,9 @@ help:
 demo: $(READY)
 	$(BIN)/python examples/photographs.py
 
+# One process a core; a test that must be alone says so by where it looks, never by when it runs.
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 lint: $(READY)
 	$(BIN)/ruff check .

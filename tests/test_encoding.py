@@ -113,13 +113,13 @@ TAGGED: list[tuple[Any, Any]] = [
 ]
 
 
-@pytest.mark.parametrize(("value", "hint", "data"), PLAIN, ids=repr)
+@pytest.mark.parametrize(("value", "hint", "data"), PLAIN)
 def test_what_the_type_tells_is_not_written(value: Any, hint: Any, data: Any) -> None:
     assert encode(value, hint) == data
     assert same(decode(json.loads(json.dumps(data)), hint), value)
 
 
-@pytest.mark.parametrize(("value", "hint"), TAGGED, ids=repr)
+@pytest.mark.parametrize(("value", "hint"), TAGGED)
 def test_where_the_type_does_not_tell_the_data_does(value: Any, hint: Any) -> None:
     data = encode(value, hint)
     assert has_tag(data)

@@ -11,6 +11,7 @@ import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -77,7 +78,14 @@ def _meant(what: str | None) -> tuple[Catalogue, bool]:
     if colon and not ("/" in name or "\\" in name):
         return _only_named(_in(place), what, name), True
     import_from_here()
-    if what.endswith(".py") or "/" in what or "\\" in what or _is_family(what) or _is_module(what):
+    if (
+        what.endswith(".py")
+        or "/" in what
+        or "\\" in what
+        or Path(what).is_file()
+        or _is_family(what)
+        or _is_module(what)
+    ):
         return _in(what), False
     found = catalogue.installed()
     try:

@@ -94,7 +94,7 @@ EXAMPLES = [
 ]
 
 
-@pytest.mark.parametrize(("hint", "value"), EXAMPLES, ids=repr)
+@pytest.mark.parametrize(("hint", "value"), EXAMPLES)
 def test_a_value_comes_back_equal_and_of_the_same_type(hint: Any, value: Any) -> None:
     found = there_and_back(hint, value)
     assert type(found) is type(value)

@@ -128,7 +128,7 @@ HINTS: list[Any] = [
 ]
 
 
-@pytest.mark.parametrize("hint", HINTS, ids=str)
+@pytest.mark.parametrize("hint", HINTS)
 def test_values_fit_their_hint_and_its_limits(hint: Any) -> None:
     def wanted(value: Any) -> None: ...
 

@@ -19,7 +19,7 @@ from hfg.nodes.files.sinks import PICTURES, encoded
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Inputs, Parameter, State
 
-__all__ = ["ImageDisplay", "image_grid"]
+__all__ = ["ImageDisplay", "image_grid", "visible"]
 
 
 class ImageDisplay(Node):

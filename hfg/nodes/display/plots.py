@@ -20,7 +20,7 @@ from hfg.nodetype import Node
 from hfg.ports import Input, Inputs, Output, Parameter, State, slot
 from hfg.token import Token
 
-__all__ = ["HistogramPlot", "ScatterPlot", "TimePlot", "VectorPlot"]
+__all__ = ["HistogramPlot", "ScatterPlot", "TimePlot", "VectorPlot", "finite"]
 
 Numbers: TypeAlias = float | Vector
 """One number, or several: a list of them or an array with one axis."""

@@ -20,7 +20,7 @@ from hfg.nodes.values.text import format_safely, is_a_format
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Parameter, State, slot
 
-__all__ = ["Indicator", "SignalLight", "TextDisplay", "format_table", "log_value"]
+__all__ = ["Indicator", "SignalLight", "TextDisplay", "format_table", "log_value", "print_line"]
 
 Level: TypeAlias = Literal["debug", "info", "warning", "error"]
 

@@ -21,7 +21,10 @@ from hfg.nodes.files.access import FilePath, named, reaching
 from hfg.types import Array
 
 __all__ = [
+    "json_of",
     "list_directory",
+    "load_array",
+    "load_image",
     "read_array",
     "read_arrays",
     "read_bytes",
@@ -30,6 +33,7 @@ __all__ = [
     "read_json",
     "read_raw_image",
     "read_text",
+    "rows_of",
 ]
 
 Column: TypeAlias = Literal["text", "int", "float", "bool"]

@@ -39,6 +39,7 @@ __all__ = [
     "WriteJsonLines",
     "WriteLines",
     "WriteText",
+    "encoded",
 ]
 
 PICTURES: Final = "*.png *.jpg *.jpeg *.tif *.tiff *.bmp *.webp *.exr *.hdr *.pgm *.ppm"

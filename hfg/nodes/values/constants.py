@@ -34,6 +34,8 @@ __all__ = [
     "MatrixOnTrigger",
     "TextOnTrigger",
     "VectorOnTrigger",
+    "as_array",
+    "has_floats",
     "replace_by",
 ]
 

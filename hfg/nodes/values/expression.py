@@ -17,7 +17,7 @@ from annotated_types import MaxLen, Predicate
 from hfg.functions import node
 from hfg.ports import Inputs, Parameter
 
-__all__ = ["expression"]
+__all__ = ["expression", "is_a_formula", "read_formula"]
 
 Calculation: TypeAlias = Callable[[Sequence[float]], float]
 

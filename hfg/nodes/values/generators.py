@@ -27,6 +27,8 @@ __all__ = [
     "RandomInt",
     "RandomNormal",
     "RandomUniform",
+    "is_a_number",
+    "is_not_zero",
     "waveform",
 ]
 

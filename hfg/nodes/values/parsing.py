@@ -24,6 +24,8 @@ __all__ = [
     "ParseJson",
     "decode_text",
     "encode_text",
+    "json_bytes",
+    "plain",
     "to_bool",
     "to_float",
     "to_int",

@@ -19,13 +19,17 @@ from hfg.nodetype import Node
 from hfg.ports import Event, Input, Inputs, Parameter
 
 __all__ = [
+    "Found",
     "TextCompare",
     "change_case",
     "contains_text",
     "count_in_text",
     "find_all",
     "format_fields",
+    "format_safely",
     "format_text",
+    "is_a_format",
+    "is_a_pattern",
     "join_list",
     "join_text",
     "matches_text",

@@ -17,7 +17,17 @@ from hfg.nodetype import Node
 from hfg.ports import Input, Inputs, Output, Parameter, State
 from hfg.types import Shape
 
-__all__ = ["AddNoiseToVector", "add_vectors", "dot", "extremum", "norm", "normalize", "scale_vector", "summarize"]
+__all__ = [
+    "AddNoiseToVector",
+    "Extremum",
+    "add_vectors",
+    "dot",
+    "extremum",
+    "norm",
+    "normalize",
+    "scale_vector",
+    "summarize",
+]
 
 VectorArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None)]
 Vector: TypeAlias = Sequence[float] | Annotated[npt.NDArray[np.floating[Any] | np.integer[Any]], Shape(None)]
