@@ -66,5 +66,7 @@ def test_line_works_as_written(command: Command, line: list[str], monkeypatch: p
     assert program == "hfg"
     if "robot.hfg.yaml" in arguments[:2]:
         command("convert", "robot.py", "robot.hfg.yaml")
+    if "run.mcap" in arguments[:2]:
+        command("record", "robot.py", "-o", "run.mcap")
     shown = command(*arguments)
     assert shown.code == (NOTHING_RUNS if "top" in arguments or "4711" in arguments else 0), shown.err
