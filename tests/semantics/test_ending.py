@@ -506,6 +506,20 @@ class Echoes(hfg.Node):
         return self.text
 
 
+@pytest.mark.rule("R5")
+def test_a_source_for_nobody_holds_nobody_up_who_works_for_others_too(fast: bool) -> None:
+    """What lies before it would else wait until all is quiet, and then be drained: an hour, beside this clock."""
+    graph, trace = hfg.Graph(), recorder()
+    sets, echoes, node = graph.add(numbers(count=3), name="sets"), graph.add(Echoes()), graph.add(add())
+    graph.connect(echoes.out, node.a)
+    graph.connect(graph.add(numbers(count=0)).out, node.b)
+    graph.connect(sets.out, echoes.ports.parameters["text"])
+    graph.connect(sets.out, graph.add(Keep()).value)
+    graph.connect(graph.add(slow_numbers(count=2, pause_s=1800)).out, graph.add(Keep(), name="slow").value)
+    assert run(graph, fast, trace=trace).outcome == "done"
+    assert [event.time for event in trace.of(TokenSent) if event.edge == "sets.out -> keep.value"] == [0, 0, 0, 0]
+
+
 @pytest.mark.rule("R5", "F12")
 @pytest.mark.parametrize("count", [5, 10**9], ids=["behind one that ends", "behind one without end"])
 @pytest.mark.parametrize("release", ["sequential", "pipelined"])

@@ -70,19 +70,13 @@ def test_the_engine_does_what_the_oracle_permits(block: int) -> None:
             check(plan, seed)
 
 
-def stalls_beside_a_source_without_end(plan: GraphPlan, seed: int) -> bool:
-    """Whether R5 leaves open that it ends: a source is blocked, and another goes on for nobody for ever."""
-    report = reference(plan, seed)
-    return report is None or (report.outcome == "stalled" and any(node.type == "Hums" for node in plan.nodes))
-
-
 @pytest.mark.rule("P9", "F12", "F13", "G4", "R5", "X3")
 @pytest.mark.parametrize("block", range(5))
 def test_so_it_does_with_all_in_which_something_was_wrong_once(block: int) -> None:
     """With operators, last words, sources without end, iteration inside of iteration, teardowns that hang."""
     for seed in range(25 * block, 25 * block + 25):
         plan = random_plan(seed, WIDE)
-        if not stalls_beside_a_source_without_end(plan, seed):
+        if reference(plan, seed) is not None:
             check(plan, seed)
 
 

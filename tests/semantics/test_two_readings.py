@@ -764,6 +764,54 @@ def test_the_slots_of_a_source_that_works_for_nobody_go_on(perform: Any) -> None
     assert perform(build, lambda seen: (seen.outcome, seen.calls("hums"))) == ("done", ["note", "note"])
 
 
+@pytest.mark.rule("R5")
+@pytest.mark.parametrize("rate", [None, 10.0])
+def test_a_blocked_source_has_stalled_also_beside_one_without_end_that_works_for_nobody(
+    perform: Any, rate: float | None
+) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        total, never = graph.add(add()), graph.add(add(), name="never")
+        graph.connect(graph.add(Repeats(), max_rate_hz=rate).out, total.a)
+        graph.connect(graph.add(script(values=())).out, total.b)
+        graph.connect(graph.add(script(), name="blocked").out, never.a)
+        return graph
+
+    found = perform(build, lambda seen: (seen.outcome, seen.values("blocked.out -> never.a")))
+    assert found == ("stalled", [1])
+
+
+@pytest.mark.rule("R5", "F12")
+def test_what_works_for_nobody_goes_on_for_whoever_is_set_up_afresh(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        twice = graph.add(EndsItself())
+        graph.connect(graph.add(Repeats()).out, twice.value)
+        graph.connect(twice.out, graph.add(sink()).value)
+        graph.connect(graph.add(ascript(values=(1,), pause_s=1.0)).out, twice.reset)
+        return graph
+
+    found = perform(build, lambda seen: (seen.outcome, seen.values("ends_itself.out -> sink.value")))
+    assert found == ("done", [0, 0, END, 0, 0, END])
+
+
+class EndsItself(hfg.Node):
+    """Ends when it has passed on two values."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    left = hfg.State(2)
+
+    def ready(self) -> bool:
+        if not self.left:
+            raise hfg.EndOfStream
+        return True
+
+    def process(self, value: int) -> int:
+        self.left -= 1
+        return value
+
+
 class Hums(hfg.Node):
     """A source without end that may be spoken to."""
 

@@ -302,7 +302,7 @@ class Core:
         self.slices = 0  # of the pump, for the watchdog
         self.until = 0.0  # on the run's clock: the pump's slice is over
         self.flags: list[str] = []  # why the pump is to look round; not empty: a wave ends behind the call under way
-        self.futile = False  # the sources left feed only ended nodes (R5)
+        self.futile: set[Worker] = set()  # sources that feed only ended nodes (R5)
         self.current: Worker | None = None
         self.speaker: Worker | None = None  # whose code a fast path runs: what it triggers may take one too
         self.holding: Any = None  # what holds nodes for an edit (R4)

@@ -18,7 +18,6 @@ from hfg.engine.model.worker import AMID_NOTHING, RESTING, Worker
 from hfg.engine.rules.agenda import consider, must_wait
 from hfg.engine.rules.modifiers import automatic, set_active, touch
 from hfg.engine.rules.sending import flush_automatic, tell, trigger
-from hfg.engine.rules.sources import judge_sources
 from hfg.ports.edges import AnyEdge
 from hfg.token import Token
 
@@ -91,10 +90,8 @@ def rest(worker: Worker) -> None:
     if any(gate.idle_rate_hz is None and not gate.state.active for gate in worker.gates_over):
         if not worker.blocked & RESTING:
             worker.block(RESTING)
-            judge_sources(worker.core)
         return
-    if worker.allow(RESTING):
-        judge_sources(worker.core)  # those that were futile beside it work on, like this one
+    worker.allow(RESTING)
     if worker.placed and must_wait(worker):  # throttled from now on (D7)
         worker.lose_place()
     else:

@@ -150,10 +150,10 @@ def end_events(core: Core) -> bool:
 
 def node_ended(worker: Worker) -> None:
     """A node is over: its operators complete (P9), and sources may feed nobody any more (R5)."""
-    core = worker.core
     for edge in worker.event_edges():
         complete_edge(edge)
-    judge_sources(core)
+    if any(edge.source.is_source for edge in worker.in_edges):
+        judge_sources(worker.core)
 
 
 def give_up(core: Core) -> bool:
@@ -164,7 +164,7 @@ def give_up(core: Core) -> bool:
     given_up = [
         source
         for source in core.sources
-        if source.blocked & FUTILE and not source.blocked & ENDED and any(edge.untaken for edge in _joined(source))
+        if source in core.futile and not source.blocked & ENDED and any(edge.untaken for edge in _joined(source))
     ]
     for source in given_up:
         source.end(given_up=True)
@@ -186,7 +186,7 @@ def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
     Even while it waits or works in a thread.
     """
     busy = [worker for worker in core.workers if worker.codes_at_work()]
-    return bool(busy) and all(worker.blocked & FUTILE and (threads_too or not worker.group.threaded) for worker in busy)
+    return bool(busy) and all(worker in core.futile and (threads_too or not worker.group.threaded) for worker in busy)
 
 
 def only_waiting_for_room(core: Core) -> bool:
@@ -205,7 +205,7 @@ def stall(core: Core) -> Stalled | None:
     reasons.extend(
         f'source "{source.path}" has not ended and {waits_for(source)}'
         for source in core.sources
-        if not source.blocked & (ENDED | DISABLED | RESTING | FUTILE)
+        if source not in core.futile and not source.blocked & (ENDED | DISABLED | RESTING)
     )
     if not reasons:
         return None

@@ -1,7 +1,7 @@
-"""Which sources still work for somebody: when none of those that are left does, they keep no run alive (rule R5).
+"""Which sources still work for somebody: those that do not are futile, and keep no run alive (rule R5).
 
-Judged anew whenever a node ends, is enabled, disabled or reset, a gate lets a source rest or go on, and the structure
-changes; never per token. Stands on `agenda`.
+Judged anew whenever a node ends, is enabled, disabled or reset, and when the structure changes; never per token. Stands
+on `agenda`.
 """
 
 from __future__ import annotations
@@ -9,29 +9,28 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from hfg.engine.model.core import Core
-from hfg.engine.model.worker import DISABLED, ENDED, FUTILE, RESTING, Worker
+from hfg.engine.model.worker import DISABLED, ENDED, FUTILE, Worker
 from hfg.engine.rules.agenda import unblock
 
 __all__ = ["judge_sources"]
 
 
 def judge_sources(core: Core) -> None:
-    """Sources are futile as long as all that are left work for nobody; one that rests keeps no run alive (A11)."""
-    if not core.futile and any(_works_for_somebody(one) for one in core.sources):
-        return  # as mostly, and seen at the first of them
-    left = [one for one in core.sources if not one.blocked & (ENDED | DISABLED | RESTING)]
-    core.futile = bool(left) and len(_for_nobody(left)) == len(left)
+    """Find the futile sources, and let them rest: one without end beside others would hide that those have stalled."""
+    if not core.futile and all(_works_for_somebody(one) for one in core.sources):
+        return  # as mostly
+    core.futile = _for_nobody([one for one in core.sources if not one.blocked & (ENDED | DISABLED)])
+    resting = _holding_nobody_up(core.futile)
     for source in core.sources:
-        if core.futile and source in left:
-            if not source.blocked & FUTILE:
-                source.block(FUTILE)
-        else:
+        if source not in resting:
             unblock(source, FUTILE)
+        elif not source.blocked & FUTILE:
+            source.block(FUTILE)
 
 
 def _works_for_somebody(source: Worker) -> bool:
-    """Whether it is left and works for one that has not ended and is no source itself."""
-    return not source.blocked & (ENDED | DISABLED | RESTING) and any(
+    """Whether it is over itself, or works for one that has not ended and is no source itself."""
+    return bool(source.blocked & (ENDED | DISABLED)) or any(
         not edge.joins() or not (edge.target.blocked & ENDED or edge.target.is_source)
         for edge in source.all_out_edges()
     )
@@ -48,6 +47,18 @@ def _for_nobody(sources: Collection[Worker]) -> set[Worker]:
 def _feeds_only(source: Worker, given_up: Collection[Worker]) -> bool:
     edges = list(source.all_out_edges())
     return bool(edges) and all(edge.joins() and (_is_over(edge.target) or edge.target in given_up) for edge in edges)
+
+
+def _holding_nobody_up(futile: Collection[Worker]) -> set[Worker]:
+    """Those to whom nothing more comes, but from others of them; who feeds one of the rest may work for others, too."""
+    found = set(futile)
+    while fed := {source for source in found if any(_still_comes(edge.source, found) for edge in source.in_edges)}:
+        found -= fed
+    return found
+
+
+def _still_comes(sender: Worker, resting: Collection[Worker]) -> bool:
+    return sender not in resting and not sender.blocked & DISABLED and not _is_over(sender)
 
 
 def _is_over(worker: Worker) -> bool:
