@@ -1,4 +1,4 @@
-"""`hfg convert TARGET OUT`: writes a graph as a file, or the schema of such files.
+"""`hfg convert TARGET OUT`: writes a graph, or a file of CS::APEX, as a graph file, or the schema of such files.
 
 Stands on `target`, `show` and the files' floor.
 """
@@ -13,9 +13,9 @@ import typer
 
 from hfg.cli import completing, show
 from hfg.cli.options import AllowOption, ArgOption
-from hfg.cli.target import load_graph
+from hfg.cli.target import SUFFIXES, load_graph
 from hfg.errors import TargetError, UsageError
-from hfg.files import describe, save, schema, text_of
+from hfg.files import apex, describe, save, schema, text_of, write
 
 __all__ = ["convert"]
 
@@ -23,7 +23,9 @@ __all__ = ["convert"]
 def convert(
     target: Annotated[
         str | None,
-        typer.Argument(help="module:graph, file.py, file.py:graph or file.hfg.yaml", autocompletion=completing.targets),
+        typer.Argument(
+            help="module:graph, file.py, file.py:graph, file.hfg.yaml or file.apex", autocompletion=completing.targets
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Argument(help="a file that ends in .hfg.yaml; without it, standard output")
@@ -33,9 +35,15 @@ def convert(
     json_schema: Annotated[
         bool, typer.Option("--schema", help="Write the JSON schema of graph files, for editors, instead of a graph.")
     ] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Of a file of CS::APEX: write what became of each part as JSON.")
+    ] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
-    """Write a graph as a graph file; what no file can say is told, all of it, and then nothing is written."""
+    """Write a graph as a graph file; what no file can say is told, all of it, and then nothing is written.
+
+    Of a file of CS::APEX it is told what is mapped, approximated and missing.
+    """
     show.set_debug(debug)
     if json_schema:
         if out is not None:
@@ -43,6 +51,10 @@ def convert(
         return _write_schema(target)
     if target is None:
         raise TargetError("there is no TARGET: write hfg convert graph.py graph.hfg.yaml")
+    if target.endswith(SUFFIXES):
+        return _import_apex(target, out, json)
+    if json:
+        raise TargetError("--json tells what became of a file of CS::APEX; leave it out")
     graph = load_graph(target, arg or [], allow)
     if out is None:
         sys.stdout.write(text_of(describe(graph, beside=Path("graph.hfg.yaml"))))
@@ -52,6 +64,24 @@ def convert(
     except UsageError as error:
         show.sentence(str(error))
         return 2
+    return 0
+
+
+def _import_apex(target: str, out: Path | None, json: bool) -> int:
+    """Without OUT the document is the output, the report goes to standard error; with --json that is the output."""
+    document, report = apex.read(target)
+    try:
+        if out is not None:
+            write(document, out)
+        elif not json:
+            sys.stdout.write(text_of(document))
+    except UsageError as error:
+        show.sentence(str(error))
+        return 2
+    if json:
+        show.json(report)
+    else:
+        (sys.stderr if out is None else sys.stdout).write(f"{report}\n")
     return 0
 
 

@@ -35,7 +35,10 @@ def _not_negative(seconds: float | None) -> float | None:
 
 
 TargetArgument = Annotated[
-    str, typer.Argument(help="module:graph, file.py, file.py:graph or file.hfg.yaml", autocompletion=completing.targets)
+    str,
+    typer.Argument(
+        help="module:graph, file.py, file.py:graph, file.hfg.yaml or file.apex", autocompletion=completing.targets
+    ),
 ]
 ClockOption = Annotated[Clock, typer.Option(help="virtual: as fast as the machine can, the same each time.")]
 UntilOption = Annotated[

@@ -1,6 +1,7 @@
-"""Finds what TARGET names: `module:graph`, `file.py`, `file.py:graph` (a graph or what makes one), `file.hfg.yaml`.
+"""Finds what TARGET names: a graph, or what makes one, in a module or Python file, or a file that says a graph.
 
-The file or module is imported as Python itself would import it. Stands on `arguments` and the graph floor.
+That is `module:graph`, `file.py`, `file.py:graph`, `file.hfg.yaml` or `file.apex`. A file or module is imported as
+Python itself would import it. Stands on `arguments`, the files' floor and the graph floor.
 """
 
 from __future__ import annotations
@@ -13,16 +14,19 @@ import typing
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Final
 
 from hfg.cli.arguments import builder_arguments
 from hfg.errors import TargetError, in_words
-from hfg.files import load
+from hfg.files import apex, load
 from hfg.functions import NodeFunction
 from hfg.graph import Graph
 from hfg.nodetype import Node
 
-__all__ = ["import_from_here", "load_graph", "load_module"]
+__all__ = ["SUFFIXES", "import_from_here", "load_graph", "load_module"]
+
+SUFFIXES: Final = (".apex", ".apexs")
+"""Of files of CS::APEX."""
 
 
 def load_graph(target: str, given: Sequence[str] = (), allow: Sequence[str] | None = None) -> Graph:
@@ -42,6 +46,11 @@ def load_graph(target: str, given: Sequence[str] = (), allow: Sequence[str] | No
         if given:
             raise TargetError(f"{target} is a graph file, no function, so --arg {given[0]} means nothing to it")
         return load(target, allow=allow or ())
+    if target.endswith(SUFFIXES):
+        for option, values in (("--arg", given), ("--allow", allow)):
+            if values:
+                raise TargetError(f"{target} is a file of CS::APEX, so {option} {values[0]} means nothing to it")
+        return apex.load(target)
     if allow:
         raise TargetError(
             f"{target} is code, which imports what it likes, so --allow {allow[0]} means nothing to it; leave it out"

@@ -7,7 +7,7 @@
     document      what a file says, as structs schema        the same as a JSON schema
     boxes         types of subgraphs           missing       stands in for types that are not there
     allowed       what may be imported         values        parameters as plain data
-    findings      what is wrong, where
+    findings      what is wrong, where              apex           files of CS::APEX
 
 Text, document and graph are three things: what reads another format makes a document and goes on from there.
 """

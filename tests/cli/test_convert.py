@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from hfg.files import schema
@@ -51,6 +52,48 @@ def test_the_schema_is_written(command: Command) -> None:
     ],
 )
 def test_wrong_uses_get_one_sentence(arguments: list[str], sentence: str, command: Command) -> None:
+    shown = command(*arguments)
+    assert shown.code == 2
+    assert sentence in shown.err
+    assert shown.err.count("\n") == 1
+
+
+APEX = """#!/usr/bin/csapex
+nodes:
+  - {type: 'csapex::IntRangeGenerator', uuid: 'csapex::IntRangeGenerator_0'}
+  - {type: 'csapex::CountMessages', uuid: 'csapex::CountMessages_0'}
+connections:
+  - {uuid: 'csapex::IntRangeGenerator_0:|:out_0', targets: ['csapex::CountMessages_0:|:in_0']}
+"""
+
+
+def test_a_file_of_csapex_becomes_a_graph_file_with_a_report(command: Command) -> None:
+    Path("count.apex").write_text(APEX)
+    shown = command("convert", "count.apex", "count.hfg.yaml")
+    assert shown.code == 0
+    assert shown.out.startswith("count.apex: 2 nodes, 1 connection, no notes\n  mapped: no nodes, 1 connection\n")
+    assert "type: hfg.nodes.flow:Count\n" in Path("count.hfg.yaml").read_text()
+    without = command("convert", "count.apex")
+    assert (without.out, without.err) == (Path("count.hfg.yaml").read_text(), shown.out)
+    report = msgspec.json.decode(command("convert", "count.apex", "--json").out)
+    assert [one["state"] for one in report["nodes"]] == ["approximated", "approximated"]
+    assert report["connections"][0]["target"] == "IntRangeGenerator_0.out -> CountMessages_0.value"
+    for target in ("count.apex", "count.hfg.yaml"):
+        assert command("check", target).code == 0
+        assert command("run", target, "--clock", "virtual").code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["run", "count.apex", "--arg", "a=1"], "count.apex is a file of CS::APEX, so --arg a=1 means nothing to it"),
+        (["run", "lost.apex"], "lost.apex: there is no such file"),
+        (["convert", "steps.py:build", "--json"], "--json tells what became of a file of CS::APEX; leave it out"),
+        (["convert", "count.apex", "count.yaml"], "count.yaml is no name of a graph file; call it count.hfg.yaml"),
+    ],
+)
+def test_wrong_uses_of_files_of_csapex_get_one_sentence(arguments: list[str], sentence: str, command: Command) -> None:
+    Path("count.apex").write_text(APEX)
     shown = command(*arguments)
     assert shown.code == 2
     assert sentence in shown.err
