@@ -29,7 +29,7 @@ _OF_PORTS: Final = (*_COUNTS, "input names", "output names", "slot names", "even
 _ITERATION: Final = ("iterate_containers", "iterated_containers")
 _NO_VALUE: Final = ("trigger", "progress", "null", "text", "output_progress", "output_text")
 _RELEASE: Final = {0: "pipelined", 1: "sequential"}
-_DRAWN: Final = ("z", "minimized", "flipped", "logger_level", "dict")
+_DRAWN: Final[dict[str, Any]] = {"z": 0, "minimized": False, "flipped": False, "logger_level": 1, "dict": []}
 _ROOT_SOURCES: Final = {"event_activation": "start"}
 _ROOT_TARGETS: Final = {"slot_exit": "stop", "slot_abort": "abort"}
 _ANY: Final = "Any"
@@ -76,6 +76,10 @@ class _Converting:
     def convert(self) -> tuple[Document, ConversionReport]:
         if self.file.description:
             self.document.notes["description"] = self.file.description
+        said = self.file.rest.get("tags")
+        tags = [one for one in said if one] if isinstance(said, list) else []  # empty ones are added at each save
+        if tags:
+            self.document.notes["tags"] = tags
         self.threads()
         self.level(self.file.graph, self.document, "", None)
         self.old = not self.file.is_new and not any(self.counts_automatic(level) for level in self.levels)
@@ -224,8 +228,8 @@ class _Converting:
             made.notes["label"] = node.label
         if node.colour is not None:
             made.notes["colour"] = node.colour
-        drawn = {key: node.raw[key] for key in _DRAWN if node.raw.get(key) not in (None, False, [], 1, 0)}
-        if drawn and node.kind not in (_NOTE,):
+        drawn = {key: node.raw[key] for key, usual in _DRAWN.items() if node.raw.get(key) not in (None, usual)}
+        if drawn:
             made.notes["drawn"] = drawn
         if node.muted:
             made.notes["muted"] = True

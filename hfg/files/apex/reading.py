@@ -19,7 +19,7 @@ __all__ = ["SEPARATOR", "SUFFIXES", "read_file"]
 SUFFIXES: Final = (".apex", ".apexs")
 SEPARATOR: Final = ":|:"
 
-_HANDLED: Final = ("nodes", "connections", "fulcrums", "threads", "version", "name", "description")
+_HANDLED: Final = ("nodes", "connections", "fulcrums", "threads", "version", "name", "description", "yaml")
 _NUMBER: Final = (int, float)
 _NO_VALUE: Final = ("trigger", "progress", "null", "text", "output_progress", "output_text")
 _VALUES: Final[tuple[str, ...]] = ("int", "double", "bool", "string", "long")
@@ -84,7 +84,7 @@ class _Reader:
                 setattr(found, key, top[key].value.strip())
         self.threads(inner.get("threads"), found)
         found.is_new = self.is_new
-        found.rest = {key: plain(one) for key, one in inner.items() if key not in _HANDLED}
+        found.rest = {key: plain(one) for key, one in (top | inner).items() if key not in _HANDLED}
         return found
 
     def version(self, said: Located | None) -> None:
