@@ -322,19 +322,23 @@ class Replay:
         for move in moves:  # steps of which nothing was seen
             if move.kind == "timer" and not (move.node and self.machine.times_out(self.machine.paths[move.node])):
                 return move
+            if move.kind == "go on" and isinstance(event, QueueGrown):  # a firing that is over waits for its turn (F14)
+                return move
         return None
 
-    def _strangeness(self, move: Move, event: TraceEvent) -> tuple[bool, bool]:
+    def _strangeness(self, move: Move, event: TraceEvent) -> tuple[bool, bool, bool]:
         """Of several firings of one node (F14) the step of which is least likely to be behind the event.
 
-        Signals have the stamp of their firing (T5); what is told of the end of one names it.
+        Signals have the stamp of their firing (T5); what is told of the end of one names it. The code of a run begins
+        with its firing, so a first step comes before the next of those that have waited.
         """
         if not move.number:
-            return False, False
+            return False, False, False
         flight = self.machine.under_way(move)
         number = getattr(event, "number", flight.number)
         token = getattr(event, "token", None)
-        return number != flight.number, token is not None and abs(token.stamp - flight.stamp) > _SAME_TIME
+        other = token is not None and abs(token.stamp - flight.stamp) > _SAME_TIME
+        return number != flight.number, other, flight.stepped
 
     def _source_of(self, label: str) -> str:
         return self.machine.path_of(self.machine.labels[label].edge.source.owner)

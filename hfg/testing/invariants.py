@@ -8,7 +8,7 @@ from __future__ import annotations
 import inspect
 import traceback
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -38,6 +38,7 @@ __all__ = [
     "Invariant",
     "activity_changes_alternate",
     "activity_is_carried",
+    "as_many_firings_as_allowed",
     "broken",
     "ended_nodes_rest",
     "modifiers_fit",
@@ -166,15 +167,45 @@ def activity_is_carried(active_edges: Iterable[str]) -> Invariant:
 
 def one_thing_at_a_time(events: list[TraceEvent]) -> list[str]:
     """Firings and calls of one node never overlap (F9)."""
-    busy: dict[str, str] = {}
+    return _overlaps(events, {})
+
+
+def as_many_firings_as_allowed(concurrency: Mapping[str, int]) -> Invariant:
+    """Make the invariant that nodes do one thing at a time (F9), but for those that may have several firings (F14).
+
+    Their calls wait for no firing, but for each other, and no firing begins during a call.
+
+    Args:
+      concurrency: how many firings of a node may be under way at once, by its path; 1 for all others.
+    """
+    several = dict(concurrency)
+
+    def within_limits(events: list[TraceEvent]) -> list[str]:
+        return _overlaps(events, several)
+
+    return within_limits
+
+
+def _overlaps(events: list[TraceEvent], concurrency: Mapping[str, int]) -> list[str]:
+    calls: dict[str, str] = {}
+    firings: dict[str, dict[int, str]] = defaultdict(dict)
     found = []
     for event in events:
         if isinstance(event, FiringStarted | CallStarted) and event.node:
-            if event.node in busy:
-                found.append(f'"{event.node}" began {_name(event)} during {busy[event.node]}')
-            busy[event.node] = _name(event)
-        elif isinstance(event, FiringEnded | CallEnded):
-            busy.pop(event.node, None)
+            most = concurrency.get(event.node, 1)
+            amid = [calls[event.node]] if event.node in calls else []
+            if len(firings[event.node]) >= most and (isinstance(event, FiringStarted) or most == 1):
+                amid += firings[event.node].values()
+            if amid:
+                found.append(f'"{event.node}" began {_name(event)} during {", ".join(amid)}')
+            if isinstance(event, FiringStarted):
+                firings[event.node][event.number] = _name(event)
+            else:
+                calls[event.node] = _name(event)
+        elif isinstance(event, FiringEnded):
+            firings[event.node].pop(event.number, None)
+        elif isinstance(event, CallEnded):
+            calls.pop(event.node, None)
     return found
 
 
@@ -225,7 +256,7 @@ ALL: Final[tuple[Invariant, ...]] = (
 
 def of_graph(graph: Any) -> list[Invariant]:
     """Give all invariants, those included that ask which edges are active or synchronous."""
-    from hfg.testing.reference.structure import dissolve
+    from hfg.testing.reference.structure import dissolve, whole
 
     edges = dissolve(graph).edges
     synchronous = [
@@ -233,7 +264,13 @@ def of_graph(graph: Any) -> list[Invariant]:
         for edge in edges
         if not edge.is_event and not edge.initial and not edge.buffer and edge.target.owner != -1
     ]
-    return [*ALL, one_unprocessed_token(synchronous), activity_is_carried(edge.label for edge in edges if edge.active)]
+    several = {leaf.path: leaf.options.concurrency for leaf in whole(graph).leaves}
+    return [
+        *(invariant for invariant in ALL if invariant is not one_thing_at_a_time),
+        as_many_firings_as_allowed(several),
+        one_unprocessed_token(synchronous),
+        activity_is_carried(edge.label for edge in edges if edge.active),
+    ]
 
 
 def broken(events: list[TraceEvent], invariants: Iterable[Invariant] = ALL) -> list[str]:

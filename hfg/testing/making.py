@@ -535,12 +535,12 @@ def make_plan(choose: Chooser, allowed: Allowed | None = None) -> GraphPlan:
     making = _Making(choose, allowed)
     making.make_nodes()
     making.make_edges()
-    if making.allowed.concurrency:
-        making.make_concurrent()
     boxes = making.make_boxes() if allowed.boxes else []
     gates = making.make_gates() if allowed.gates else []
     if allowed.box_ports:
         boxes, gates = making.mean_boxes(boxes, gates)
+    if allowed.concurrency:
+        making.make_concurrent()
     groups = ("left", "right") if allowed.threads else ()
     feeds = tuple(name for name in FEEDS if any(edge.source == ("", "output", name) for edge in making.edges))
     return GraphPlan(tuple(making.nodes), tuple(making.edges), tuple(boxes), tuple(gates), groups, feeds)

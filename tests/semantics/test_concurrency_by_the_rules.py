@@ -590,3 +590,16 @@ def with_ready() -> hfg.Graph:
 def test_it_has_no_active_edge_and_no_ready(build: Any) -> None:
     with pytest.raises(hfg.errors.GraphError, match=r"concurrency"):
         hfg.run(build(), clock="virtual")
+
+
+@pytest.mark.rule("F14", "R5")
+def test_firings_that_wait_for_a_place_that_never_comes_are_no_work_under_way(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        asks, never = graph.add(slow_double(), concurrency=2), graph.add(add(), name="never")
+        graph.connect(graph.add(script(values=(1, 2, 3))).out, asks.value)
+        graph.connect(asks.out, never.a)
+        return graph
+
+    found = perform(build, lambda seen: (seen.outcome, seen.values("slow_double.out -> never.a")))
+    assert found == ("stalled", [2])

@@ -5,6 +5,7 @@ A failure prints the smallest graph found, as a program. `test_soak.py` does the
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -21,6 +22,7 @@ from hfg.testing.shrinking import shrink
 
 MOST_MOVES = 1500
 EVERYTHING = Allowed()
+SEVERAL_AT_ONCE = Allowed(concurrency=True, disabling=False)
 THREADS = Allowed(threads=True, lossy=False, gates=False)
 
 
@@ -78,6 +80,19 @@ def test_so_it_does_with_all_in_which_something_was_wrong_once(block: int) -> No
         plan = random_plan(seed, WIDE)
         if reference(plan, seed) is not None:
             check(plan, seed)
+
+
+def has_several_at_once(plan: GraphPlan) -> bool:
+    return any("concurrency" in node.options for node in plan.nodes)
+
+
+@pytest.mark.rule("F14", "F9")
+def test_so_it_does_with_several_firings_of_a_node_at_once() -> None:
+    """Nothing is reset here: with firings under way the engine ends that call behind them, the oracle at once."""
+    drawn = ((seed, random_plan(seed, SEVERAL_AT_ONCE)) for seed in itertools.count())
+    chosen = ((seed, plan) for seed, plan in drawn if has_several_at_once(plan) and reference(plan, seed) is not None)
+    for seed, plan in itertools.islice(chosen, 60):
+        check(plan, seed)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

@@ -297,8 +297,9 @@ class ReferenceMachine(Editing):
         if line is not None:
             return [Move("grow", edge=line.edge.label)]
         busy = any(
-            station.flights and (index not in moot or station.is_calling) for index, station in enumerate(self.stations)
-        )
+            any(flight.over is None for flight in station.flights) and (index not in moot or station.is_calling)
+            for index, station in enumerate(self.stations)
+        )  # but not what is over and waits for its turn behind a token that nobody takes (F14)
         return [] if busy or self.held_open else [self.closing_move()]
 
     def closing_move(self) -> Move:

@@ -182,6 +182,7 @@ class RunningCode(Sending):
                 flight.in_thread = False
                 self.land(flight, flight.result, flight.error)
             return
+        flight.stepped = True
         with self.amid_code(flight):
             self.loop.step(flight)
         if flight.task.done() and flight.then is not None:

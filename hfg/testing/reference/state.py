@@ -85,6 +85,7 @@ class Flight:
     in_thread: bool = False
     signals: list[tuple[str, Any, int | None, float | None]] = field(default_factory=list)
     task: Any = None
+    stepped: bool = False  # its code has begun
     then: Callable[[Any, BaseException | None], None] | None = None  # what happens with the result
     result: Any = None
     error: BaseException | None = None
