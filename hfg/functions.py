@@ -31,7 +31,7 @@ from hfg.signature import CallPlan, Signature, read_signature
 from hfg.types import describe
 from hfg.vectors import list_of, size_parameters, vector_specs
 
-__all__ = ["FunctionNode", "NodeFunction", "node"]
+__all__ = ["FunctionNode", "NodeFunction", "make_type", "node"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -195,16 +195,17 @@ def node(
     caller = sys._getframe(1)
     while caller.f_globals.get("__name__") == "functools" and caller.f_back is not None:
         caller = caller.f_back
-    return _make(function, inputs, outputs, parameters, caller.f_globals.get("__name__", "__main__"))
+    return make_type(function, caller.f_globals.get("__name__", "__main__"), inputs, outputs, parameters)
 
 
-def _make(
+def make_type(
     function: Callable[..., Any],
-    inputs: Mapping[str, Any] | None,
-    outputs: Any,
-    parameters: Mapping[str, Any] | None,
     module: str,
+    inputs: Mapping[str, Any] | None = None,
+    outputs: Any = None,
+    parameters: Mapping[str, Any] | None = None,
 ) -> NodeFunction[..., Any]:
+    """Make a node type that belongs to a module, as `node` does for the module that calls it."""
     name = function_name(function)
     where = f"node type {name}"
     declared = _declared_vectors(where, inputs, outputs)

@@ -35,6 +35,8 @@ __all__ = [
     "Labels",
     "Mask",
     "Matrix",
+    "OneOf",
+    "Picture",
     "Points",
     "Rows",
     "describe_arrays",
@@ -58,6 +60,34 @@ class Rows(Shape):
     def shapes(self) -> tuple[tuple[int | None, ...], ...]:
         """Give every allowed shape, `None` for an axis of any length."""
         return tuple(shape for count in self.axes for shape in ((None, count), (None, 1, count)))
+
+
+class OneOf(Shape):
+    """Metadata of an array of one of several shapes.
+
+    Example:
+      >>> OneOf((3,), (3, 1)).accepts((3, 1)), OneOf((3,), (3, 1)).accepts((1, 3))
+      (True, False)
+    """
+
+    __slots__ = ("allowed",)
+
+    def __init__(self, *allowed: tuple[int | None, ...]) -> None:
+        super().__init__()
+        self.allowed = allowed
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, OneOf) and other.allowed == self.allowed
+
+    def __hash__(self) -> int:
+        return hash((OneOf, self.allowed))
+
+    def __repr__(self) -> str:
+        return f"OneOf({', '.join(map(str, self.allowed))})"
+
+    def shapes(self) -> tuple[tuple[int | None, ...], ...]:
+        """Give every allowed shape, `None` for an axis of any length."""
+        return self.allowed
 
 
 if TYPE_CHECKING:
@@ -93,6 +123,9 @@ Color: TypeAlias = Annotated[_Uint8, Pixels(3), Named("Color")]
 
 ColorAlpha: TypeAlias = Annotated[_Uint8, Pixels(4), Named("ColorAlpha")]
 """An image of 8 bits and four channels: blue, green, red and how opaque it is."""
+
+Picture: TypeAlias = Annotated[_Uint8, Pixels(1, 3, 4), Named("Picture")]
+"""An image of 8 bits that people can look at: gray, in colour, or with opacity."""
 
 Mask: TypeAlias = Annotated[_Uint8, Pixels(1), Named("Mask")]
 """Which pixels count: 0 is out, anything else is in, and 255 what is written for it. Any `Gray` image will do."""
@@ -150,7 +183,7 @@ def _shapes_in_words(hint: Any, shapes: tuple[tuple[int | None, ...], ...]) -> s
         counts = sorted({shape[2] for shape in shapes if len(shape) == 3 and shape[2] is not None})
         if counts == [1]:
             return _LETTERS[2]
-        channels = f"{counts[0]} to {counts[-1]}" if len(counts) > 2 else " or ".join(map(str, counts))
+        channels = "1 to 4" if counts == [1, 2, 3, 4] else " or ".join(map(str, counts))
         long = _LETTERS[3].format(channels)
         return f"{_LETTERS[2]}, or {long}" if 1 in counts else long
     return ", ".join(" x ".join("any" if axis is None else str(axis) for axis in shape) for shape in shapes)

@@ -588,6 +588,9 @@ def _words(hint: Any) -> str:
         return "Array" if dtype is Any else f"Array[{describe(dtype)}]"
     if typing.get_origin(hint) is Annotated:
         return describe(typing.get_args(hint)[0])
-    if typing.get_origin(hint) is None and isinstance(hint, type):
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is None and isinstance(hint, type):
         return hint.__name__
+    if isinstance(origin, type) and origin is not _CALLABLE and arguments:
+        return f"{origin.__name__}[{', '.join('...' if one is ... else describe(one) for one in arguments)}]"
     return str(hint).replace("typing.", "").replace("collections.abc.", "")

@@ -11,7 +11,7 @@ from hfg.catalogue import Catalogue, installed, undocumented
 from hfg.catalogue.offers import Offer
 from hfg.testing.usable import try_all
 
-NEEDS_HARDWARE: set[str] = set()
+NEEDS_HARDWARE = {"hfg.nodes.video:Camera", "hfg.nodes.video:Screenshot", "hfg.nodes.video:VideoFile"}
 """What cannot work without a thing that a test has not."""
 
 
@@ -26,8 +26,11 @@ def test_every_module_of_the_library_can_be_imported(library: Catalogue) -> None
 
 @pytest.mark.timeout(300)
 def test_every_type_fires_with_what_it_declares(library: Catalogue) -> None:
-    trials = try_all(one.reference for one in library.types)
-    assert len(trials) == len(library.types) > 0
+    """Of OpenCV's functions every tenth; all take five minutes: python -m hfg.testing.usable hfg.nodes.cv."""
+    generated = [one for one in library.types if one.module == "hfg.nodes.cv"]
+    chosen = [one for one in library.types if one not in generated or generated.index(one) % 10 == 0]
+    trials = try_all(one.reference for one in chosen)
+    assert len(trials) == len(chosen) > len(library.types) / 2
     faults = [trial.fault for trial in trials if not trial.usable and trial.reference not in NEEDS_HARDWARE]
     assert not faults, "\n".join(faults)
 

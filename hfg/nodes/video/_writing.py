@@ -1,0 +1,139 @@
+"""A sink that writes a video file."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+from annotated_types import Interval
+
+from hfg.images import Picture
+from hfg.nodes._pictures import colour, need_picture
+from hfg.nodetype import Node
+from hfg.ports import Event, Input, Parameter, State, slot
+
+__all__ = ["WriteVideo"]
+
+
+class WriteVideo(Node):
+    """Write pictures into a video file.
+
+    The file is there as a whole or not at all: pictures go into a temporary file beside it, which takes its name when
+    the stream ends, the run is over or `finish` is called. What stood there before stays until then. Without a picture
+    nothing is written. After `finish` the next picture begins another video, which takes the place of the first unless
+    `path` was changed.
+
+    Attributes:
+      path: the file; its folder is there.
+      codec: how pictures are packed: "MJPG" and "XVID" for .avi, "mp4v" for .mp4.
+      fps: pictures per second that players show.
+      width: in pixels; pictures are scaled to it. 0 takes that of the first picture.
+      height: in pixels; pictures are scaled to it. 0 takes that of the first picture.
+      image: the picture, gray or blue, green, red; all of one size unless width and height are given.
+      finish: close the video and give it its name.
+      clear: throw away what was written since the last video.
+      written: the path of a video that is complete.
+
+    Raises:
+      FileNotFoundError: there is no such folder.
+      ValueError: a picture has another size than the first, or OpenCV does not write such a file.
+
+    CS::APEX: csapex::MakeVideo.
+    """
+
+    path = Parameter("", save=True)
+    codec = Parameter("MJPG", type=Literal["MJPG", "XVID", "mp4v", "FFV1"])
+    fps = Parameter(25.0, Interval(gt=0, le=1000), unit="1/s")
+    width = Parameter(0, Interval(ge=0, le=16384), unit="px")
+    height = Parameter(0, Interval(ge=0, le=16384), unit="px")
+    image = Input(Picture)
+    written = Event(str)
+
+    writer: State[Any] = State(None)
+    temporary: State[str | None] = State(None)
+    target = State("")
+    size = State((0, 0))
+
+    def setup(self) -> None:
+        """See that a file can be written there before the first picture comes."""
+        if not self.path:
+            raise FileNotFoundError('no video is named: set path, as in WriteVideo(path="people.avi")')
+        self._folder()
+
+    def _folder(self) -> Path:
+        folder = Path(self.path).absolute().parent
+        if not folder.is_dir():
+            raise FileNotFoundError(f'there is no folder "{folder}" for the video "{self.path}": make it, or mend path')
+        return folder
+
+    def process(self, image: Picture) -> None:
+        """Append the picture."""
+        need_picture(self, image)
+        shape = (self.width or image.shape[1], self.height or image.shape[0])
+        if self.writer is None:
+            self._begin(shape)
+        if shape != self.size:
+            raise ValueError(
+                f'the video "{self.target}" has pictures of {self.size[0]} x {self.size[1]} pixels, got one of '
+                f"{shape[0]} x {shape[1]}: scale it, or set width and height"
+            )
+        if (image.shape[1], image.shape[0]) != self.size:
+            self.writer.write(cv2.resize(colour(image), self.size))
+        else:
+            self.writer.write(colour(image))
+
+    def _begin(self, size: tuple[int, int]) -> None:
+        target = Path(self.path).absolute()
+        handle, temporary = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem}-", dir=self._folder())
+        os.close(handle)
+        writer = cv2.VideoWriter(temporary, cv2.VideoWriter.fourcc(*self.codec), self.fps, size)
+        if not writer.isOpened():
+            Path(temporary).unlink()
+            raise ValueError(
+                f'OpenCV does not write "{self.path}" with the codec {self.codec}: take "MJPG" and a name that ends '
+                "with .avi"
+            )
+        self.writer, self.temporary, self.target, self.size = writer, temporary, str(target), size
+
+    @slot
+    def finish(self) -> None:
+        """Close the video and give it its name."""
+        self._complete()
+
+    @slot
+    def clear(self) -> None:
+        """Throw away what was written since the last video."""
+        if self.writer is not None:
+            self.writer.release()
+            Path(str(self.temporary)).unlink(missing_ok=True)
+            self.writer = self.temporary = None
+
+    def _close(self) -> str:
+        self.writer.release()
+        Path(str(self.temporary)).chmod(0o666 & ~_umask())
+        Path(str(self.temporary)).replace(self.target)
+        self.writer = self.temporary = None
+        return self.target
+
+    def end(self) -> None:
+        """The stream is over, so the video is complete."""
+        self._complete()
+
+    def _complete(self) -> None:
+        if self.writer is not None:
+            self.written.trigger(self._close())
+
+    def teardown(self) -> None:
+        """Give what was written its name, also if the run failed: every picture in it is whole."""
+        if self.writer is not None:
+            self._close()
+
+
+def _umask() -> int:
+    """Give the rights that new files lack; a temporary file is for its owner alone."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,43 @@
+"""What is found in pictures: people, faces, bar codes, markers, chessboards, keypoints, depth.
+
+These are OpenCV's objects: each keeps a detector or a matcher that is costly to make. `hfg.nodes.cv` has its functions.
+
+    _detecting     PeopleDetector, CascadeDetector, BarcodeReader, MarkerDetector, ChessboardFinder, qr_code
+    _keypoints     KeypointDetector, match_descriptors
+    _depth         StereoDepth, CameraCalibration
+    _improving     EqualizeLocally
+"""
+
+from __future__ import annotations
+
+from hfg.nodes._extras import require
+
+require("cv2", "vision")  # before the modules that import it
+
+# isort: split
+from hfg.nodes.vision._depth import Calibration, CameraCalibration, StereoDepth  # noqa: E402
+from hfg.nodes.vision._detecting import (  # noqa: E402
+    BarcodeReader,
+    CascadeDetector,
+    ChessboardFinder,
+    MarkerDetector,
+    PeopleDetector,
+    qr_code,
+)
+from hfg.nodes.vision._improving import EqualizeLocally  # noqa: E402
+from hfg.nodes.vision._keypoints import KeypointDetector, match_descriptors  # noqa: E402
+
+__all__ = [
+    "BarcodeReader",
+    "Calibration",
+    "CameraCalibration",
+    "CascadeDetector",
+    "ChessboardFinder",
+    "EqualizeLocally",
+    "KeypointDetector",
+    "MarkerDetector",
+    "PeopleDetector",
+    "StereoDepth",
+    "match_descriptors",
+    "qr_code",
+]

@@ -1,0 +1,425 @@
+"""The family `cv`: OpenCV's functions as nodes."""
+
+from __future__ import annotations
+
+import functools
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import hfg
+from hfg import images, registry
+from hfg.catalogue import describe_type, undocumented
+from hfg.nodes import cv
+from hfg.nodes.cv import _docs, _overrides, _recipes, _stub
+from hfg.ports.specs import REQUIRED
+from hfg.testing import fire
+from hfg.types import compatible, describe
+from hfg.values import Colour
+from tests.nodes.cv_samples import PARAMETERS, picture, sample
+
+TABLE = Path(cv.__file__).with_name("_measured.json")
+ALL = tuple(_recipes.names())
+BELOW = (0, 0, 255)
+
+
+def test_there_are_more_than_two_hundred_types_and_none_is_without_a_category() -> None:
+    assert len(ALL) > 220
+    grouped = cv.categories()
+    assert sorted(name for names in grouped.values() for name in names) == sorted(ALL)
+    assert "other" not in grouped
+    assert {
+        "filter",
+        "geometry",
+        "colour",
+        "features",
+        "drawing",
+        "morphology",
+        "histogram",
+        "calibration",
+        "motion",
+    } <= set(grouped)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_type_says_what_it_does_and_what_each_port_and_parameter_means(name: str) -> None:
+    described = describe_type(getattr(cv, name))
+    assert undocumented(described) == []
+    assert described.reference == f"hfg.nodes.cv:{name}"
+    assert described.category.startswith("cv ")
+    assert {error.name for error in described.errors} == {"TypeError", "ValueError"}
+
+
+def test_what_is_no_node_says_why() -> None:
+    reasons = cv.not_nodes()
+    assert not set(reasons) & set(_recipes.names().values())
+    assert reasons["imshow"] == "it needs a window: hfg.nodes.display shows pictures"
+    assert reasons["getTickCount"] == "it takes no array, so it would be a source without end"
+    with pytest.raises(AttributeError, match="cv2.imshow is no node: it needs a window"):
+        _ = cv.imshow
+    with pytest.raises(AttributeError, match="has no attribute 'gausian_blur'$"):
+        _ = cv.gausian_blur
+
+
+def test_no_override_speaks_of_what_is_not_there() -> None:
+    """A word that OpenCV does not know would be silently without effect."""
+    for name, said in _overrides.FUNCTIONS.items():
+        arguments = {one.name for overload in _stub.overloads()[name] for one in overload.arguments}
+        unknown = set(said) - arguments
+        assert not unknown or name in ("dilate", "erode", "fastNlMeansDenoisingMulti"), f"{name}: {unknown}"
+
+
+# --- names and references ---
+
+
+def test_the_name_in_opencv_is_understood_too() -> None:
+    assert cv.GaussianBlur is cv.gaussian_blur
+    assert "gaussian_blur" in dir(cv)
+
+
+@pytest.mark.parametrize(
+    ("theirs", "ours"),
+    [
+        ("GaussianBlur", "gaussian_blur"),
+        ("filter2D", "filter_2d"),
+        ("solvePnP", "solve_pnp"),
+        ("HoughLinesP", "hough_lines_p"),
+        ("getAffineTransform", "get_affine_transform"),
+        ("reprojectImageTo3D", "reproject_image_to_3d"),
+        ("LUT", "lut"),
+    ],
+)
+def test_names_are_in_snake_case(theirs: str, ours: str) -> None:
+    assert _recipes.names()[ours] == theirs
+
+
+def test_a_type_is_found_by_its_reference_in_another_process() -> None:
+    program = (
+        "from hfg import registry; kind = registry.find('hfg.nodes.cv:gaussian_blur'); "
+        "print(registry.reference_of(kind), kind(ksize=(7, 7)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split(" ", 1)[0] == registry.reference_of(cv.gaussian_blur) == "hfg.nodes.cv:gaussian_blur"
+    assert "ksize=(7, 7)" in done.stdout
+
+
+def test_a_copied_graph_has_the_same_types_and_parameters() -> None:
+    graph = hfg.Graph("pictures")
+    graph.add(cv.gaussian_blur(ksize=(7, 7), border_type="REFLECT"), name="blur")
+    again = hfg.Graph("again")
+    again.edit(*graph.as_commands())
+    assert repr(again.nodes["blur"]) == repr(graph.nodes["blur"])
+    assert "border_type='REFLECT'" in repr(again.nodes["blur"])
+
+
+# --- values ---
+
+
+def test_a_picture_comes_out_as_opencv_makes_it() -> None:
+    image = picture("uint8", 3)
+    out = fire(cv.gaussian_blur(ksize=(5, 5), sigma_x=1.5), src=image).outputs["out"]
+    assert np.array_equal(out, cv2.GaussianBlur(image, (5, 5), 1.5))
+
+
+def test_constants_are_words() -> None:
+    image = picture("uint8", 3)
+    assert np.array_equal(
+        fire(cv.cvt_color(code="BGR2HSV"), src=image).outputs["out"], cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
+    )
+    with pytest.raises(ValueError, match='"cvt_color.code" must be of type'):
+        cv.cvt_color(code="BGR2PINK")
+
+
+def test_constants_that_add_up_are_a_set_of_words() -> None:
+    plane = picture("float32", 1)
+    both = fire(cv.dft(flags=frozenset({"COMPLEX_OUTPUT", "SCALE"})), src=plane).outputs["out"]
+    assert np.array_equal(both, cv2.dft(plane, flags=cv2.DFT_COMPLEX_OUTPUT | cv2.DFT_SCALE))
+
+
+def test_several_results_are_several_outputs_with_names() -> None:
+    outputs = fire(cv.threshold(type="BINARY_OTSU"), src=picture("uint8", 1)).outputs
+    used, expected = cv2.threshold(picture("uint8", 1), 127, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
+    assert outputs["used"] == used
+    assert np.array_equal(outputs["dst"], expected)
+
+
+def test_drawing_changes_a_copy() -> None:
+    image = np.zeros((32, 32, 3), np.uint8)
+    image.flags.writeable = False
+    out = fire(cv.circle(center=(16, 16), radius=5, color=Colour(255, 0, 0), thickness=-1), img=image).outputs["out"]
+    assert tuple(out[16, 16]) == BELOW
+    assert not image.any()
+
+
+def test_a_colour_on_a_gray_picture_is_its_lightness() -> None:
+    image = np.zeros((32, 32), np.uint8)
+    out = fire(cv.circle(radius=5, color=Colour(255, 255, 255), thickness=-1), img=image).outputs["out"]
+    assert out[16, 16] == 255
+
+
+def test_an_optional_array_may_be_left_out() -> None:
+    image = picture("uint8", 1)
+    mask = np.zeros_like(image)
+    mask[:10] = 255
+    assert fire(cv.mean(), src=image).outputs["out"][0] == pytest.approx(image.mean())
+    assert fire(cv.mean(), src=image, mask=mask).outputs["out"][0] == pytest.approx(image[:10].mean())
+
+
+def test_a_list_of_arrays_comes_out_as_a_list_that_can_be_drawn() -> None:
+    image = np.zeros((48, 48), np.uint8)
+    image[10:20, 10:20] = 255
+    contours = fire(cv.find_contours(), image=image).outputs["contours"]
+    assert isinstance(contours, list)
+    drawn = fire(
+        cv.draw_contours(thickness=-1, color=Colour(255, 255, 255)), image=np.zeros_like(image), contours=contours
+    )
+    assert np.array_equal(drawn.outputs["out"], image)
+
+
+@pytest.mark.rule("T2")
+def test_nothing_found_is_silence() -> None:
+    assert fire(cv.hough_circles(), image=np.zeros((64, 64), np.uint8)).outputs == {}
+
+
+def test_a_size_that_is_not_given_is_that_of_the_picture() -> None:
+    image, shift = picture("uint8", 3), np.array([[1, 0, 3], [0, 1, 0]], np.float64)
+    out = fire(cv.warp_affine(), src=image, m=shift).outputs["out"]
+    assert out.shape == image.shape
+    assert np.array_equal(out[:, 3:], image[:, :-3])
+
+
+def test_bounds_hold_for_each_channel() -> None:
+    image = np.dstack([np.full((4, 4), value, np.uint8) for value in (10, 20, 30)])
+    assert fire(cv.in_range(lowerb=(5.0,), upperb=(35.0,)), src=image).outputs["out"].all()
+    assert not fire(cv.in_range(lowerb=(15.0,), upperb=(35.0,)), src=image).outputs["out"].any()
+    assert fire(cv.in_range(lowerb=(5.0, 15.0, 25.0), upperb=(15.0, 25.0, 35.0)), src=image).outputs["out"].all()
+
+
+def test_what_another_node_computes_can_move_what_is_drawn() -> None:
+    """Parameters are ports (P8)."""
+
+    @hfg.node
+    def pictures() -> Iterator[images.Image]:
+        yield np.zeros((32, 32, 3), np.uint8)
+
+    @hfg.node
+    def radii() -> Iterator[int]:
+        yield 3
+
+    graph = hfg.Graph("drawing")
+    circle = graph.add(cv.circle(thickness=-1))
+    graph.connect(graph.add(pictures()).out, circle.ports.inputs["img"])
+    graph.connect(graph.add(radii()).out, circle.ports.parameters["radius"])
+    graph.connect(circle.out, graph.output("drawn", images.AnyImage))
+    drawn = hfg.run(graph, clock="virtual").outputs["drawn"][0]
+    assert drawn[16, 16 + 3].any()
+    assert not drawn[16, 16 + 5].any()
+
+
+# --- what is refused ---
+
+
+@pytest.mark.parametrize(
+    ("node", "values", "sentence"),
+    [
+        (
+            cv.equalize_hist(),
+            {"src": picture("float32", 1)},
+            'input "src" of equalize_hist: expected Gray (an array of uint8, height x width), found an array of '
+            "float32, 48 x 64",
+        ),
+        (
+            cv.canny(),
+            {"image": picture("uint8", 3).astype(np.int64)},
+            "found an array of int64, 48 x 64 x 3",
+        ),
+        (cv.sqrt(), {"src": picture("uint8", 1)}, 'input "src" of sqrt: expected Array[float32 | float64]'),
+        (cv.gaussian_blur(), {"src": [1, 2]}, "found list: [1, 2]"),
+        (cv.gaussian_blur(), {"src": np.zeros((0, 4), np.uint8)}, 'input "src" of gaussian_blur is empty'),
+        (
+            cv.bounding_rect(),
+            {"array": np.array([[0, 0], [1 << 20, 3]], np.int32)},
+            'input "array" of bounding_rect has a point that is not within 32767 pixels',
+        ),
+        (
+            cv.cvt_color(code="BGR2GRAY"),
+            {"src": picture("uint8", 1)},
+            "cv2.cvtColor refuses src an array of uint8, 48 x 64: ",
+        ),
+        (
+            cv.add(),
+            {"src1": picture("uint8", 1), "src2": np.zeros((3, 3), np.uint8)},
+            "cv2.add refuses src1 an array of uint8, 48 x 64, src2 an array of uint8, 3 x 3: The operation is neither",
+        ),
+        (
+            cv.kmeans(),
+            {"data": np.array([[np.nan, 1.0], [2.0, 3.0]], np.float32)},
+            "kmeans: data has a number that is not within 1e15",
+        ),
+    ],
+    ids=str,
+)
+def test_what_does_not_fit_is_told_by_node_port_expected_and_found(node: Any, values: Any, sentence: str) -> None:
+    with pytest.raises((TypeError, ValueError)) as error:
+        fire(node, debug=False, **values)
+    assert sentence in str(error.value)
+    assert "\n" not in str(error.value)
+    assert "/io/" not in str(error.value)
+
+
+def test_a_wrong_picture_in_a_graph_names_the_path() -> None:
+    @hfg.node
+    def camera() -> Any:
+        return np.zeros((4, 5))
+
+    graph = hfg.Graph("pictures")
+    graph.connect(graph.add(camera()).out, graph.add(cv.equalize_hist(), name="even").ports.inputs["src"])
+    with pytest.raises(hfg.errors.NodeError) as error:
+        hfg.run(graph, clock="virtual", debug=False)
+    assert 'node "even" failed in firing 1: TypeError: input "src" of equalize_hist: expected Gray' in str(error.value)
+
+
+def test_a_picture_that_would_end_the_process_is_refused() -> None:
+    """OpenCV writes beyond its memory when it takes the root of whole numbers; hfg never lets it."""
+    program = (
+        "import numpy as np; from hfg.nodes import cv; from hfg.testing import fire\n"
+        "for kind in (np.uint8, np.int16, np.int32):\n"
+        "    try: fire(cv.sqrt(), debug=False, src=np.ones((40, 40), kind))\n"
+        "    except TypeError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.count("expected Array[float32 | float64]") == 3
+
+
+@pytest.mark.rule("P3")
+def test_edges_between_kinds_that_never_fit_are_refused() -> None:
+    assert compatible(cv.cvt_color._type.outputs["out"].type, cv.canny._type.inputs["image"].type)
+    graph = hfg.Graph("pictures")
+    edges, root = graph.add(cv.canny()), graph.add(cv.sqrt())
+    with pytest.raises(hfg.errors.ConnectionError, match="an array of uint8 is no array of"):
+        graph.connect(edges.out, root.ports.inputs["src"])
+
+
+# --- the tables ---
+
+OWN_DEFAULTS = {
+    ("batchDistance", "K"), ("resize", "fx"), ("resize", "fy"), ("reduce", "dtype"), ("drawKeypoints", "color"),
+    ("drawMatches", "matchColor"), ("drawMatches", "singlePointColor"), ("drawMatchesKnn", "matchColor"),
+    ("drawMatchesKnn", "singlePointColor"),
+}  # fmt: skip
+"""Where we take another default than OpenCV on purpose."""
+
+
+def defaults_of(name: str) -> list[str]:
+    found = []
+    for argument in _recipes.chosen(name).arguments:
+        own = _overrides.FUNCTIONS.get(name, {}).get(argument.name) or _overrides.COMMON.get(argument.name)
+        said = own is not None and not own.drop and own.default is not REQUIRED and own.default is not None
+        if said and argument.optional and (name, argument.name) not in OWN_DEFAULTS:
+            found.append(argument.name)
+    return found
+
+
+def tries(name: str, recipe: Any) -> Iterator[list[Any]]:
+    """Ordinary inputs, with one kind of picture after the other."""
+    pictures = _recipes._image_hint(_recipes.measured()[name])
+    for dtype, channels in (("uint8", 3), ("uint8", 1), ("float32", 1), ("float32", 3), ("int16", 1)):
+        values = []
+        for number, one in enumerate(recipe.inputs):
+            value: Any = None if one.optional else sample(one.hint, number)
+            value = picture(dtype, channels, number) if one.hint == pictures and value is not None else value
+            values.append(value[4:20, 8:24].copy() if one.name == "templ" else value)
+        yield values
+
+
+def copied(arguments: dict[str, Any]) -> dict[str, Any]:
+    return {key: np.copy(value) if isinstance(value, np.ndarray) else value for key, value in arguments.items()}
+
+
+@pytest.mark.parametrize("name", [name for name in _recipes.names().values() if defaults_of(name)])
+def test_defaults_are_those_of_opencv(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The stub does not say them: what OpenCV does without an argument it does with our default, too."""
+    function = getattr(cv2, name)
+    given: dict[str, Any] = {}
+
+    @functools.wraps(function)
+    def spy(*by_position: Any, **arguments: Any) -> Any:
+        if by_position:  # it is the samples' own
+            return function(*by_position, **arguments)
+        given.clear()
+        given.update(copied(arguments))  # some are written into
+        return function(**arguments)
+
+    monkeypatch.setattr(cv2, name, spy)
+    recipe = _recipes.recipe(name)
+    parameters = {one.name: one.default for one in recipe.settings} | PARAMETERS.get(name, {})
+    for values in tries(name, recipe):
+        try:
+            recipe.call(*values, **parameters)
+            break
+        except (TypeError, ValueError):
+            continue
+    else:
+        pytest.fail("OpenCV refuses every sample")
+    ours = flat(function(**copied(given)))
+    if ours != flat(function(**copied(given))):
+        pytest.skip("its results are never twice the same")
+    for argument in defaults_of(name):
+        without = copied(given)
+        del without[argument]
+        assert flat(function(**without)) == ours, f"{argument} is something else in OpenCV"
+
+
+def flat(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [str(value.dtype), value.shape, value.tobytes().hex()]
+    return [flat(one) for one in value] if isinstance(value, list | tuple) else repr(value)
+
+
+def test_the_table_of_kinds_is_that_of_the_installed_version() -> None:
+    """Otherwise measure again: python -m tests.nodes.measure_cv."""
+    table = json.loads(TABLE.read_text(encoding="utf-8"))
+    if table["version"] == cv2.__version__:
+        assert sorted(table["functions"]) == sorted(_recipes.names().values())
+
+
+def test_what_is_not_in_the_table_takes_pictures_of_8_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A newer OpenCV has functions that nobody has measured."""
+    monkeypatch.setattr(_recipes, "measured", dict)
+    recipe = _recipes.recipe("blur")
+    assert describe(recipe.inputs[0].hint) == "Array[uint8]"
+    with pytest.raises(TypeError, match="expected Array"):
+        recipe.call(picture("float32", 1), ksize=(3, 3), anchor=(-1, -1), border_type="DEFAULT")
+
+
+@pytest.mark.timeout(120)
+def test_a_sample_of_the_measurement_gives_the_same_again() -> None:
+    names = ["sqrt", "blur", "Canny", "equalizeHist"]
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.nodes.measure_cv", "--json", *names], capture_output=True, text=True, check=True
+    )
+    found = json.loads(done.stdout)
+    table = json.loads(TABLE.read_text(encoding="utf-8"))
+    assert found == {name: table["functions"][name] for name in names}
+    assert ["uint8", 1] in found["sqrt"]["deadly"]
+
+
+def test_documentation_is_read_without_markup() -> None:
+    told = _docs.read(cv2.warpAffine, ("src", "M", "dsize", "dst", "flags", "borderMode", "borderValue"))
+    assert told.outputs == ("dst",)
+    assert told.about == "Applies an affine transformation to an image."
+    assert told.arguments["M"] == "2x 3 transformation matrix." or told.arguments["M"].startswith("2")
+    assert not any(mark in text for text in told.arguments.values() for mark in ("\\f$", "@ref", "#"))
+
+
+def test_importing_the_family_makes_no_type() -> None:
+    program = "from hfg.nodes import cv; print(sum(type(one).__name__ == 'NodeFunction' for one in vars(cv).values()))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "0"

@@ -1,0 +1,216 @@
+"""The family `vision`: what is found in pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import skimage.data
+
+import hfg
+from hfg.images import Gray
+from hfg.nodes import vision
+from hfg.testing import fire
+
+
+def board(columns: int = 7, rows: int = 5, square: int = 24) -> Any:
+    """A chessboard with so many inner corners, and a white rim."""
+    y, x = np.mgrid[0 : (rows + 1) * square, 0 : (columns + 1) * square] // square
+    return cv2.copyMakeBorder(((x + y) % 2 * 255).astype(np.uint8), 40, 40, 40, 40, cv2.BORDER_CONSTANT, value=255)
+
+
+def ean13(digits: str, module: int = 3) -> Any:
+    """Draw a bar code."""
+    left = "0001101 0011001 0010011 0111101 0100011 0110001 0101111 0111011 0110111 0001011".split()  # noqa: SIM905
+    right = ["".join("10"[int(bit)] for bit in code) for code in left]
+    turned = [code[::-1] for code in right]
+    parities = "LLLLLL LLGLGG LLGGLG LLGGGL LGLLGG LGGLLG LGGGLL LGLGLG LGLGGL LGGLGL".split()  # noqa: SIM905
+    parity = parities[int(digits[0])]
+    first = "".join((left if kind == "L" else turned)[int(one)] for kind, one in zip(parity, digits[1:7], strict=True))
+    bits = "101" + first + "01010" + "".join(right[int(one)] for one in digits[7:]) + "101"
+    row = np.repeat(np.array([0 if bit == "1" else 255 for bit in bits], np.uint8), module)
+    code = np.repeat(row[np.newaxis], 120, axis=0)
+    framed = cv2.copyMakeBorder(code, 60, 60, 60, 60, cv2.BORDER_CONSTANT, value=255)
+    return cv2.GaussianBlur(framed, (5, 5), 1)  # as a camera sees it
+
+
+def test_a_qr_code_that_was_drawn_is_read() -> None:
+    image = fire(vision.qr_code(scale=6), text="hello, robot").outputs["out"]
+    reader = vision.BarcodeReader(kinds="qr")
+    first = fire(reader, image=image)
+    assert first.outputs["texts"] == ["hello, robot"]
+    assert first.events == [("read", "hello, robot")]
+    x, y, width, height = first.outputs["boxes"][0]
+    assert 0 <= x < width
+    assert 0 <= y < height
+    assert first.outputs["corners"][0].shape == (4, 2)
+
+
+def test_a_code_is_told_again_when_it_was_gone_or_if_asked() -> None:
+    image = fire(vision.qr_code(scale=6), text="hello").outputs["out"]
+    empty = np.full_like(image, 255)
+    reader = vision.BarcodeReader(kinds="qr")
+    assert [len(fire(reader, image=one).events) for one in (image, image, empty, image)] == [1, 0, 0, 1]
+    reader = vision.BarcodeReader(kinds="qr", republish=True)
+    assert [len(fire(reader, image=one).events) for one in (image, image)] == [1, 1]
+
+
+def test_a_bar_code_is_read() -> None:
+    outputs = fire(vision.BarcodeReader(), image=ean13("4006381333931")).outputs
+    assert outputs["texts"] == ["4006381333931"]
+
+
+def test_markers_are_found_by_number() -> None:
+    known = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    image = np.full((160, 160), 255, np.uint8)
+    image[40:120, 40:120] = cv2.aruco.generateImageMarker(known, 7, 80)
+    outputs = fire(vision.MarkerDetector(), image=image).outputs
+    assert outputs["numbers"] == [7]
+    assert np.allclose(outputs["corners"][0][0], [40, 40], atol=2)
+    assert fire(vision.MarkerDetector(), image=np.full((99, 99), 255, np.uint8)).outputs["numbers"] == []
+
+
+def test_the_corners_of_a_chessboard_are_found_and_without_one_there_is_silence() -> None:
+    corners = fire(vision.ChessboardFinder(columns=7, rows=5), image=board()).outputs["corners"]
+    assert corners.shape == (35, 1, 2)
+    assert np.allclose(np.sort(corners[:, 0, 0])[0], 40 + 24, atol=1)
+    assert fire(vision.ChessboardFinder(columns=7, rows=5), image=np.zeros((99, 99), np.uint8)).outputs == {}
+
+
+def test_a_camera_is_calibrated_by_pictures_of_a_board() -> None:
+    node = vision.CameraCalibration(columns=7, rows=5)
+    flat = board()
+    height, width = flat.shape
+    with pytest.raises(ValueError, match="three pictures at least, got 0"):
+        fire(node, slot="calibrate")
+    frame = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+    for number in range(5):
+        lean = np.array([[3 * number, 9], [4, 2 * number], [-5, 3], [6, -3 * number]], np.float32)
+        view = cv2.getPerspectiveTransform(frame, frame * 0.9 + 10 + lean)
+        picture = cv2.warpPerspective(flat, view, (width, height), borderValue=255)
+        outputs = fire(node, image=picture).outputs
+    assert (outputs["accepted"], outputs["rejected"]) == (5, 0)
+    name, calibration = fire(node, slot="calibrate").events[0]
+    assert name == "calibrated"
+    assert calibration.error < 1
+    assert calibration.size == (width, height)
+    assert fire(node, image=np.zeros_like(flat)).outputs["rejected"] == 1
+    fire(node, slot="forget")
+    assert fire(node, image=flat).outputs["accepted"] == 1
+
+
+def test_a_face_is_found_in_a_photograph() -> None:
+    photograph = np.ascontiguousarray(skimage.data.astronaut()[:, :, ::-1])  # type: ignore[no-untyped-call]
+    boxes = fire(vision.CascadeDetector(neighbors=6), image=photograph).outputs["boxes"]
+    x, y, width, height = max(boxes, key=lambda box: box[2])
+    assert x < 224 < x + width
+    assert y < 110 < y + height
+
+
+def test_a_cascade_that_is_not_there_names_those_that_are(tmp_path: Any) -> None:
+    with pytest.raises(FileNotFoundError, match='no cascade "nose": name a file, or one of eye, .*frontalface_default'):
+        fire(vision.CascadeDetector(cascade="nose"), image=np.zeros((9, 9), np.uint8))
+    wrong = tmp_path / "wrong.xml"
+    wrong.write_text("<no cascade>")
+    with pytest.raises(ValueError, match="is no cascade"):
+        fire(vision.CascadeDetector(cascade=str(wrong)), image=np.zeros((9, 9), np.uint8))
+
+
+def test_a_person_is_found_in_a_photograph_and_a_small_picture_has_none() -> None:
+    photograph = np.ascontiguousarray(skimage.data.astronaut()[:, :, ::-1])  # type: ignore[no-untyped-call]
+    node = vision.PeopleDetector(threshold=0.0)
+    outputs = fire(node, image=photograph).outputs
+    assert len(outputs["boxes"]) == len(outputs["weights"])
+    assert outputs["weights"] == sorted(outputs["weights"], reverse=True)
+    assert fire(node, image=photograph[:100, :50]).outputs == {"boxes": [], "weights": []}
+
+
+@pytest.mark.parametrize("method", ["ORB", "SIFT", "AKAZE", "BRISK", "KAZE"])
+def test_keypoints_of_a_turned_picture_match(method: Any) -> None:
+    image = skimage.data.camera()[::2, ::2].copy()  # type: ignore[no-untyped-call]
+    node = vision.KeypointDetector(method=method, most=200)
+    first, second = (fire(node, image=one).outputs for one in (image, np.rot90(image).copy()))
+    assert len(first["keypoints"]) == len(first["points"]) == len(first["descriptors"]) <= 200
+    matches = fire(vision.match_descriptors(), first=first["descriptors"], second=second["descriptors"]).outputs["out"]
+    assert len(matches) > 20
+    right = 0
+    for match in matches:
+        x, y = first["points"][match.queryIdx]
+        expected = (y, image.shape[1] - 1 - x)
+        right += bool(np.allclose(second["points"][match.trainIdx], expected, atol=3))
+    assert right > 0.7 * len(matches)
+
+
+def test_a_picture_without_keypoints_gives_empty_ones() -> None:
+    outputs = fire(vision.KeypointDetector(), image=np.zeros((64, 64), np.uint8)).outputs
+    assert (outputs["keypoints"], outputs["points"].shape, len(outputs["descriptors"])) == ([], (0, 2), 0)
+    assert (
+        fire(vision.match_descriptors(), first=outputs["descriptors"], second=outputs["descriptors"]).outputs["out"]
+        == []
+    )
+
+
+def test_descriptors_of_different_kinds_are_refused() -> None:
+    with pytest.raises(ValueError, match="both descriptors are of one kind, got uint8 x 32 and float32 x 128"):
+        fire(vision.match_descriptors(), first=np.zeros((3, 32), np.uint8), second=np.zeros((3, 128), np.float32))
+
+
+@pytest.mark.parametrize("method", ["SGBM", "BM"])
+def test_near_things_move_farther(method: Any) -> None:
+    wall = np.random.default_rng(0).integers(0, 255, (96, 256), np.uint8)
+    right = np.roll(wall, -8, axis=1)
+    right[30:60, 100:160] = wall[30:60, 124:184]  # the middle is nearer
+    disparity = fire(vision.StereoDepth(method=method, range=32), left=wall, right=right).outputs["disparity"] / 16
+    assert np.median(disparity[70:90, 100:200]) == pytest.approx(8, abs=0.5)
+    assert np.median(disparity[36:54, 136:170]) == pytest.approx(24, abs=0.5)
+
+
+def test_pictures_that_are_no_pair_are_refused() -> None:
+    node = vision.StereoDepth()
+    with pytest.raises(ValueError, match="both pictures are of one size"):
+        fire(node, left=np.zeros((99, 200), np.uint8), right=np.zeros((98, 200), np.uint8))
+    small = np.zeros((99, 60), np.uint8)
+    assert (fire(node, left=small, right=small).outputs["disparity"] == -16).all()  # nothing can be found in it
+
+
+def test_brightness_is_spread_and_gray_stays_gray() -> None:
+    dark = (skimage.data.camera()[::4, ::4] // 4).astype(np.uint8)  # type: ignore[no-untyped-call]
+    gray = fire(vision.EqualizeLocally(limit=10.0), image=dark).outputs["out"]
+    assert gray.ndim == 2
+    assert gray.std() > 1.5 * dark.std()
+    assert fire(vision.EqualizeLocally(), image=cv2.cvtColor(dark, cv2.COLOR_GRAY2BGR)).outputs["out"].shape[2] == 3
+
+
+@pytest.mark.parametrize(
+    "kind", ["PeopleDetector", "BarcodeReader", "MarkerDetector", "KeypointDetector", "EqualizeLocally"]
+)
+def test_pictures_of_another_kind_are_refused(kind: str) -> None:
+    node = getattr(vision, kind)()
+    values: dict[str, Any] = {"image": np.zeros((99, 99), np.float64)}
+    with pytest.raises(TypeError, match="expected Picture .*, found an array of float64, 99 x 99"):
+        fire(node, debug=False, **values)
+    with pytest.raises(TypeError, match="height x width x 1 or 3 or 4.*, found an array of uint8, 150 x 99 x 2"):
+        fire(node, debug=False, image=np.zeros((150, 99, 2), np.uint8))
+
+
+def test_the_event_of_a_code_goes_its_own_way_in_a_graph() -> None:
+    code = fire(vision.qr_code(scale=6), text="door 4").outputs["out"]
+    told: list[str] = []
+
+    @hfg.node
+    def camera() -> Iterator[Gray]:
+        yield from (code, code)
+
+    @hfg.node
+    def act(text: str) -> None:
+        told.append(text)
+
+    graph = hfg.Graph("door")
+    reader = graph.add(vision.BarcodeReader())
+    graph.connect(graph.add(camera()).out, reader.image)
+    graph.connect(reader.read, graph.add(act()).ports.inputs["text"])
+    hfg.run(graph, clock="virtual", debug=True)
+    assert told == ["door 4"]
