@@ -25,9 +25,9 @@ help:
 demo: $(READY)
 	$(BIN)/python examples/photographs.py
 
-# One process a core; a test that must be alone says so by where it looks, never by when it runs.
+# One process a core, whole files to each.
 test: $(READY)
-	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: $(READY)
 	$(BIN)/ruff check .
