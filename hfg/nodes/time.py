@@ -41,6 +41,9 @@ __all__ = [
 _INSTANT_S = 1e-9
 """What is closer is at the same moment: sums of floats differ in the last digits."""
 
+_FOR_EVER_S = 1e12
+"""Longer than anybody waits: thirty thousand years."""
+
 
 # --- sources ---
 
@@ -82,7 +85,8 @@ class Ticker(Node):
             number, given = number + 1, given + 1
 
     def _period(self) -> float:
-        return 1 / self.rate_hz if self.rate_hz else self.period_s
+        period = 1 / self.rate_hz if self.rate_hz else self.period_s
+        return min(max(period, _INSTANT_S), _FOR_EVER_S)  # so that no product of it leaves the numbers that there are
 
 
 async def _until(due: float) -> None:

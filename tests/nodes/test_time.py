@@ -60,6 +60,14 @@ def test_a_ticker_ticks_on_a_grid_and_ends_behind_its_count() -> None:
     assert heard.stamps == [0.2, 0.7, 1.2, 1.7]
 
 
+@pytest.mark.parametrize(("rate_hz", "told"), [(1.1e-308, [(0.0, 0)]), (1e308, [(0.0, 0), (1e-9, 1)])])
+def test_a_ticker_has_periods_that_can_be_reckoned_with(rate_hz: float, told: list[tuple[float, int]]) -> None:
+    graph = hfg.Graph()
+    heard = heard_of(graph.add(time.Ticker(rate_hz=rate_hz, count=len(told))).tick, graph)
+    hfg.run(graph, clock="virtual", until_s=1.0)
+    assert heard.told == [(pytest.approx(at, abs=1e-8), number) for at, number in told]
+
+
 @pytest.mark.rule("F11")
 def test_a_ticker_does_not_drift() -> None:
     graph = hfg.Graph()
