@@ -259,6 +259,17 @@ def test_what_another_node_computes_can_move_what_is_drawn() -> None:
             "cv2.add refuses src1 an array of uint8, 48 x 64, src2 an array of uint8, 3 x 3: The operation is neither",
         ),
         (
+            cv.draw_matches_knn(),
+            {
+                "img1": picture("uint8", 3),
+                "img2": picture("uint8", 3),
+                "keypoints1": [cv2.KeyPoint(1.0, 1.0, 1.0)],
+                "keypoints2": [cv2.KeyPoint(1.0, 1.0, 1.0)],
+                "matches1to2": [[cv2.DMatch(5, 0, 1.0)]],
+            },
+            "draw_matches_knn: a match names the keypoints 5 and 0, and there are 1 and 1",
+        ),
+        (
             cv.kmeans(),
             {"data": np.array([[np.nan, 1.0], [2.0, 3.0]], np.float32)},
             "kmeans: data has a number that is not within 1e15",

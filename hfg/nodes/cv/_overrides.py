@@ -47,6 +47,7 @@ class Say(NamedTuple):
 
 
 Size: TypeAlias = tuple[int, int]
+Board: TypeAlias = Annotated[tuple[int, int], Interval(ge=1, le=200)]
 # OpenCV computes with numbers of 16 or 32 bits; what lies beyond ends the process (getRectSubPix) or takes minutes.
 Position: TypeAlias = Annotated[tuple[int, int], Interval(ge=-32767, le=32767)]
 Exact: TypeAlias = Annotated[tuple[float, float], Interval(ge=-32767, le=32767)]
@@ -295,7 +296,7 @@ COMMON: Final[Mapping[str, Say]] = {
     "center": Say(Position, (16, 16)),
     "angleInDegrees": Say(bool, False),
     "criteria": _criteria(30, 0.01),
-    "patternSize": Say(Annotated[Size, Predicate(sides_fit)], (9, 6)),
+    "patternSize": Say(Board, (9, 6)),
     "imageSize": _sizes((640, 480)),
     "imgsize": _sizes((640, 480)),
     "connectivity": Say(Literal[8, 4], 8),
@@ -519,7 +520,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     },
     "calibrationMatrixValues": {"apertureWidth": _float(0.0, 0.0), "apertureHeight": _float(0.0, 0.0)},
     "cartToPolar": {},
-    "checkChessboard": {"size": Say(Annotated[Size, Predicate(sides_fit)], (9, 6))},
+    "checkChessboard": {"size": Say(Board, (9, 6))},
     "checkRange": {"quiet": Say(drop=True, given=True), "minVal": _float(-1e308), "maxVal": _float(1e308)},
     "circle": {"radius": _int(8, 0, 16384)},
     "colorChange": {
@@ -679,7 +680,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "findCirclesGrid": {
         "flags": _several("CALIB_CB_ SYMMETRIC_GRID ASYMMETRIC_GRID CLUSTERING", ("SYMMETRIC_GRID",)),
         "blobDetector": DROP,
-        "patternSize": Say(Annotated[Size, Predicate(sides_fit)], (4, 3)),
+        "patternSize": Say(Board, (4, 3)),
     },
     "findContours": {
         "mode": _pick("RetrievalModes", "EXTERNAL", less="RETR_FLOODFILL"),
@@ -909,7 +910,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "thresholdWithMask": {"dst": IMAGE, "type": _words("THRESH_ BINARY BINARY_INV TRUNC TOZERO TOZERO_INV", "BINARY")},
     "transform": {
         "src": Say(Annotated[npt.NDArray[np.uint8 | np.float32], Pixels(3), Named("Picture")]),
-        "m": Say(Annotated[npt.NDArray[Reals], OneOf((3, 3), (3, 4), (1, 3)), Named("Mixture")]),
+        "m": Say(Annotated[npt.NDArray[Reals], OneOf((3, 3), (3, 4)), Named("Mixture")]),
     },
     "transposeND": {"order": Say(tuple[int, ...], (1, 0))},
     "undistortImagePoints": {"src": Say(Exacts), "arg1": DROP},
@@ -951,5 +952,24 @@ def _samples_are_near(inputs: Mapping[str, Any]) -> str | None:
     return "data has a number that is not within 1e15"
 
 
-NEEDS: Final[Mapping[str, Callable[[Mapping[str, Any]], str | None]]] = {"kmeans": _samples_are_near}
+def _matches_name_keypoints(inputs: Mapping[str, Any]) -> str | None:
+    pairs = [inputs["matches1to2"]] if not _is_nested(inputs["matches1to2"]) else inputs["matches1to2"]
+    first, second = len(inputs["keypoints1"]), len(inputs["keypoints2"])
+    for match in (one for pair in pairs for one in pair):
+        if not (0 <= match.queryIdx < first and 0 <= match.trainIdx < second):
+            return (
+                f"a match names the keypoints {match.queryIdx} and {match.trainIdx}, and there are {first} and {second}"
+            )
+    return None
+
+
+def _is_nested(matches: Any) -> bool:
+    return bool(matches) and isinstance(matches[0], list)
+
+
+NEEDS: Final[Mapping[str, Callable[[Mapping[str, Any]], str | None]]] = {
+    "kmeans": _samples_are_near,
+    "drawMatches": _matches_name_keypoints,
+    "drawMatchesKnn": _matches_name_keypoints,
+}
 """What inputs need besides their types, because OpenCV ends the process for it; each says what is wrong, or None."""
