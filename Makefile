@@ -11,7 +11,7 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench peers bench-peers bench-goals bench-docs soak setup clean
+.PHONY: help demo test lint bench peers bench-peers bench-goals bench-docs docs-nodes soak setup clean
 
 help:
 	@echo "make demo    search, measure and report on real photographs, watched and steered"
@@ -19,6 +19,7 @@ help:
 	@echo "make lint    ruff and mypy"
 	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md;"
 	@echo "             bench-goals: what is to be reached, and whether it is)"
+	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything tools have left"
 
@@ -54,6 +55,9 @@ bench-goals: peers
 
 bench-docs: $(READY)
 	$(BIN)/python -m benchmarks.page $(RESULTS)
+
+docs-nodes: $(READY)
+	$(BIN)/python -m hfg.catalogue.page docs/nodes
 
 soak: $(READY)
 	$(BIN)/python -m pytest -m soak --timeout 3600
