@@ -167,8 +167,12 @@ class TypeDescription(msgspec.Struct, frozen=True):
                 yield kind, port
 
 
-def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any]) -> TypeDescription:
+def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any], *, offered_by: str = "") -> TypeDescription:
     """Describe a node type.
+
+    Args:
+      of: the type.
+      offered_by: the module whose category it has, if that is not its own.
 
     Example:
       >>> import hfg
@@ -194,7 +198,7 @@ def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any]) -> TypeDes
         name=kind.name,
         title=title,
         module=module,
-        category=read.category or _category(kind.module),
+        category=read.category or _category(offered_by or kind.module),
         summary=read.summary,
         text=read.text,
         doc=kind.doc,

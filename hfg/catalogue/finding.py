@@ -1,8 +1,9 @@
 """Imports the places and lists the node types in them; what is broken is told in a sentence and stops nobody.
 
-A module offers the node types that it declares under public names. One that makes its types when they are asked for, or
-wants to offer others than those, has a function `__node_types__()` that gives them. Packages are walked; modules whose
-names begin with an underscore, and tests, are not. Stands on `offers` and `describing`.
+A module offers the node types that it declares under public names, and those that its `__all__` lists. One that makes
+its types when they are asked for, or wants to offer others than those, has a function `__node_types__()` that gives
+them. Packages are walked; modules whose names begin with an underscore, and tests, are not. Stands on `offers` and
+`describing`.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from hfg.functions import FunctionNode, NodeFunction
 from hfg.graph import Subgraph
 from hfg.nodetype import Node
 
-__all__ = ["Catalogue", "installed", "types_of"]
+__all__ = ["Catalogue", "installed", "submodules", "types_of"]
 
 _BASES: Final = (Node, Subgraph, FunctionNode)
 _TESTS: Final = ("test", "tests", "conftest")
@@ -93,7 +94,7 @@ class _Search:
             value = getattr(value, part, None)
         kind = _type_in(value)
         if kind is not None:
-            self._add([kind])
+            self._add([kind], offer.module)
         elif isinstance(value, ModuleType):
             self.module(value)
         else:
@@ -104,17 +105,17 @@ class _Search:
         """List the types of a module, then those of the modules in it."""
         offered = getattr(module, "__node_types__", None)
         kinds = self._attempt(module.__name__, "", lambda: list(_offered(offered) if offered else _declared(module)))
-        self._add(kinds or [])
-        for name in _submodules(module):
+        self._add(kinds or [], module.__name__)
+        for name in submodules(module):
             inner = self._attempt(name, "", lambda name=name: importlib.import_module(name))  # type: ignore[misc]
             if inner is not None:
                 self.module(inner)
 
-    def _add(self, kinds: Iterable[NodeType]) -> None:
+    def _add(self, kinds: Iterable[NodeType], module: str) -> None:
         for kind in kinds:
             if id(kind.origin) not in self._seen:
                 self._seen.add(id(kind.origin))
-                self.found.append(describe_type(kind))
+                self.found.append(describe_type(kind, offered_by=module))
 
     def _attempt(self, name: str, origin: str, action: Callable[[], Any]) -> Any:
         """Run code of somebody's; None and a sentence if it fails, whatever it raises."""
@@ -153,10 +154,11 @@ def _offered(offered: Callable[[], Iterable[Any]]) -> Iterator[NodeType]:
 
 
 def _declared(module: ModuleType) -> Iterator[NodeType]:
-    """Give the types that a module, or a package and what lies in it, declares, in order."""
+    """Give the types that a module, or a package and what lies in it, declares or lists, in order."""
+    listed = getattr(module, "__all__", ())
     for name, value in list(vars(module).items()):
         kind = None if name.startswith("_") else _type_in(value)
-        if kind is not None and f"{kind.module}.".startswith(f"{module.__name__}."):
+        if kind is not None and (name in listed or f"{kind.module}.".startswith(f"{module.__name__}.")):
             yield kind
 
 
@@ -170,7 +172,7 @@ def _type_in(value: Any) -> NodeType | None:
     return None
 
 
-def _submodules(package: ModuleType) -> list[str]:
+def submodules(package: ModuleType) -> list[str]:
     """Name the modules in a package, one level deep."""
     path = getattr(package, "__path__", ())
     return [

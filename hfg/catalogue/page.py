@@ -12,12 +12,12 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Final
 
 from hfg.catalogue.describing import ParameterDescription, PortDescription, TypeDescription
-from hfg.catalogue.finding import installed
-from hfg.catalogue.offers import LIBRARY, Offer
+from hfg.catalogue.finding import submodules, types_of
+from hfg.catalogue.offers import LIBRARY
 from hfg.catalogue.searching import categories
 
 __all__ = ["DISTRIBUTIONS", "made_with", "main", "pages"]
@@ -35,12 +35,13 @@ def pages() -> dict[str, str]:
     Raises:
       RuntimeError: a family cannot be imported; it says why.
     """
-    found = installed([Offer(LIBRARY)])
-    if found.problems:
-        raise RuntimeError("; ".join(found.problems))
     families: dict[str, list[TypeDescription]] = {}
-    for one in found.types:
-        families.setdefault(one.module.removeprefix(f"{LIBRARY}.").partition(".")[0], []).append(one)
+    for module in submodules(importlib.import_module(LIBRARY)):
+        found = types_of(module)
+        if found.problems:
+            raise RuntimeError("; ".join(found.problems))
+        if found.types:
+            families[module.rpartition(".")[2]] = list(found.types)
     written = {f"{name}.md": _text(_family(name, types)) for name, types in sorted(families.items())}
     return {"index.md": _text(_index(families)), **written}
 
@@ -155,7 +156,8 @@ def _default(each: ParameterDescription) -> str:
 
 def _plain(value: Any) -> str:
     """Write a value so that it looks the same each time."""
-    return re.sub(r" at 0x[0-9a-f]+", "", " ".join(repr(value).split()))
+    plain = str(value) if isinstance(value, PurePath) else value
+    return re.sub(r" at 0x[0-9a-f]+", "", " ".join(repr(plain).split()))
 
 
 def _anchor(title: str) -> str:

@@ -2,6 +2,7 @@
 
     firing         fire one node without a graph
     values         Hypothesis: values of the type hints of ports and parameters
+    samples        files of many kinds, for nodes that read some
     trying         fire a node type with such values, and see whether it keeps its word
     usable         the same for many types, in processes of their own
     diagrams       token diagrams: drive a node by lines of characters

@@ -28,6 +28,7 @@ from hfg.nodetype import Node
 from hfg.ports.specs import REQUIRED
 from hfg.registry import find
 from hfg.testing.firing import Firing, fire
+from hfg.testing.samples import sample_folder
 from hfg.testing.values import Alike, values_of, values_of_parameter
 from hfg.types import accepts, describe, describe_value
 
@@ -70,7 +71,8 @@ def try_type(
     """Fire a node type several times, with values generated from the types and limits that it declares.
 
     Several nodes are made, with parameters by default and with generated ones, and each is fired `firings` times in a
-    row; slots are called in between. The same seed gives the same values.
+    row; slots are called in between. The same seed gives the same values. Meanwhile the working directory is a folder
+    with a few small files, from which paths are drawn.
 
     Args:
       type_: a reference, "my_robot.nodes:MapLookup", or the type itself.
@@ -109,7 +111,8 @@ def try_type(
             trying.example(data)
 
         try:
-            attempt()
+            with sample_folder():
+                attempt()
         except (ResolutionFailed, Unsatisfiable) as error:
             raise NotUsable(
                 f"{trying.described.reference}: no values can be made of what it declares: {error}; "

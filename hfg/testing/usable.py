@@ -1,7 +1,7 @@
 """Tries many node types, in processes of their own: `python -m hfg.testing.usable [MODULE or REFERENCE ...]`.
 
-A type that ends its process, or never comes back, is named and the others go on in a new one. The work is done in an
-empty folder with a few small files, with bounded memory and without standard input; what the nodes print goes nowhere.
+A type that ends its process, or never comes back, is named and the others go on in a new one. Memory is bounded, there
+is no standard input, and what the nodes print goes nowhere.
 Stands on `trying` and the catalogue.
 """
 
@@ -18,26 +18,17 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterable, Sequence
-from functools import cache
-from pathlib import Path
 from typing import Any, Final
 
 import msgspec
-import numpy as np
 
-import hfg
 from hfg import catalogue
-from hfg.testing.nodes import script, sink
 from hfg.testing.trying import NotUsable, Trial, try_type
 
 __all__ = ["main", "try_all"]
 
 _MEMORY_BYTES: Final = 12 << 30  # of addresses, most of which libraries only reserve
 _FILE_BYTES: Final = 64 << 20
-_PICTURE: Final = bytes.fromhex(  # a PNG of one grey pixel
-    "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b550000000a49444154789c636800000082008177cd72b600000000"
-    "49454e44ae426082"
-)
 
 
 def try_all(
@@ -134,7 +125,6 @@ def _work(firings: int, seed: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_FSIZE, (_FILE_BYTES, _FILE_BYTES))
     for reference in references:
-        _lay_out_files()
         try:
             trial = try_type(reference, firings=firings, seed=seed, shrink=False)
         except NotUsable as error:
@@ -143,29 +133,6 @@ def _work(firings: int, seed: int) -> None:
             trial = Trial(reference, fault=f"{reference}: {type(error).__name__}: {error}")
         answers.write(msgspec.json.encode(trial).decode() + "\n")
         answers.flush()
-
-
-@cache
-def _recording() -> bytes:
-    """Record three numbers."""
-    graph = hfg.Graph("recorded")
-    graph.add(script()) >> graph.add(sink())
-    hfg.run(graph, clock="virtual", begin=lambda run: run.record("recording.mcap", force=True))
-    return Path("recording.mcap").read_bytes()
-
-
-def _lay_out_files() -> None:
-    """Write the small files that paths are drawn from; nodes may have changed them."""
-    Path("folder").mkdir(exist_ok=True)
-    Path("lines.txt").write_text("one\ntwo\nthree\n", encoding="utf-8")
-    Path("table.csv").write_text("name,value\na,1\nb,2.5\n", encoding="utf-8")
-    Path("lines.jsonl").write_text('{"a": 1}\n[1, 2]\n', encoding="utf-8")
-    Path("value.json").write_text('{"a": [1, 2.5, "b", null]}\n', encoding="utf-8")
-    for name in ("picture.png", "folder/1.png", "folder/2.png"):
-        Path(name).write_bytes(_PICTURE)
-    Path("recording.mcap").write_bytes(_recording())
-    np.save("array.npy", np.arange(6.0).reshape(2, 3))
-    np.savez("arrays.npz", first=np.arange(3), second=np.zeros((2, 2)))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

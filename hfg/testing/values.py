@@ -28,6 +28,7 @@ from hypothesis import strategies as st
 from hfg.generics import callable_parts
 from hfg.limits import limits_of
 from hfg.ports.specs import ParameterSpec
+from hfg.testing.samples import PATHS
 from hfg.types import ArrayFacts, array_facts, bare_type
 from hfg.values import Colour, Span
 
@@ -40,21 +41,6 @@ _LENGTHS: Final = (12, 12, 1, 4, 33, 0)
 _TEXTS: Final = ("1", "-2.5", "true", "a, b", '{"a": 1}', "a b\nc", "x" * 100)
 _LETTERS: Final = "aB1 .,:;-+_/\\'\"{}[]()%$\n\t\0\x7f\u00e9\u00df\u6f22\U0001f642"
 """What texts have gone wrong with; all of Unicode takes Hypothesis seconds to prepare."""
-_PATHS: Final = (
-    *(
-        "lines.txt",
-        "table.csv",
-        "lines.jsonl",
-        "value.json",
-        "picture.png",
-        "array.npy",
-        "arrays.npz",
-        "folder",
-        "recording.mcap",
-    ),
-    *("new", "new.png", "new.txt", "new/one.json", "no/such"),
-)
-"""Files that whoever tries a type may lay in the working directory, and some that are not there."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -142,7 +128,7 @@ def values_of_parameter(spec: ParameterSpec, *, alike: Alike | None = None) -> s
         strategy = st.sampled_from(list(spec.choices))
     elif spec.kind == "path":
         kind = Path if isinstance(spec.default, Path) or bare_type(spec.type) is not str else str
-        names = ["folder", "new"] if spec.directory else list(_PATHS)
+        names = ["folder", "new"] if spec.directory else list(PATHS)
         names += [pattern.replace("*", "new") for pattern in (spec.pattern or "").split()]
         strategy = st.sampled_from(names).map(kind)
     else:
@@ -256,7 +242,7 @@ def _scalar(kind: type, limits: tuple[Any, ...]) -> st.SearchStrategy[Any] | Non
     if kind is type:
         return st.sampled_from([int, float, str])
     if _is_path(kind):
-        return st.sampled_from(_PATHS).map(Path if kind is os.PathLike else kind)
+        return st.sampled_from(PATHS).map(Path if kind is os.PathLike else kind)
     return None
 
 
