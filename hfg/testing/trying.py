@@ -35,7 +35,7 @@ from hfg.types import accepts, describe, describe_value
 __all__ = ["NotUsable", "Trial", "try_type"]
 
 _EXAMPLES: Final = 5  # nodes with parameters of their own; each is fired several times
-_MOST_EXAMPLES: Final = 40  # until one firing goes well
+_MOST_EXAMPLES: Final = 150  # until one firing goes well
 _LONGEST_RUN_S: Final = 60.0  # of a subgraph, in virtual time
 
 

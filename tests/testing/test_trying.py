@@ -302,17 +302,17 @@ def test_the_command_tells_what_is_not_usable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)
-    (tmp_path / "my_lamps.py").write_text(
+    (tmp_path / "lamps_to_try.py").write_text(
         "import hfg\n\n@hfg.node\ndef dim(light: int) -> int:\n    return 1 // light\n\n"
         "@hfg.node\ndef off(light: int) -> int:\n    return 0\n"
     )
-    assert main(["my_lamps", "my_lamps:off"]) == 1
+    assert main(["lamps_to_try", "lamps_to_try:off"]) == 1
     fault, count = capsys.readouterr().out.splitlines()
-    assert fault.startswith("my_lamps:dim: fire(dim(), light=0) raised ZeroDivisionError")
+    assert fault.startswith("lamps_to_try:dim: fire(dim(), light=0) raised ZeroDivisionError")
     assert count == "1 of 2 node types are usable"
     monkeypatch.setattr(usable, "try_all", lambda references, **settings: [Trial(one, 1) for one in references])
-    assert main(["my_lamps:off", "--json"]) == 0
-    assert '"reference": "my_lamps:off"' in capsys.readouterr().out
+    assert main(["lamps_to_try:off", "--json"]) == 0
+    assert '"reference": "lamps_to_try:off"' in capsys.readouterr().out
     assert main(["no_such_module"]) == 1
     assert 'there is no module "no_such_module"' in capsys.readouterr().out
 
