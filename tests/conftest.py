@@ -5,6 +5,8 @@ With `--fuse-after 0` all runs fuse their regions from the first firing on.
 
 from __future__ import annotations
 
+from collections.abc import Generator
+
 import pytest
 from hypothesis import settings
 
@@ -24,3 +26,11 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.option.fuse_after is not None:
         run_settings.FUSE_AFTER = config.option.fuse_after
     settings.load_profile("soak" if config.option.markexpr == "soak" else "suite")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """What a test has shown goes from process to process, which text with half a character does not."""
+    report = yield
+    report.sections = [(name, text.encode("utf-8", "backslashreplace").decode()) for name, text in report.sections]
+    return report
