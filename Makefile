@@ -26,9 +26,8 @@ help:
 demo: $(READY)
 	$(BIN)/python examples/photographs.py
 
-# One process a core, whole files to each.
 test: $(READY)
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest
 
 lint: $(READY)
 	$(BIN)/ruff check .
