@@ -173,7 +173,7 @@ def test_any_data_comes_back_unchanged_from_json(value: Any) -> None:
         (["LEFT", "UP"], Sides, "the value must be Sides, one of LEFT, RIGHT, got ['LEFT', 'UP']"),
         ("#12", Colour, "the value must be a colour, as in \"#ff8000\", got '#12'"),
         ([1, 2, 256], Colour, 'the value must be a colour, as in "#ff8000" or [255, 128, 0], got [1, 2, 256]'),
-        ([1, 2, 3], Span[int], "the value must be hfg.values.Span[int], got [1, 2, 3]"),
+        ([1, 2, 3], Span[int], "the value must be Span[int], got [1, 2, 3]"),
         ([1, 2], tuple[int, int, int], "the value must be tuple[int, int, int], got [1, 2]"),
         ([[1, 2], [3]], npt.NDArray[np.float64], "the value must be Array[float64], got [[1, 2], [3]]"),
         ([300], npt.NDArray[np.uint8], "the value must be Array[uint8], got [300]"),
