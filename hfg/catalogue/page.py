@@ -156,6 +156,8 @@ def _default(each: ParameterDescription) -> str:
 
 def _plain(value: Any) -> str:
     """Write a value so that it looks the same each time."""
+    if isinstance(value, frozenset | set) and value:  # whose own order is another in each process
+        return "{" + ", ".join(sorted(map(repr, value))) + "}"
     plain = str(value) if isinstance(value, PurePath) else value
     return re.sub(r" at 0x[0-9a-f]+", "", " ".join(repr(plain).split()))
 
