@@ -275,7 +275,18 @@ def test_what_another_node_computes_can_move_what_is_drawn() -> None:
             "kmeans: data has a number that is not within 1e15",
         ),
     ],
-    ids=str,
+    ids=[
+        "kind of picture",
+        "kind of numbers",
+        "whole numbers",
+        "a list",
+        "an empty picture",
+        "a point far away",
+        "channels",
+        "two sizes",
+        "a match without keypoint",
+        "no number",
+    ],
 )
 def test_what_does_not_fit_is_told_by_node_port_expected_and_found(node: Any, values: Any, sentence: str) -> None:
     with pytest.raises((TypeError, ValueError)) as error:
