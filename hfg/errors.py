@@ -18,6 +18,10 @@
     │   ├── Aborted           the graph's slot `abort` was called (rule A10)
     │   ├── QueueLimit        a queue would have grown over its `capacity_limit` (rule F8)
     │   └── TeardownError     nodes failed while they were torn down (rule X3)
+    ├── TransportError        a transport cannot do what it is asked: closed, no way to the other side, ...
+    │   ├── MessageTooLarge   more bytes than it carries at once
+    │   ├── NoAnswer          a question that nobody answers, or not in time
+    │   └── QueryRefused      a question whose answer is a refusal; the text says why
     ├── QueueOverflow         policy `error`: the queue is full, nothing of the trigger was sent (rule P5)
     ├── EndOfStream           raised *by* a node to say that it has ended (rule F2)
     └── EngineInternalError   a fault of hfg, never of the user
@@ -48,14 +52,18 @@ __all__ = [
     "GraphError",
     "HfgError",
     "MachineError",
+    "MessageTooLarge",
+    "NoAnswer",
     "NodeError",
     "NotRunning",
+    "QueryRefused",
     "QueueLimit",
     "QueueOverflow",
     "RunError",
     "Stalled",
     "TargetError",
     "TeardownError",
+    "TransportError",
     "UsageError",
     "in_words",
 ]
@@ -209,6 +217,22 @@ class TeardownError(RunError):
     def __init__(self, errors: Sequence[NodeError]) -> None:
         self.errors = tuple(errors)
         super().__init__("; ".join(str(error) for error in errors))
+
+
+class TransportError(HfgError):
+    """A transport cannot do what it is asked, now or at all; nothing was sent."""
+
+
+class MessageTooLarge(TransportError):
+    """A datagram of more bytes than the transport carries; a smaller one would go."""
+
+
+class NoAnswer(TransportError):
+    """Nobody answers to the name, who did has gone, or it took too long; asking again may help."""
+
+
+class QueryRefused(TransportError):
+    """Who was asked has refused, in words of its own; asking again will not help."""
 
 
 class QueueOverflow(HfgError):
