@@ -26,8 +26,9 @@ help:
 demo: $(READY)
 	$(BIN)/python examples/photographs.py
 
+# As many processes as there are cores; without them: .venv/bin/python -m pytest
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 lint: $(READY)
 	$(BIN)/ruff check .

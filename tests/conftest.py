@@ -5,6 +5,7 @@ With `--fuse-after 0` all runs fuse their regions from the first firing on.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Generator
 
 import pytest
@@ -34,3 +35,16 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
     report = yield
     report.sections = [(name, text.encode("utf-8", "backslashreplace").decode()) for name, text in report.sections]
     return report
+
+
+_LOGGERS = tuple(logging.getLogger(name) for name in (None, "hfg", "hfg.node", "hfg.graph"))
+
+
+@pytest.fixture(autouse=True)
+def _loggers_are_as_they_were() -> Generator[None, None, None]:
+    """A command line that a test has called in this process leaves no level and no handler behind."""
+    kept = [(one, one.level, one.propagate, one.disabled, list(one.handlers)) for one in _LOGGERS]
+    yield
+    for one, level, propagate, disabled, handlers in kept:
+        one.setLevel(level)
+        one.propagate, one.disabled, one.handlers[:] = propagate, disabled, handlers

@@ -263,6 +263,7 @@ def test_every_check_has_a_name_and_is_explained() -> None:
     """The page lists exactly the names that findings can have."""
     sources = [
         *(ROOT / "hfg" / "graph").rglob("*.py"),
+        *(ROOT / "hfg" / "files").rglob("*.py"),
         ROOT / "hfg" / "activity" / "analysis.py",
         ROOT / "hfg" / "activity" / "description.py",
         ROOT / "hfg/cli/check.py",
