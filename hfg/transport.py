@@ -23,6 +23,8 @@ import enum
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Literal, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
+import msgspec
+
 __all__ = [
     "Answer",
     "Buffer",
@@ -235,11 +237,30 @@ class Position(NamedTuple):
     sequence: int
 
 
-class Delivery(NamedTuple):
-    """A token at the receiving end of a link."""
+class Delivery(msgspec.Struct, frozen=True, gc=False):
+    """A token at the receiving end of a link; there are many, so making one is cheap.
 
-    position: Position
-    token: EncodedToken
+    Attributes:
+      stream: of its position.
+      sequence: of its position.
+      metadata: what is small about it.
+      value: its value.
+    """
+
+    stream: int
+    sequence: int
+    metadata: bytes
+    value: Buffer
+
+    @property
+    def position(self) -> Position:
+        """Where it stands, for good."""
+        return Position(self.stream, self.sequence)
+
+    @property
+    def token(self) -> EncodedToken:
+        """It, as it was sent."""
+        return self.metadata, self.value
 
 
 @runtime_checkable
@@ -271,12 +292,13 @@ class OutgoingLink(Protocol):
     async def send(self, token: EncodedToken, position: Position | None = None) -> Position:
         """The same, but wait while the window is full."""
 
-    def admit(self, consumer: str, incarnation: int | None = None) -> None:
+    def admit(self, consumer: str, incarnation: int | None = None, *, after: int | None = None) -> None:
         """Let a consumer take part from the next token on; all that follow wait for it too, also while it is away.
 
         Args:
           consumer: its name on this link.
           incarnation: whom to believe from now on, if somebody knows; else the newest that is heard of.
+          after: the number behind which it takes part, for those that did when an outbox was kept.
         """
 
     def dismiss(self, consumer: str) -> None:

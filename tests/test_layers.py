@@ -44,6 +44,7 @@ FLOORS = {
     "hfg.vectors": 2,
     "hfg.graph": 3,
     "hfg.activity": 4,
+    "hfg.links": 4,
     "hfg.timeline": 4,
     "hfg.engine": 5,
     "hfg.nodes": 6,
@@ -90,7 +91,7 @@ WINGS = {
     },
 }
 NAMED_FROM_BELOW = "hfg.graph.graph"  # nodes and edges give users their graph, so its name stands in annotations
-WITHOUT_CIRCLES = ("hfg.graph", "hfg.activity", "hfg.engine")
+WITHOUT_CIRCLES = ("hfg.graph", "hfg.activity", "hfg.engine", "hfg.links")
 WAITING = {"asyncio", "anyio", "trio"}
 ORACLE_MUST_NOT_SHARE = ("hfg.ports", "hfg.activity", "hfg.engine")
 

@@ -1,0 +1,218 @@
+"""Both ends of the link that may lose tokens: it keeps their order, never waits, and counts what is gone (rule L2, P5).
+
+The sending end numbers and sends; the receiving end puts what comes in order into a queue with a policy. A gap in the
+numbers is a loss on the way, known when the next token comes. There is no word back. Knows no time; nothing that
+arrives can make it raise.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import msgspec
+
+from hfg.errors import MessageTooLarge, UsageError
+from hfg.links.frames import OtherVersion, Outgoing, Tokens, Unreadable, batches, read_from_producer, values_of, write
+from hfg.transport import Buffer, Delivery, EncodedToken, LinkOverflow, Position
+
+__all__ = ["BoundedConsumer", "BoundedConsumerCounts", "BoundedProducer", "BoundedProducerCounts"]
+
+
+class BoundedProducerCounts(msgspec.Struct):
+    """What has happened at the sending end.
+
+    Attributes:
+      sent: tokens.
+      datagrams: that they went in.
+    """
+
+    sent: int = 0
+    datagrams: int = 0
+
+
+class BoundedProducer:
+    """The sending end of a link that may lose tokens; to any number of consumers.
+
+    Args:
+      epoch: which life of the producer this is; each must be higher than all before.
+      largest_batch: bytes of a datagram of several tokens.
+      largest_token: bytes of a value and its metadata that can be sent at all.
+
+    Attributes:
+      epoch: see above.
+      counts: what has happened.
+    """
+
+    def __init__(self, epoch: int, *, largest_batch: int = 60_000, largest_token: int = 2**30) -> None:
+        if epoch < 1:
+            raise UsageError(f"a link needs epoch >= 1, got {epoch}")
+        self.epoch = epoch
+        self.counts = BoundedProducerCounts()
+        self._largest_batch = largest_batch
+        self._largest_token = largest_token
+        self._next = 1
+        self._unsent: list[EncodedToken] = []
+
+    @property
+    def position(self) -> Position:
+        """That of the last token that was sent."""
+        return Position(self.epoch, self._next - 1)
+
+    def send(self, token: EncodedToken) -> Position:
+        """Take the next token; it leaves with the next `flush`.
+
+        Raises:
+          MessageTooLarge: the value is too large for the transport.
+        """
+        metadata, value = token
+        if type(value) is memoryview and (value.ndim != 1 or value.itemsize != 1):
+            token = (metadata, value.cast("B"))
+        if len(token[1]) + len(metadata) > self._largest_token:
+            raise MessageTooLarge(
+                f"a token of {len(token[1])} bytes cannot be sent: the transport carries {self._largest_token} at once"
+            )
+        self._unsent.append(token)
+        self._next += 1
+        return Position(self.epoch, self._next - 1)
+
+    def flush(self) -> list[Outgoing]:
+        """Give what is to be sent now."""
+        if not self._unsent:
+            return []
+        out: list[Outgoing] = []
+        first = self._next - len(self._unsent)
+        for metadata, payload in batches(self._unsent, self._largest_batch):
+            self.counts.datagrams += 1
+            out.append(Outgoing(None, write(Tokens(self.epoch, self.epoch, first, 0, metadata)), payload))
+            first += len(metadata)
+        self.counts.sent += len(self._unsent)
+        self._unsent = []
+        return out
+
+
+class BoundedConsumerCounts(msgspec.Struct):
+    """What has happened at the receiving end.
+
+    Attributes:
+      received: tokens that were put into the queue, those that were dropped from it later among them.
+      lost: tokens that were lost on the way, by the gaps in their numbers.
+      dropped: tokens that the policy has dropped, for they were too many.
+      late: tokens that came behind later ones, or again; they are not taken.
+      streams: how often a producer began afresh.
+      refused: datagrams that are no frame, or whose payload does not fit their header.
+      other_versions: datagrams of another version of the protocol.
+      stale: tokens of former lives of the producer.
+    """
+
+    received: int = 0
+    lost: int = 0
+    dropped: int = 0
+    late: int = 0
+    streams: int = 0
+    refused: int = 0
+    other_versions: int = 0
+    stale: int = 0
+
+
+class BoundedConsumer:
+    """The receiving end of a link that may lose tokens.
+
+    Args:
+      capacity: how many tokens wait at most.
+      overflow: what becomes of one too many, in the words of rule P5. Under `error` it is dropped and `overflowed` is
+        set: who emitted it is far away, so it is for the consuming side to fail.
+      producer: the only epoch to believe, if somebody knows; else the newest that is heard of.
+
+    Attributes:
+      counts: what has happened.
+      epoch: the life of the producer it listens to; 0: none yet.
+      overflowed: a token was too many under `error`.
+    """
+
+    def __init__(
+        self, *, capacity: int = 16, overflow: LinkOverflow = "drop_oldest", producer: int | None = None
+    ) -> None:
+        if capacity < 1:
+            raise UsageError(f"a link needs capacity >= 1, got {capacity}")
+        self.counts = BoundedConsumerCounts()
+        self.epoch = 0
+        self.overflowed = False
+        self._capacity = 1 if overflow == "latest" else capacity
+        self._overflow = overflow
+        self._expected = producer
+        self._last = 0
+        self._waiting: deque[Delivery] = deque()
+
+    @property
+    def waiting(self) -> int:
+        """How many tokens can be taken."""
+        return len(self._waiting)
+
+    def take(self) -> Delivery | None:
+        """Give the next token, if there is one."""
+        return self._waiting.popleft() if self._waiting else None
+
+    def take_all(self) -> list[Delivery]:
+        """Give all tokens that wait."""
+        taken = list(self._waiting)
+        self._waiting.clear()
+        return taken
+
+    def believe(self, epoch: int) -> None:
+        """Listen to that life of the producer only, whatever else is heard."""
+        self._expected = epoch
+
+    def receive(self, header: Buffer, payload: Buffer = b"") -> None:
+        """Take a datagram of the producer."""
+        try:
+            frame = read_from_producer(header)
+            if type(frame) is Tokens and frame.first > 0:
+                self._accept(frame, payload)
+            else:
+                self.counts.refused += 1
+        except OtherVersion:
+            self.counts.other_versions += 1
+        except Unreadable:
+            self.counts.refused += 1
+
+    def _accept(self, frame: Tokens, payload: Buffer) -> None:
+        count = len(frame.metadata)
+        if frame.epoch < max(self.epoch, 1) or (self._expected is not None and frame.epoch != self._expected):
+            self.counts.stale += count
+            return
+        values = values_of(frame, payload)
+        if frame.epoch > self.epoch:
+            self.counts.streams += self.epoch > 0
+            # Of a producer that was there before this end nothing is known to be lost; of a new one the beginning is.
+            self._last = 0 if self.epoch else frame.first - 1
+            self.epoch = frame.epoch
+        known = min(max(self._last + 1 - frame.first, 0), count)
+        self.counts.late += known
+        if known == count:
+            return
+        self.counts.lost += max(frame.first - self._last - 1, 0)
+        self._last = frame.first + count - 1
+        self.counts.received += count - known
+        for index in range(known, count):
+            self._put(Delivery(frame.stream, frame.first + index, frame.metadata[index], values[index]))
+
+    def _put(self, token: Delivery) -> None:
+        if len(self._waiting) >= self._capacity:
+            self.counts.dropped += 1
+            if self._overflow == "error":
+                self.overflowed = True
+                return
+            if self._overflow == "drop_newest":
+                return
+            self._waiting.popleft()
+        self._waiting.append(token)
+
+    def check_invariants(self) -> None:
+        """Check what must hold between any two calls.
+
+        Raises:
+          AssertionError: it does not.
+        """
+        assert len(self._waiting) <= self._capacity, f"{len(self._waiting)} tokens wait, more than {self._capacity}"
+        numbers = [(one.stream, one.sequence) for one in self._waiting]
+        assert numbers == sorted(set(numbers)), "tokens wait out of order"

@@ -1,0 +1,81 @@
+"""What the producer of an exact link knows of one of its consumers.
+
+Stands on nothing; the producer alone changes it.
+"""
+
+from __future__ import annotations
+
+__all__ = ["Peer"]
+
+
+class Peer:
+    """One consumer, as its statuses have told.
+
+    Attributes:
+      name: its name on the link.
+      incarnation: which life of it is believed; 0: it was never heard of.
+      expected: the only incarnation to believe, or None for the newest that is heard of.
+      in_step: this life of it follows this epoch and stream: it is sent tokens. Others are only probed.
+      accepted: what it has got.
+      done: what it has processed; never goes back.
+      limit: what it has room for.
+      sent: what was sent to it and is not known to be lost.
+      last_serial: of what carried the last of those; a status that has seen it and lacks some proves them lost.
+      owed: it is to be probed at once.
+      since: when something was last sent to it or learnt of it.
+      patience_s: how long after that it is probed.
+    """
+
+    __slots__ = (
+        "accepted",
+        "done",
+        "expected",
+        "in_step",
+        "incarnation",
+        "last_serial",
+        "limit",
+        "name",
+        "owed",
+        "patience_s",
+        "sent",
+        "since",
+    )
+
+    def __init__(self, name: str, done: int, patience_s: float) -> None:
+        self.name = name
+        self.incarnation = 0
+        self.expected: int | None = None
+        self.in_step = False
+        self.accepted = self.done = self.limit = self.sent = done
+        self.last_serial = 0
+        self.owed = True
+        self.since = float("-inf")
+        self.patience_s = patience_s
+
+    def believes(self, incarnation: int) -> bool:
+        """Whether a word of that life of it counts."""
+        if self.expected is not None:
+            return incarnation == self.expected
+        return incarnation >= self.incarnation and incarnation > 0
+
+    def begin(self, incarnation: int) -> None:
+        """It has come back: what it had accepted and not done is gone with its former life."""
+        self.incarnation = incarnation
+        self.fall_out()
+
+    def fall_out(self) -> None:
+        """It has to be told where the producer stands before it can be sent anything."""
+        self.in_step = False
+        self.accepted = self.limit = self.sent = self.done
+        self.last_serial = 0
+
+    def step_in(self, accepted: int) -> None:
+        """It knows where the producer stands, and has so much."""
+        self.in_step = True
+        self.accepted = self.sent = accepted
+
+    def move_to(self, done: int) -> None:
+        """The numbers go on from elsewhere."""
+        self.done = done
+        self.fall_out()
+        self.owed = True

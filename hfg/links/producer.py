@@ -1,0 +1,419 @@
+"""The sending end of an exact link: numbers, windows, resends on evidence, probes (rules L1 to L3).
+
+Tokens are kept until every consumer has said that they are done. They are sent once to all; a second time only to a
+consumer whose status shows that it lacks them although it has seen what was sent after them, or which has begun a new
+life. One that is silent is asked by a small probe, less and less often, and never sent a large value to be sure.
+
+What this machine does not know: time but as an argument, how datagrams travel, and what a token is. Nothing that
+arrives can make it raise.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import islice
+from typing import Literal, NamedTuple
+
+import msgspec
+
+from hfg.errors import MessageTooLarge, UsageError
+from hfg.links.frames import (
+    OtherVersion,
+    Outgoing,
+    Probe,
+    Status,
+    Tokens,
+    Unreadable,
+    batches,
+    read_from_consumer,
+    write,
+)
+from hfg.links.peer import Peer
+from hfg.transport import Buffer, EncodedToken, Position
+
+__all__ = ["ExactProducer", "Outbox", "ProducerCounts"]
+
+
+class Outbox(NamedTuple):
+    """What a producer kept of its former life, so that nothing of it is lost.
+
+    Attributes:
+      stream: the numbering that is carried on.
+      first: the number of the first token, or of the next one if there is none.
+      tokens: what was not done, as far as is known.
+    """
+
+    stream: int
+    first: int
+    tokens: tuple[EncodedToken, ...] = ()
+
+
+class ProducerCounts(msgspec.Struct):
+    """What has happened at the sending end.
+
+    Attributes:
+      sent: tokens that were sent for the first time.
+      resent: tokens that were sent again, to each consumer that lacked them.
+      datagrams: that were put, probes among them.
+      probes: that were put.
+      restarts: new lives of consumers.
+      given_up: tokens that were not done when the link was closed or a consumer dismissed.
+      superseded: tokens that no consumer takes any more, since it follows a newer stream.
+      repeated: tokens that were sent before, by their positions; nothing became of them.
+      refused: datagrams that are no frame, or acknowledge what was never sent.
+      other_versions: datagrams of another version of the protocol.
+      strangers: frames of consumers that do not take part.
+      stale: frames of former lives of a consumer.
+      late: frames that were overtaken by newer ones.
+      fenced: frames that say that a newer life of this producer is at work.
+    """
+
+    sent: int = 0
+    resent: int = 0
+    datagrams: int = 0
+    probes: int = 0
+    restarts: int = 0
+    given_up: int = 0
+    superseded: int = 0
+    repeated: int = 0
+    refused: int = 0
+    other_versions: int = 0
+    strangers: int = 0
+    stale: int = 0
+    late: int = 0
+    fenced: int = 0
+
+
+class ExactProducer:
+    """The sending end of an exact link to one or several consumers.
+
+    Args:
+      epoch: which life of the producer this is; each must be higher than all before.
+      window: how many tokens may be unreleased, P4's buffer; 1 is the paper's rule.
+      release: what frees the producer's output: that a token is done or, for slots, accepted.
+      depth: with `release="accepted"`, how many more may be accepted and not done yet.
+      inherits: the positions of tokens are given with them; the first one begins the numbering.
+      outbox: what was kept of the former life.
+      largest_batch: bytes of a datagram of several tokens.
+      largest_token: bytes of a value and its metadata that can be sent at all.
+      probe_s: how long a consumer may be silent before it is probed.
+      slowest_probe_s: to what the time between two probes grows while nothing is heard.
+
+    Attributes:
+      counts: what has happened.
+      newer_epoch: that of a newer life of this producer, by which consumers have fenced this one off; or 0.
+    """
+
+    def __init__(
+        self,
+        epoch: int,
+        *,
+        window: int = 8,
+        release: Literal["done", "accepted"] = "done",
+        depth: int = 0,
+        inherits: bool = False,
+        outbox: Outbox | None = None,
+        largest_batch: int = 60_000,
+        largest_token: int = 2**30,
+        probe_s: float = 0.1,
+        slowest_probe_s: float = 0.5,
+    ) -> None:
+        if epoch < 1 or window < 1 or depth < 0:
+            raise UsageError(f"a link needs epoch >= 1, window >= 1 and depth >= 0, got {epoch}, {window}, {depth}")
+        self.epoch = epoch
+        self.counts = ProducerCounts()
+        self.newer_epoch = 0
+        self._window = window
+        self._most = window + depth
+        self._eager = release == "accepted"
+        self._inherits = inherits
+        self._largest_batch = largest_batch
+        self._largest_token = largest_token
+        self._probe_s = probe_s
+        self._slowest_probe_s = slowest_probe_s
+        kept = outbox or Outbox(0 if inherits else epoch, 1)
+        self._stream = kept.stream  # 0: not begun
+        self._kept: deque[EncodedToken] = deque(kept.tokens)  # what is not done by all
+        self._next = kept.first + len(kept.tokens)
+        self._put = kept.first - 1  # what was sent to all, but for those out of step
+        self._released = kept.first - 1
+        self._serial = 0
+        self._peers: dict[str, Peer] = {}
+        self._closed = False
+
+    # --- what the producing node asks and does
+
+    @property
+    def free(self) -> bool:
+        """Whether it takes a token."""
+        return self._next - 1 - self._released < self._window and len(self._kept) < self._most
+
+    @property
+    def released(self) -> int:
+        """The last number of the stream for which the producer's output is free again."""
+        return self._released
+
+    @property
+    def position(self) -> Position:
+        """That of the last token that was sent."""
+        return Position(self._stream, self._next - 1)
+
+    @property
+    def unfinished(self) -> int:
+        """How many tokens are not done by all."""
+        return len(self._kept)
+
+    def takes(self, position: Position | None = None) -> bool:
+        """Whether a token of that position can be sent now: `free`, and where numbers jump all before is done."""
+        if position is not None and tuple(position) >= (self._stream, self._next):
+            follows = position == (self._stream, self._next)
+            return self.free if follows else not self._kept
+        return self.free or position is not None
+
+    def send(self, token: EncodedToken, position: Position | None = None) -> Position:
+        """Take the next token; it leaves with the next `flush`.
+
+        Raises:
+          UsageError: the window is full, or the link is closed.
+          MessageTooLarge: the value is too large for the transport.
+        """
+        if position is not None and not self._begin_at(position):
+            self.counts.repeated += 1
+            return position
+        if not self.free or self._closed:
+            raise UsageError("the link is closed" if self._closed else f"the window of {self._window} tokens is full")
+        metadata, value = token
+        if type(value) is memoryview and (value.ndim != 1 or value.itemsize != 1):
+            token = (metadata, value.cast("B"))
+        if len(token[1]) + len(metadata) > self._largest_token:
+            raise MessageTooLarge(
+                f"a token of {len(token[1])} bytes cannot be sent: the transport carries {self._largest_token} at once"
+            )
+        number = self._next
+        if self._stream == 0:
+            raise UsageError("this link inherits its numbers: give the position of the input with the first token")
+        self._kept.append(token)
+        self._next = number + 1
+        if not self._peers or number <= self._released:  # done before: a relay that began anew comes to it again
+            self._free()
+        return Position(self._stream, number)
+
+    def _begin_at(self, position: Position) -> bool:
+        """Whether a token of that position is new; numbers go on from there if they jump."""
+        here = (self._stream, self._next)
+        if position == here:
+            return True
+        if tuple(position) < here and self._stream:
+            return False
+        if self._kept:
+            raise UsageError(f"numbers jump from {here} to {tuple(position)} while tokens are not done: await send()")
+        self._stream = position.stream
+        self._next = position.sequence
+        self._put = self._released = position.sequence - 1
+        for peer in self._peers.values():
+            peer.move_to(position.sequence - 1)
+        return True
+
+    def admit(self, consumer: str, incarnation: int | None = None, *, after: int | None = None) -> None:
+        """Let a consumer take part; or say whom to believe of one that does.
+
+        Args:
+          consumer: its name on this link.
+          incarnation: the only life of it to believe from now on; None: the newest that is heard of.
+          after: the number behind which it takes part, for those that did when an outbox was kept; None: from the next
+            token on.
+        """
+        peer = self._peers.get(consumer)
+        if peer is None:
+            last = self._next - 1
+            done = last if after is None else min(max(after, last - len(self._kept)), last)
+            peer = self._peers[consumer] = Peer(consumer, done, self._probe_s)
+        if incarnation is not None:
+            peer.expected = incarnation
+            if peer.incarnation != incarnation:
+                peer.begin(incarnation)
+                peer.owed = True
+
+    def dismiss(self, consumer: str) -> None:
+        """Wait for a consumer no longer."""
+        peer = self._peers.pop(consumer, None)
+        if peer is not None:
+            self.counts.given_up += self._next - 1 - peer.done
+            self._free()
+
+    def close(self) -> list[Outgoing]:
+        """End it: what is not done is given up, and consumers are told."""
+        if self._closed:
+            return []
+        self._closed = True
+        self.counts.given_up += len(self._kept)
+        return [self._probe(peer) for peer in self._peers.values() if self._stream]
+
+    # --- what arrives
+
+    def receive(self, header: Buffer, payload: Buffer = b"") -> None:
+        """Take a datagram of a consumer; `flush` gives what follows from it."""
+        del payload  # statuses have none
+        try:
+            status = read_from_consumer(header)
+        except OtherVersion:
+            self.counts.other_versions += 1
+        except Unreadable:
+            self.counts.refused += 1
+        else:
+            peer = self._peers.get(status.consumer)
+            if peer is None:
+                self.counts.strangers += 1
+            elif not peer.believes(status.incarnation):
+                self.counts.stale += 1
+            else:
+                self._learn(peer, status)
+
+    def _learn(self, peer: Peer, status: Status) -> None:
+        if status.incarnation != peer.incarnation:
+            self.counts.restarts += peer.incarnation > 0
+            peer.begin(status.incarnation)
+            peer.patience_s = self._probe_s
+        if status.epoch > self.epoch:  # a fact for whoever supervises this producer, who may know that it is forged
+            self.counts.fenced += 1
+            self.newer_epoch = max(self.newer_epoch, status.epoch)
+        elif (status.epoch, status.stream) == (self.epoch, self._stream):
+            self._acknowledge(peer, status)
+        elif status.epoch == self.epoch and status.stream > self._stream and self._inherits:
+            self.counts.superseded += self._next - 1 - peer.done
+            peer.move_to(self._next - 1)
+            peer.owed = False  # nothing of this stream is wanted there
+            self._free()
+        elif status.epoch == self.epoch and status.stream > self._stream:
+            self.counts.refused += 1
+        elif peer.in_step:
+            self.counts.late += 1
+        else:
+            peer.owed = True
+
+    def _acknowledge(self, peer: Peer, status: Status) -> None:
+        """A word on this very stream: what it has, what is done, what it lacks."""
+        impossible = status.accepted >= self._next and not self._inherits
+        if impossible or not status.done <= status.accepted <= status.limit:
+            self.counts.refused += 1
+            return
+        if not peer.in_step:
+            if status.accepted < peer.done:  # its ledger is behind its own word: it is told from where it can go on
+                peer.owed = True
+                return
+            peer.step_in(status.accepted)
+        news = status.accepted > peer.accepted or status.done > peer.done or status.limit > peer.limit
+        peer.accepted = max(peer.accepted, status.accepted)
+        peer.limit = max(peer.limit, status.limit)
+        if status.seen >= peer.last_serial and peer.accepted < peer.sent:
+            peer.sent = peer.accepted  # it has seen what was sent last, and lacks these
+        peer.sent = max(peer.sent, peer.accepted)
+        if status.done > peer.done:
+            peer.done = status.done
+        if news:
+            peer.patience_s = self._probe_s
+            self._free()
+
+    def _free(self) -> None:
+        """Forget what is done by all, and see how far the output is free."""
+        last = self._next - 1
+        peers = self._peers.values()
+        done = min((peer.done for peer in peers), default=last)
+        released = min((max(peer.accepted, peer.done) for peer in peers), default=last) if self._eager else done
+        self._released = (
+            max(self._released, min(released, last)) if not self._inherits else max(self._released, released)
+        )
+        first = self._next - len(self._kept)
+        if done >= last:
+            self._kept.clear()
+        else:
+            for _ in range(done - first + 1):
+                self._kept.popleft()
+        self._put = max(self._put, min(done, last))
+
+    # --- what leaves
+
+    def flush(self, now: float) -> list[Outgoing]:
+        """Give what is to be sent now: new tokens, what consumers lack, and probes that are due.
+
+        To be called when something was sent or has arrived, at the end of a burst of either, and at `due`.
+        """
+        if self._closed or self._stream == 0:
+            return []
+        out: list[Outgoing] = []
+        ready = [peer for peer in self._peers.values() if peer.in_step]
+        for peer in ready:
+            last = min(self._put, peer.limit)
+            if peer.sent < last:
+                self.counts.resent += last - peer.sent
+                self._transmit(out, peer.name, peer.sent + 1, last, [peer], now)
+        last = self._next - 1
+        if ready and self._put < last:
+            has = min([peer.sent for peer in ready])
+            if has >= self._put:  # else somebody has no room for what others have got
+                last = min(last, min([peer.limit for peer in ready]))
+                first = max(self._put, min(has, last)) + 1
+                self._put = first - 1
+                if first <= last:
+                    self.counts.sent += last - first + 1
+                    self._put = last
+                    self._transmit(out, None, first, last, ready, now)
+        for peer in self._peers.values():
+            if peer.owed or (peer.done < self._next - 1 and now >= peer.since + peer.patience_s):
+                if not peer.owed:
+                    peer.patience_s = min(2 * peer.patience_s, self._slowest_probe_s)
+                peer.owed = False
+                peer.since = now
+                out.append(self._probe(peer))
+        return out
+
+    @property
+    def due(self) -> float | None:
+        """When `flush` has something to do though nothing happens; None: never."""
+        waits = [peer.since + peer.patience_s for peer in self._peers.values() if peer.done < self._next - 1]
+        return min(waits) if waits and self._stream and not self._closed else None
+
+    def _transmit(
+        self, out: list[Outgoing], to: str | None, first: int, last: int, peers: list[Peer], now: float
+    ) -> None:
+        skipped = first - (self._next - len(self._kept))
+        run = list(islice(self._kept, skipped, skipped + last - first + 1))
+        for metadata, payload in batches(run, self._largest_batch):
+            self._serial += 1
+            out.append(Outgoing(to, write(Tokens(self.epoch, self._stream, first, self._serial, metadata)), payload))
+            first += len(metadata)
+            self.counts.datagrams += 1
+        for peer in peers:
+            peer.sent = max(peer.sent, last)
+            peer.last_serial = self._serial
+            peer.since = now
+
+    def _probe(self, peer: Peer) -> Outgoing:
+        self._serial += 1
+        self.counts.datagrams += 1
+        self.counts.probes += 1
+        probe = Probe(
+            peer.name,
+            peer.incarnation,
+            self.epoch,
+            self._stream,
+            peer.done + 1,
+            self._next - 1,
+            self._serial,
+            self._eager,
+            self._closed,
+        )
+        return Outgoing(peer.name, write(probe), b"")
+
+    def check_invariants(self) -> None:
+        """Check what must hold between any two calls.
+
+        Raises:
+          AssertionError: it does not.
+        """
+        first = self._next - len(self._kept)
+        assert len(self._kept) <= self._most, f"it keeps {len(self._kept)} tokens, more than {self._most} (L1)"
+        assert first - 1 <= self._put < self._next, f"it has put {self._put} and keeps {first} to {self._next - 1}"
+        for peer in self._peers.values():
+            assert peer.done >= first - 1, f"{peer.name} lacks {peer.done + 1}, which is not kept (L2)"
+            assert not peer.in_step or peer.sent >= peer.accepted >= peer.done, f"{peer.name} is ahead of itself"
