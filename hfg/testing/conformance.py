@@ -25,6 +25,7 @@ from hfg.trace import (
     ErrorRaised,
     EventTriggered,
     FiringEnded,
+    FiringRetried,
     FiringStarted,
     NodeEnabled,
     NodeEnded,
@@ -48,6 +49,7 @@ __all__ = ["Divergence", "Replay", "describe", "key", "replay", "token_key", "va
 _RULES: Final[dict[type[TraceEvent], str]] = {
     FiringStarted: "F1, F4, F5, F8, F9, F11, A11",
     FiringEnded: "F3, F4, X1",
+    FiringRetried: "X1, X2",
     CallStarted: "F6, F8, F9",
     CallEnded: "F6, F9",
     TokenSent: "F3, T2-T5, A3-A5, P5, P8, F13",
@@ -416,6 +418,8 @@ def key(event: TraceEvent) -> tuple[Any, ...]:
         return (kind, event.event, value_key(event.token.value), round(event.token.stamp, 9))
     if isinstance(event, ErrorRaised):
         return (kind, event.node, event.policy)
+    if isinstance(event, FiringRetried):
+        return (kind, event.node, event.number, event.attempt, round(event.pause_s, 9))
     if isinstance(event, ParameterSet):
         return (kind, event.node, event.parameter, value_key(event.value))
     return (kind, *(getattr(event, name) for name in event.__struct_fields__ if name != "time"))

@@ -83,6 +83,7 @@ class Allowed:
     disabling: bool = True
     readiness: bool = True
     concurrency: bool = False  # several firings of async nodes under way at once
+    retries: bool = False  # firings that fail are tried again
     through: bool = False  # operators on edges, with schedulers and without
     iteration: bool = False  # inside of iteration
     endings: bool = False  # last words, sources without end that work for who will have ended
@@ -132,7 +133,7 @@ _PLAIN_WHERE_ACTIVITY_MOVES = ["handing"]
 FEEDS = ("red", "blue")
 """The inputs of graphs that are fed from outside."""
 
-_WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay", "calm", "restless", "calling"}
+_WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay", "calm", "restless", "calling", "Unsteady"}
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear"}
 _TURNED = {"Scaled": "factor", "Pulse": "most", "Script": "count", "Hums": "tone"}
@@ -156,7 +157,8 @@ _OPERATORS: list[tuple[str, list[float]]] = [
     ("throttle_first", [0.005]),
     ("beside_a_timer", [0.002, 0.02]),
 ]
-_SEVERAL = ("slow_double", "Waiting", "restless", "calm")
+_SEVERAL = ("slow_double", "Waiting", "restless", "calm", "Unsteady")
+_TRIED_AGAIN = ("Unsteady", "Stubborn")
 
 _DELICATE_SLOTS = ["activate", "deactivate", "reset", "disable", "enable"]
 
@@ -180,6 +182,7 @@ class _Making:
         inner += ["Relay", "Relay", "Doubter"] if allowed.events else []
         inner += ["Scaled"] if allowed.parameters else []
         inner += ["OnlyTwice"] if allowed.readiness else []
+        inner += ["Unsteady"] * 3 + ["Stubborn"] * 2 if allowed.retries else []
         inner += ["LastWord", "LastWord", "Hums"] if allowed.endings and not allowed.plain else []
         inner += ["EachOfEach"] if allowed.iteration and not allowed.plain else []
         inner += ["Clings"] if allowed.clinging and not allowed.plain else []
@@ -228,7 +231,7 @@ class _Making:
                 return {"modulus": choose.number(2, 3)}
             case "Failing" | "picky" | "gives_up":
                 return {"at": choose.number(2, 3)}
-            case "slow_double" | "Waiting":
+            case "slow_double" | "Waiting" | "Unsteady":
                 return {"pause_s": choose.one_of([0.0, 0.003, 0.01])}
         return {}
 
@@ -249,12 +252,25 @@ class _Making:
             options["on_error"] = choose.one_of(
                 ["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"]
             )
+        if kind in _TRIED_AGAIN:
+            options |= self._trying_again(kind)
         if allowed.activity and choose.chance(self._seldom(10)):
             options["active_for_s"] = choose.one_of([0.02, 0.005])
         if allowed.disabling and choose.chance(4):
             options["enabled"] = False
         if allowed.threads and kind not in _WAITING and choose.chance(self._seldom(50)):
             options["group"] = choose.one_of(["left", "right"])
+        return options
+
+    def _trying_again(self, kind: str) -> dict[str, Any]:
+        """How often, and when, a firing that has failed is tried again; what follows behind the last attempt (X1)."""
+        choose = self.choose
+        options: dict[str, Any] = {"retries": choose.number(1, 4), "retry_backoff_s": choose.one_of([0.004, 0.0, 0.02])}
+        if choose.chance(30):
+            options["retry_backoff_max_s"] = 0.006
+        if kind == "Unsteady" and choose.chance(20):
+            options["max_duration_s"] = 0.005
+        options["on_error"] = choose.one_of(["skip", "skip", "skip", "restart", "disable", "stop"])
         return options
 
     # --- ends

@@ -36,7 +36,9 @@ __all__ = [
     "Sends",
     "Sieve",
     "Stateful",
+    "Stubborn",
     "Tally",
+    "Unsteady",
     "Waiting",
     "add",
     "ascript",
@@ -484,6 +486,55 @@ class Waiting(hfg.Node):
         await asyncio.sleep(self.pause_s)
         self.after.trigger(value)
         return None if value % 2 else value
+
+
+class Unsteady(hfg.Node):
+    """Waits, and fails as often for a token as its value says; now and then it has sent a signal before."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    tried = hfg.Event(int)
+    pause_s = hfg.Parameter(0.003)
+
+    def setup(self) -> None:
+        """Nothing was tried so far: tokens are told apart by stamp and number, values may come again."""
+        self.tries: dict[tuple[float, int, int], int] = {}
+
+    async def process(self, value: hfg.Token[int]) -> int:
+        """Fail at the first tries; a signal leaves amid the second, so that there is no third."""
+        tries = _one_more(self.tries, value)
+        if tries % 2 and tries <= value.value % 4:
+            self.out.send(-tries)  # it is thrown away
+        await asyncio.sleep(self.pause_s)
+        if tries == 2 and value.value % 5 == 3:
+            self.tried.trigger(tries)
+        if tries <= value.value % 4:
+            raise ConnectionError(f"try {tries} of {value.value}")
+        return value.value + tries
+
+
+class Stubborn(hfg.Node):
+    """Fails as often for a token as its value says, without waiting."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def setup(self) -> None:
+        """Nothing was tried so far."""
+        self.tries: dict[tuple[float, int, int], int] = {}
+
+    def process(self, value: hfg.Token[int]) -> int:
+        """Fail, or answer."""
+        tries = _one_more(self.tries, value)
+        if tries <= value.value % 3:
+            raise ConnectionError(f"try {tries} of {value.value}")
+        return value.value + tries
+
+
+def _one_more(tries: dict[tuple[float, int, int], int], token: hfg.Token[int]) -> int:
+    which = (token.stamp, token.sequence, token.value)
+    tries[which] = tries.get(which, 0) + 1
+    return tries[which]
 
 
 class Sieve(hfg.Node):

@@ -14,11 +14,11 @@ import pytest
 
 import hfg
 from hfg import END, NO_MESSAGE
-from hfg.testing import Recorder
+from hfg.testing import Recorder, replay
 from hfg.testing.nodes import Doubter, Tally, add, ascript, script, sink, slow_double
-from hfg.trace import CallStarted, ErrorRaised, FiringEnded, NodeEnabled
+from hfg.trace import CallEnded, CallStarted, ErrorRaised, FiringEnded, NodeEnabled
 from tests.semantics.nodes import drive
-from tests.semantics.readings import sent, starts
+from tests.semantics.readings import by_engine, sent, starts
 
 Pauses = tuple[float, ...]
 
@@ -603,3 +603,133 @@ def test_firings_that_wait_for_a_place_that_never_comes_are_no_work_under_way(pe
 
     found = perform(build, lambda seen: (seen.outcome, seen.values("slow_double.out -> never.a")))
     assert found == ("stalled", [2])
+
+
+# --- who is reset, or enabled again, amid its firings
+
+
+class Opened(hfg.Node):
+    """Answers when its pause is over, and tells what has happened since it was set up."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(list)
+    pauses: hfg.Parameter[Pauses] = hfg.Parameter((1.0,))
+
+    def setup(self) -> None:
+        self.since = ["up"]
+
+    def teardown(self) -> None:
+        self.since.append("down")
+
+    async def process(self, value: int) -> list[str]:
+        await asyncio.sleep(self.pauses[(value - 1) % len(self.pauses)])
+        self.since.append("gave")
+        return list(self.since)
+
+    @hfg.slot
+    def ask(self) -> None:
+        self.since.append("asked")
+
+
+@hfg.node
+async def keeps(value: Any, *, for_s: float = 0.0) -> None:
+    await asyncio.sleep(for_s)
+
+
+def called_amid(pauses: Pauses, *slots: str, concurrency: int = 2, for_s: float = 0.0) -> hfg.Graph:
+    """Its firings begin at 0; its slots are called at 0.5, 0.75 ... by outputs."""
+    graph = hfg.Graph()
+    node = graph.add(Opened(pauses=pauses), name="node", concurrency=concurrency)
+    graph.connect(graph.add(script(values=(1, 2, 3))).out, node.value)
+    node >> graph.add(keeps(for_s=for_s), name="behind", release="sequential")
+    for number, slot in enumerate(slots):
+        caller = graph.add(ascript(values=(1,), pause_s=0.5 + number / 4), name=f"caller{number}")
+        graph.connect(caller.out, node.ports.slots[slot])
+    return graph
+
+
+def calls_of(seen: Recorder, node: str) -> list[tuple[float, float]]:
+    """When its calls began and ended."""
+    began = [event.time for event in seen.of(CallStarted) if event.node == node]
+    return list(zip(began, [event.time for event in seen.of(CallEnded) if event.node == node], strict=True))
+
+
+ANSWERS = "node.out -> behind.value"
+
+
+@pytest.mark.rule("F14", "A9", "F9")
+def test_a_reset_begins_at_once_and_is_over_behind_the_code_of_all_firings(perform: Any) -> None:
+    """No firing and no other call begins meanwhile, and nobody works on what was torn down under its hands."""
+
+    def build() -> hfg.Graph:
+        return called_amid((3.0, 1.0, 1.0), "reset", "ask")
+
+    given = [(3, ["up", "gave", "gave"]), (3, ["up", "gave"]), (4, ["up", "asked", "gave"]), (4, END)]
+    assert perform(build, lambda seen: sent(seen, ANSWERS)) == given
+    assert perform(build, lambda seen: calls_of(seen, "node")) == [(0.5, 3), (3, 3)]
+    assert perform(build, lambda seen: starts(seen, "node", kind="process")) == [0, 0, 3]
+
+
+@pytest.mark.rule("F14", "A9")
+def test_a_reset_does_not_wait_for_what_is_over_and_has_not_left(perform: Any) -> None:
+    """The second is over at 0.25 and waits behind the first, which the consumer keeps for five seconds."""
+
+    def build() -> hfg.Graph:
+        return called_amid((0.125, 0.25, 1.0), "reset", for_s=5.0)
+
+    assert perform(build, lambda seen: calls_of(seen, "node")) == [(0.5, 0.5)]
+    assert perform(build, lambda seen: [time for time, _ in sent(seen, ANSWERS)[:2]]) == [0.125, 5.125]
+
+
+@pytest.mark.rule("F14", "A9", "F4")
+def test_a_reset_before_the_turn_of_its_end_has_come_ends_that() -> None:
+    """It has not ended then (A9), and the firing that was to end it is told to be over.
+
+    The engine takes END as soon as it can; by the rules it may as well lie there until the others are over.
+    """
+    seen = by_engine(called_amid((0.25, 0.25, 0.25), "reset", concurrency=4, for_s=5.0), 0)
+    over = [(event.time, event.number, event.outcome) for event in seen.of(FiringEnded) if event.node == "node"]
+    assert over == [(0.25, 1, "done"), (0.5, 4, "abandoned"), (5.25, 2, "done"), (10.25, 3, "done")]
+    assert END not in [value for _, value in sent(seen, ANSWERS)]
+    assert seen.outcome == "done"
+    replay(lambda: called_amid((0.25, 0.25, 0.25), "reset", concurrency=4, for_s=5.0), seen)
+
+
+@pytest.mark.rule("F14", "F10")
+def test_who_is_enabled_again_amid_its_firings_comes_back_behind_them(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        return called_amid((3.0, 1.0), "disable", "enable")
+
+    assert perform(build, lambda seen: calls_of(seen, "node")) == [(0.5, 0.5), (0.75, 3)]
+    assert perform(build, lambda seen: [(event.time, event.enabled) for event in seen.of(NodeEnabled)]) == [
+        (0.5, False),
+        (3, True),
+    ]
+
+
+@pytest.mark.rule("F14", "G2")
+def test_a_reset_of_a_subgraph_waits_for_none_of_its_firings(perform: Any) -> None:
+    """Each node inside is reset as soon as none of its firings is under way; the call is over at once."""
+
+    def build() -> hfg.Graph:
+        class Box(hfg.Subgraph):
+            value = hfg.Input(int)
+            out = hfg.Output(list)
+
+            def build(self, graph: hfg.Graph) -> None:
+                node = graph.add(Opened(pauses=(3.0, 1.0)), name="node", concurrency=2)
+                graph.connect(self.value.inner, node.value)
+                graph.connect(node.out, self.out.inner)
+
+        graph = hfg.Graph()
+        box = graph.add(Box(), name="box")
+        graph.add(script(values=(1, 2, 3))) >> box
+        box >> graph.add(keeps(), name="behind")
+        graph.connect(graph.add(ascript(values=(1,), pause_s=0.5)).out, box.reset)
+        return graph
+
+    def read(seen: Recorder) -> Any:
+        return calls_of(seen, "box"), sent(seen, "box/node.out -> behind.value")
+
+    given = [(3, ["up", "gave", "gave"]), (3, ["up", "gave"]), (6, ["up", "gave"]), (6, END)]
+    assert perform(build, read) == ([(0.5, 0.5)], given)

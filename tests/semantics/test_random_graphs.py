@@ -22,7 +22,8 @@ from hfg.testing.shrinking import shrink
 
 MOST_MOVES = 1500
 EVERYTHING = Allowed()
-SEVERAL_AT_ONCE = Allowed(concurrency=True, disabling=False)
+SEVERAL_AT_ONCE = Allowed(concurrency=True)
+TRIED_AGAIN = Allowed(concurrency=True, retries=True)
 THREADS = Allowed(threads=True, lossy=False, gates=False)
 
 
@@ -87,12 +88,22 @@ def has_several_at_once(plan: GraphPlan) -> bool:
 
 
 @pytest.mark.rule("F14", "F9")
-def test_so_it_does_with_several_firings_of_a_node_at_once() -> None:
-    """Nothing is reset here: with firings under way the engine ends that call behind them, the oracle at once."""
-    drawn = ((seed, random_plan(seed, SEVERAL_AT_ONCE)) for seed in itertools.count())
+@pytest.mark.parametrize("block", range(4))
+def test_so_it_does_with_several_firings_of_a_node_at_once(block: int) -> None:
+    drawn = ((seed, random_plan(seed, SEVERAL_AT_ONCE)) for seed in itertools.count(300 * block))
     chosen = ((seed, plan) for seed, plan in drawn if has_several_at_once(plan) and reference(plan, seed) is not None)
-    for seed, plan in itertools.islice(chosen, 60):
+    for seed, plan in itertools.islice(chosen, 15):
         check(plan, seed)
+
+
+@pytest.mark.rule("X1", "X2")
+@pytest.mark.parametrize("block", range(4))
+def test_so_it_does_where_firings_that_fail_are_tried_again(block: int) -> None:
+    """One at a time, several at once, in threads; with limits of time, and signals behind which nobody tries again."""
+    for seed in range(25 * block, 25 * block + 25):
+        plan = random_plan(seed, replace(TRIED_AGAIN, threads=seed % 5 == 0))
+        if reference(plan, seed) is not None:
+            check(plan, seed)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

@@ -10,8 +10,12 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg import END, NO_MESSAGE
+from hfg.testing import Recorder, reference_run
+from hfg.testing.nodes import Unsteady, script
 from hfg.trace import ErrorRaised, FiringEnded, FiringRetried, FiringStarted, TraceEvent
 from tests.semantics.nodes import Keep, drive, numbers, of_kind, run
+from tests.semantics.readings import sent
 
 
 class Device(hfg.Node):
@@ -204,3 +208,82 @@ def test_whoever_ends_a_task_on_purpose_is_not_tried_again(fast: bool) -> None:
     assert not of_kind(trace, FiringRetried)
     assert len(of_kind(trace, ErrorRaised)) <= 1
     assert all(earlier.time <= later.time for earlier, later in pairwise(trace))
+
+
+# --- read by engine and oracle
+
+
+def unsteady(*values: int, pause_s: float = 1.0, **options: Any) -> hfg.Graph:
+    """It fails as often for a value as its remainder by four says, a second after each beginning."""
+    graph = hfg.Graph()
+    node = graph.add(Unsteady(pause_s=pause_s), name="node", on_error="skip", retry_backoff_s=0.5, **options)
+    graph.add(script(values=values)) >> node
+    graph.connect(node.out, graph.add(Keep(), name="keep").value)
+    graph.connect(node.tried, graph.add(Keep(), name="heard").value)
+    return graph
+
+
+def tried(seen: Recorder) -> list[tuple[float, int, int, float]]:
+    return [(event.time, event.number, event.attempt, event.pause_s) for event in seen.of(FiringRetried)]
+
+
+GIVEN = "node.out -> keep.value"
+
+
+@pytest.mark.rule("X1")
+@pytest.mark.parametrize(
+    ("concurrency", "again", "given"),
+    [
+        pytest.param(
+            1,
+            [(1, 1, 1, 0.5), (2.5, 1, 2, 1.0), (5.5, 2, 1, 0.5)],
+            [(4.5, 2 + 3), (7, 1 + 2), (7, END)],
+            id="one after the other",
+        ),
+        pytest.param(
+            2,
+            [(1, 1, 1, 0.5), (1, 2, 1, 0.5), (2.5, 1, 2, 1.0)],
+            [(4.5, 2 + 3), (4.5, 1 + 2), (4.5, END)],
+            id="at once",
+        ),
+    ],
+)
+def test_a_firing_is_over_behind_its_last_attempt(
+    perform: Any, concurrency: int, again: list[Any], given: list[Any]
+) -> None:
+    """The first fails at 1 and 2.5, its third attempt begins behind a pause of one second, at 3.5."""
+
+    def build() -> hfg.Graph:
+        return unsteady(2, 1, retries=3, concurrency=concurrency)
+
+    assert perform(build, lambda seen: sorted(tried(seen))) == again
+    assert perform(build, lambda seen: sent(seen, GIVEN)) == given
+
+
+@pytest.mark.rule("X1", "F3")
+@pytest.mark.parametrize("concurrency", [1, 2])
+def test_nobody_tries_again_behind_a_signal_or_behind_the_last_retry(perform: Any, concurrency: int) -> None:
+    """3 is told of amid the second attempt; 7, which fails three times, has but one retry."""
+
+    def build(retries: int, value: int) -> hfg.Graph:
+        return unsteady(value, retries=retries, concurrency=concurrency)
+
+    for retries, value, heard in ((3, 3, [(2.5, 2)]), (1, 7, [])):
+        assert perform(lambda r=retries, v=value: build(r, v), lambda seen: sent(seen, GIVEN)[0]) == (2.5, NO_MESSAGE)
+        told = perform(lambda r=retries, v=value: build(r, v), lambda seen: sent(seen, "node.tried -> heard.value"))
+        assert [one for one in told if one[1] is not END] == heard
+
+
+@pytest.mark.rule("X1", "X2")
+def test_the_limit_of_time_is_for_each_attempt_and_the_pause_not_part_of_it(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        return unsteady(4, pause_s=2.0, retries=2, max_duration_s=1.5, retry_backoff_max_s=0.75)
+
+    assert perform(build, tried) == [(1.5, 1, 1, 0.5), (3.5, 1, 2, 0.75)]
+    assert perform(build, lambda seen: sent(seen, GIVEN)) == [(5.75, NO_MESSAGE), (5.75, END)]
+
+
+@pytest.mark.rule("X1", "R6")
+def test_the_oracle_says_that_it_draws_no_pauses() -> None:
+    with pytest.raises(NotImplementedError, match='the pauses of "node" are shorter by chance'):
+        reference_run(unsteady(1, retries=1, retry_jitter=0.5))

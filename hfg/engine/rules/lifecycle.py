@@ -18,7 +18,7 @@ from hfg.engine.rules.sending import send_end, telling_behind
 from hfg.engine.rules.sources import judge_sources
 from hfg.errors import NodeError
 from hfg.ports.edges import BufferEdge, Edge, EventEdge
-from hfg.trace import NodeEnabled
+from hfg.trace import FiringEnded, NodeEnabled
 
 __all__ = [
     "Then",
@@ -227,7 +227,7 @@ def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> 
             then()  # disabled again meanwhile
             return
         worker.allow(DISABLED | ENDED)
-        worker.not_ended()
+        _not_ended(worker)
         if itself and core.seldom is not None:  # else the subgraph around it was, and that is told
             core.seldom(NodeEnabled(core.now(), worker.path, True))
         wiring.refresh(worker)
@@ -263,11 +263,19 @@ def _afresh(worker: Worker, then: Callable[[], None]) -> None:
         tear_down(worker, down)
 
 
+def _not_ended(worker: Worker) -> None:
+    """It starts afresh; a firing that was to end it behind others whose turn has not come is over with that (F14)."""
+    flights, core = worker.flights, worker.core
+    if flights is not None and flights.ending is not None and core.trace is not None:
+        core.trace(FiringEnded(core.now(), worker.path, flights.end_number, "abandoned"))
+    worker.not_ended()
+
+
 def reset(worker: Worker, then: Callable[[], None]) -> None:
     """The slot `reset`: teardown, setup, not ended; tokens and A(v) stay (A9)."""
 
     def up() -> None:
-        worker.not_ended()
+        _not_ended(worker)
         unblock(worker, ENDED)
         wiring.refresh(worker)
         judge_sources(worker.core)

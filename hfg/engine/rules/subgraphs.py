@@ -54,7 +54,7 @@ def _each(workers: Iterable[Worker], action: Action, then: Callable[[], None]) -
             return
         inside = True
         for worker in rest:
-            if worker.busy:
+            if worker.busy or worker.is_flying():
                 when_idle(worker, action, lifecycle.nothing)
                 continue
             done_inside = False

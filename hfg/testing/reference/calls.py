@@ -10,7 +10,7 @@ from hfg.testing.reference.firing import Firing
 from hfg.testing.reference.state import Flight, Line, Lying, Station
 from hfg.testing.reference.structure import ROOT, boundary_of, is_box
 from hfg.token import Token
-from hfg.trace import CallEnded, CallStarted, ErrorRaised, NodeEnabled, TokenProcessed, TokenTaken
+from hfg.trace import CallEnded, CallStarted, ErrorRaised, FiringEnded, NodeEnabled, TokenProcessed, TokenTaken
 
 __all__ = ["Calling"]
 
@@ -77,15 +77,18 @@ class Calling(Firing):
         actions: dict[str, Callable[[], None]] = {
             "enable": lambda: self.enable(index),
             "disable": lambda: self.disable(index),
-            "reset": lambda: self.restart_behind_firings(station),
+            "reset": lambda: self.reset(station),
             "activate": lambda: self.set_active(index, True, "slot"),
             "deactivate": lambda: self.deactivate(index),
         }
         return actions[name]
 
     def launch_call(self, flight: Flight, handler: Callable[[], Any]) -> None:
-        """Run the handler where its group runs."""
+        """Run the handler where its group runs; what tears the node down behind its firings (F14)."""
         automatic = flight.slot not in flight.station.type.slots
+        if automatic and self.begins_afresh(flight) and flight.station.is_flying:
+            flight.when_rested = lambda: self.launch_call(flight, handler)
+            return
         # `setup` and `teardown` run where the node does
         at_once = automatic and flight.slot not in ("reset", "enable")
         self.begin_in_group(flight, at_once or (not automatic and self.is_async_slot(flight)))
@@ -98,6 +101,13 @@ class Calling(Firing):
             self.end_call(flight, error)
 
         self.launch(flight, lambda: None, set_up_there)
+
+    def begins_afresh(self, flight: Flight) -> bool:
+        """Whether what an automatic slot does begins with a teardown (A9, F10)."""
+        if flight.slot == "reset":
+            return True
+        index = flight.station.leaf.index
+        return flight.slot == "enable" and not self.is_enabled(index) and self.is_enabled_around(index)
 
     def is_async_slot(self, flight: Flight) -> bool:
         """Whether the handler may wait."""
@@ -152,17 +162,17 @@ class Calling(Firing):
             self.quench(-2 - owner, "slot")
         else:
             for station in self.members_of(owner):
-                if not station.flights:
-                    self.restart(station)
+                if not station.is_amid:
+                    self.reset(station)
                 else:
                     station.afterwards = station.afterwards or "reset"
 
-    def restart_behind_firings(self, station: Station) -> None:
-        """Restart it as soon as none of its firings is under way, for its calls do not wait for those (F14)."""
-        if station.firings_under_way:
-            station.afterwards = station.afterwards or "reset"
-        else:
-            self.restart(station)
+    def reset(self, station: Station) -> None:
+        """A9: it has not ended, so what was to end it behind firings whose turn has not come does so no more (F14)."""
+        for flight in [flight for flight in station.firings_under_way if flight.waits_to_end]:
+            station.flights.remove(flight)
+            self.observe(FiringEnded(self.now, station.path, flight.number, "abandoned"))
+        self.restart(station)
 
     def restart(self, station: Station) -> None:
         """Teardown, setup, not ended; tokens and A(v) stay. In a back-off that is done when it is over (X1)."""
@@ -207,11 +217,10 @@ class Calling(Firing):
             for station, was in zip(members, before, strict=True):
                 if was or not self.is_enabled(station.leaf.index):
                     continue
-                if station.flights if is_box(owner) else station.firings_under_way:
+                if station.is_flying or (is_box(owner) and station.is_calling):
                     station.afterwards = "enable"
-                elif station.resting_until is None:
-                    self.tear_down(station)
-                    self.set_up(station)
+                else:
+                    self.reset(station)
             self.settle()
 
     def disable(self, owner: int) -> None:

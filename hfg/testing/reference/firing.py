@@ -16,6 +16,7 @@ from hfg.token import END, NO_MESSAGE
 from hfg.trace import (
     ErrorRaised,
     FiringEnded,
+    FiringRetried,
     FiringStarted,
     ParameterSet,
     TokenDropped,
@@ -160,6 +161,14 @@ class Firing(RunningCode):
         if station.leaf.inside is not None:
             self.begin_iteration(flight, arguments)
             return
+        flight.again = lambda: self.attempt(flight, arguments)
+        self.attempt(flight, arguments)
+
+    def attempt(self, flight: Flight, arguments: list[Any]) -> None:
+        """Run the process function: for the first time, or once more because it has failed (X1)."""
+        station = flight.station
+        flight.attempts += 1
+        flight.task, flight.stepped = None, False
         self.begin_in_group(flight, station.type.process_kind in ("async", "async generator"))
         self.launch(
             flight, self.what_to_run(station, arguments), lambda result, error: self.end_process(flight, result, error)
@@ -308,6 +317,9 @@ class Firing(RunningCode):
         flight.over, flight.over_since = (outcome, failure), self.next_tick()
         if flight.void or not flight.station.is_concurrent:
             self.leave(flight)
+        else:
+            self.settle()
+            self.let_others(flight.station)
 
     def leave(self, flight: Flight) -> None:
         """Outputs leave together, then automatic events in the order they arose; then the firing is over."""
@@ -346,15 +358,20 @@ class Firing(RunningCode):
         while station.to_set:
             self.set_parameter(station, *station.to_set.pop(0))
         self.settle()
-        if station.afterwards == "rest" and not station.flights:
-            station.afterwards = ""
+        self.let_others(station)
+
+    def let_others(self, station: Station) -> None:
+        """No code of it may go on any more: what has waited for that is done (F14, G2, X1)."""
+        if not station.afterwards or station.is_amid:
+            return
+        wanted, station.afterwards = station.afterwards, ""
+        if wanted == "rest":
             self.rest(station)
-        elif station.afterwards and not station.flights:
-            station.afterwards = ""
-            self.restart(station)
+        else:
+            self.reset(station)
             self.settle()
 
-    def restart(self, station: Station) -> None:
+    def reset(self, station: Station) -> None:
         """Teardown, setup, not ended."""
         raise NotImplementedError
 
@@ -394,7 +411,10 @@ class Firing(RunningCode):
     def fail_firing(
         self, flight: Flight, error: BaseException, outcome: Literal["failed", "abandoned"] = "failed"
     ) -> None:
-        """An exception in a node's code: its policy decides."""
+        """An exception in a node's code: it is tried again, or the node's policy decides."""
+        if self.may_try_again(flight, error):
+            self.try_again(flight, error)
+            return
         station = flight.station
         options = station.leaf.options
         what = f"firing {flight.number}"
@@ -418,6 +438,27 @@ class Firing(RunningCode):
             else:
                 self.rest(station)
         self.end_firing(flight, outcome, failure)
+
+    def may_try_again(self, flight: Flight, error: BaseException) -> bool:
+        """Whether there is another attempt: of its function alone, and as long as none has sent a signal."""
+        return (
+            flight.kind == "process"
+            and isinstance(error, Exception)
+            and 0 < flight.attempts <= flight.station.leaf.options.retries
+            and not flight.triggered
+        )
+
+    def try_again(self, flight: Flight, error: BaseException) -> None:
+        """Throw away what the attempt has written; after a pause, which doubles each time, there is another one."""
+        path, options = flight.station.path, flight.station.leaf.options
+        if options.retry_jitter:
+            raise NotImplementedError(
+                f'the pauses of "{path}" are shorter by chance (retry_jitter), which the reference does not draw'
+            )
+        pause = min(options.retry_backoff_max_s, options.retry_backoff_s * 2 ** (flight.attempts - 1))
+        flight.writes = {}
+        flight.pause_until = self.now + pause
+        self.observe(FiringRetried(self.now, path, flight.number, flight.attempts, str(error), pause))
 
     def rest(self, station: Station) -> None:
         """X1: the back-off of a restart begins, of several firings behind the last that is under way (F14)."""

@@ -332,6 +332,7 @@ class ReferenceMachine(Editing):
                 times += [flight.began + limit for flight in station.flights if self.is_limited(flight)]
             if station.resting_until is not None:
                 times.append(station.resting_until)
+            times += [flight.pause_until for flight in station.flights]
             if not station.is_busy and station.place is None and self.may_fire(index, ignore="timers and queues"):
                 rests = [station.hold_until]
                 rests += [
@@ -525,7 +526,7 @@ class ReferenceMachine(Editing):
                 self.time_activity_out(owner)
             elif owner >= 0:
                 self.stations[owner].resting_until = None
-                self.restart_behind_firings(self.stations[owner])
+                self.restart(self.stations[owner])
         self.settle()
 
     def time_activity_out(self, owner: int) -> None:

@@ -77,6 +77,8 @@ class RunningCode(Sending):
     def _trigger_of(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], None]:
         def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
             flight = self.flight_of(station)
+            if flight is not None:
+                flight.triggered = True
             if flight is not None and flight.in_thread:
                 flight.signals.append((name, value, activity, stamp))
             else:
@@ -87,6 +89,8 @@ class RunningCode(Sending):
     def _waiting_trigger_of(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], Any]:
         async def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
             flight = self.flight_of(station)
+            if flight is not None:
+                flight.triggered = True
             self.trigger(station.leaf.index, name, value, activity, stamp, flight)
             while flight is not None and self.has_no_room(station, name):
                 flight.waiting_for = name
@@ -140,6 +144,10 @@ class RunningCode(Sending):
 
     def can_go_on(self, flight: Flight) -> bool:
         """Whether something of the flight can happen without time going by."""
+        if flight.pause_until is not None:
+            return self.is_over(flight.pause_until)
+        if flight.when_rested is not None:
+            return not flight.station.is_flying
         if flight.waits_to_end:
             others = [one for one in flight.station.firings_under_way if not one.waits_to_end]
             return not others and flight.station.firings_under_way[0] is flight
@@ -165,6 +173,14 @@ class RunningCode(Sending):
 
     def go_on(self, flight: Flight) -> None:
         """Carry the flight on: an element, a signal from its thread, a step of its coroutine, or its end."""
+        if flight.pause_until is not None and flight.again is not None:
+            flight.pause_until = None
+            flight.again()
+            return
+        if flight.when_rested is not None:
+            begin, flight.when_rested = flight.when_rested, None
+            begin()
+            return
         if flight.waits_to_end:
             self.run_end(flight)
             return

@@ -100,7 +100,12 @@ class Flight:
     over_since: int = 0
     leaving: bool = False
     waits_to_end: bool = False  # it ends the node as soon as the firings that began before it are over (F14)
+    when_rested: Callable[[], None] | None = None  # what a call does as soon as no code of a firing goes on (F14)
     parameters: dict[str, Any] = field(default_factory=dict)  # as they were when it began
+    attempts: int = 0  # at running its function (X1)
+    triggered: bool = False  # an attempt has sent a signal, so there is no other
+    again: Callable[[], None] | None = None  # makes the next attempt
+    pause_until: float | None = None  # the pause before that
 
 
 @dataclass(eq=False)
@@ -162,6 +167,16 @@ class Station:
     def firings_under_way(self) -> list[Flight]:
         """Its firings under way, those that wait until their outputs may leave included (F14)."""
         return [flight for flight in self.flights if flight.what == "firing"]
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether code of a firing goes on; what is over and waits for its turn, or for its end, does not (F14)."""
+        return any(flight.over is None and not flight.waits_to_end for flight in self.firings_under_way)
+
+    @property
+    def is_amid(self) -> bool:
+        """Whether it is amid a firing or call, so that it cannot be torn down."""
+        return self.is_calling or self.is_flying
 
     @property
     def is_calling(self) -> bool:
@@ -284,11 +299,11 @@ class State:
         if owner < 0:  # the border of what iterates: a firing under way is finished (F10)
             return True
         station = self.stations[owner]
-        return (
-            station.enabled
-            and station.afterwards != "enable"
-            and all(self._box_open(box) for box in station.leaf.boxes)
-        )
+        return station.enabled and station.afterwards != "enable" and self.is_enabled_around(owner)
+
+    def is_enabled_around(self, index: int) -> bool:
+        """Whether all subgraphs around a node are enabled."""
+        return all(self._box_open(box) for box in self.stations[index].leaf.boxes)
 
     def _box_open(self, box: int) -> bool:
         around = (*self.structure.boxes[box].boxes, box)
