@@ -274,6 +274,76 @@ def test_what_another_node_computes_can_move_what_is_drawn() -> None:
             {"data": np.array([[np.nan, 1.0], [2.0, 3.0]], np.float32)},
             "kmeans: data has a number that is not within 1e15",
         ),
+        (
+            cv.pow(power=0.5),
+            {"src": picture("uint8", 3)},
+            "pow: the power 0.5 needs an array of float32 or float64; uint8 takes whole powers only",
+        ),
+        (
+            cv.box_filter(ksize=(3, 3), anchor=(3, 0)),
+            {"src": picture("uint8", 3)},
+            "box_filter: the anchor 3, 0 is outside of the kernel of 3 x 3; -1, -1 is its middle",
+        ),
+        (
+            cv.erode(anchor=(0, 2)),
+            {"src": picture("uint8", 3), "kernel": np.ones((2, 5), np.uint8)},
+            "erode: the anchor 0, 2 is outside of the kernel of 5 x 2",
+        ),
+        (
+            cv.convert_maps(),
+            {"map1": picture("float32", 1), "map2": np.zeros((4, 5), np.float32)},
+            "convert_maps: map1 is 48 x 64 and map2 4 x 5; they have one size",
+        ),
+        (
+            cv.draw_chessboard_corners(),
+            {"image": picture("uint8", 3), "corners": np.zeros((12, 2), np.float32)},
+            "draw_chessboard_corners: a board of 9 x 6 that was found has 54 corners, and there are 12",
+        ),
+        (
+            cv.triangulate_points(),
+            {
+                "proj_matr1": np.eye(3, 4),
+                "proj_matr2": np.eye(3, 4),
+                "proj_points1": np.zeros((1, 2), np.float32),
+                "proj_points2": np.zeros((2, 2), np.float32),
+            },
+            "triangulate_points: there are 1 points of the first camera and 2 of the second",
+        ),
+        (
+            cv.hough_lines_p(rho=85.0),
+            {"image": np.full((1, 1), 255, np.uint8)},
+            "hough_lines_p: rho is 85, more than 5, the most that lines in a picture of 1 x 1 are apart",
+        ),
+        (
+            cv.spatial_gradient(),
+            {"src": np.zeros((5, 1), np.uint8)},
+            "spatial_gradient: src is one pixel wide, and needs two",
+        ),
+        (
+            cv.min_enclosing_triangle(),
+            {"points": np.linspace(0, 1, 24, dtype=np.float32).reshape(12, 2)},
+            "min_enclosing_triangle: the points lie almost on a line",
+        ),
+        (
+            cv.validate_disparity(min_disparity=0, number_of_disparities=16),
+            {"disparity": np.full((2, 3), 256, np.int16), "cost": np.zeros((2, 3), np.int16)},
+            "validate_disparity: disparity has numbers that are not within 0 and 255",
+        ),
+        (
+            cv.validate_disparity(),
+            {"disparity": np.zeros((2, 3), np.int16), "cost": np.zeros((2, 4), np.int16)},
+            "validate_disparity: disparity is 2 x 3 and cost 2 x 4; they have one size",
+        ),
+        (
+            cv.eigen_non_symmetric(),
+            {"src": np.array([[1, np.nan], [0, 1]])},
+            "eigen_non_symmetric: src has what is no number",
+        ),
+        (
+            cv.find_non_zero(),
+            {"src": np.zeros((2, 3), np.float16)},
+            'input "src" of find_non_zero: expected Plane',
+        ),
     ],
     ids=[
         "kind of picture",
@@ -286,6 +356,19 @@ def test_what_another_node_computes_can_move_what_is_drawn() -> None:
         "two sizes",
         "a match without keypoint",
         "no number",
+        "a power of integers",
+        "an anchor outside",
+        "an anchor outside of an element",
+        "maps of two sizes",
+        "corners of another board",
+        "points that are no pairs",
+        "steps over the picture",
+        "a picture of one column",
+        "almost a line",
+        "disparities beyond",
+        "costs of another size",
+        "not finite",
+        "half precision",
     ],
 )
 def test_what_does_not_fit_is_told_by_node_port_expected_and_found(node: Any, values: Any, sentence: str) -> None:
@@ -318,6 +401,35 @@ def test_a_picture_that_would_end_the_process_is_refused() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.count("expected Array[float32 | float64]") == 3
+
+
+def test_what_opencv_needs_is_not_refused_where_it_is_met() -> None:
+    whole = np.array([[1, 2], [3, 4]], np.int16)
+    assert fire(cv.pow(power=2.0), debug=False, src=whole).outputs["out"].tolist() == [[1, 4], [9, 16]]
+    assert fire(cv.pow(power=0.5), debug=False, src=np.array([[4, 9]], np.float32)).outputs["out"].tolist() == [[2, 3]]
+    assert fire(cv.box_filter(anchor=(2, 0)), debug=False, src=picture("uint8", 1)).outputs["out"].shape == (48, 64)
+    corners = np.array([[0, 0], [4, 0], [0, 3], [1, 1]], np.float32)
+    assert fire(cv.min_enclosing_triangle(), debug=False, points=corners).outputs["area"] == pytest.approx(6.0)
+    line = np.array([[0, 0], [1, 1], [2, 2], [3, 3]], np.int32)
+    assert fire(cv.min_enclosing_triangle(), debug=False, points=line).outputs["area"] == 0
+    some = picture("uint8", 1) > 12
+    lengths = [
+        fire(cv.norm(), debug=False, src1=picture(kind, 1), mask=some.astype(np.uint8) * 255).outputs["out"]
+        for kind in ("uint8", "int16")
+    ]
+    assert lengths == [pytest.approx(np.linalg.norm(picture(kind, 1)[some])) for kind in ("uint8", "int16")]
+    disparity = np.full((2, 40), 35, np.int16)
+    disparity[0, 30] = -16  # there was none
+    cost = np.zeros((2, 40), np.int16)
+    out = fire(cv.validate_disparity(), debug=False, disparity=disparity, cost=cost).outputs["out"]
+    assert out[1].tolist() == disparity[1].tolist()
+
+
+def test_what_opencv_needs_is_documented() -> None:
+    for name, need in _overrides.NEEDS.items():
+        ours = next(ours for ours, theirs in _recipes.names().items() if theirs == name)
+        errors = {error.name: error.when for error in describe_type(getattr(cv, ours)).errors}
+        assert need.says in errors["ValueError"]
 
 
 @pytest.mark.rule("P3")

@@ -20,7 +20,7 @@ from hfg.ports.specs import REQUIRED
 from hfg.types import Named, Pixels, Shape
 from hfg.values import Colour
 
-__all__ = ["COMMON", "FUNCTIONS", "NEEDS", "Say"]
+__all__ = ["COMMON", "FUNCTIONS", "NEEDS", "Need", "Say"]
 
 Convert: TypeAlias = Callable[[Any, Mapping[str, Any]], Any]
 """Turns the value of a port into OpenCV's argument; it sees the inputs by name."""
@@ -92,6 +92,11 @@ def is_odd(value: int) -> bool:
 def sides_are_odd(value: Size) -> bool:
     """Say whether width and height are odd numbers from 1 to 255."""
     return all(side % 2 == 1 and 1 <= side <= 255 for side in value)
+
+
+def window_is_small(value: Size) -> bool:
+    """Say whether width and height are 1 to 255."""
+    return 1 <= value[0] <= 255 and 1 <= value[1] <= 255
 
 
 def sides_fit(value: Size) -> bool:
@@ -229,6 +234,13 @@ def _in_a_list(value: Any, inputs: Mapping[str, Any]) -> Any:
     return [value]
 
 
+def _with_room(value: Any, inputs: Mapping[str, Any]) -> Any:
+    """Copy a mask to where something is behind it: OpenCV reads some bytes more."""
+    room = np.zeros(value.size + 64, value.dtype)
+    room[: value.size] = value.reshape(-1)
+    return room[: value.size].reshape(value.shape)
+
+
 def _painted(value: Colour, inputs: Mapping[str, Any]) -> tuple[float, ...]:
     """Give a colour as the picture has it: how light it is where there is one channel, else blue, green, red."""
     shape = _first(inputs).shape
@@ -319,7 +331,7 @@ COMMON: Final[Mapping[str, Say]] = {
     "alpha": _float(1.0),
     "beta": _float(0.0),
     "flags": _int(0, 0),
-    "winSize": _sizes((21, 21)),
+    "winSize": Say(Annotated[Size, Predicate(window_is_small)], (21, 21)),
     "maxLevel": _int(3, 0, 16),
     "handleMissingValues": Say(bool, False),
     "hint": DROP,
@@ -341,8 +353,8 @@ COMMON: Final[Mapping[str, Say]] = {
     "k": _float(0.04),
     "rho": _float(1.0, 0.1, 100.0),
     "theta": _float(float(np.pi / 180), 0.001, 3.2),
-    "srn": _float(0.0, 0.0),
-    "stn": _float(0.0, 0.0),
+    "srn": _float(0.0, 0.0, 100.0),
+    "stn": _float(0.0, 0.0, 100.0),
     "min_theta": _float(0.0, 0.0, float(np.pi)),
     "max_theta": _float(float(np.pi), 0.0, float(np.pi)),
     "use_edgeval": Say(bool, False),
@@ -554,7 +566,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     },
     "cornerHarris": {"blockSize": _int(2, 1, 31), "k": _float(0.04)},
     "cornerSubPix": {
-        "winSize": _sizes((5, 5)),
+        "winSize": Say(Annotated[Size, Predicate(window_is_small)], (5, 5)),
         "zeroZone": Say(Size, (-1, -1)),
     },
     "correctMatches": {
@@ -586,7 +598,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
         "borderType": _pick("BorderTypes", "CONSTANT", less="BORDER_TRANSPARENT BORDER_ISOLATED BORDER_WRAP"),
         "borderValue": DROP,
     },
-    "distanceTransform": {"dstType": _dtype("float32", "float32", "uint8")},
+    "distanceTransform": {"dstType": DROP},  # uint8 is for one kind of distance only
     "distanceTransformWithLabels": {
         "maskSize": _words("DIST_MASK_ 5", "5"),
         "labelType": _pick("DistanceTransformLabelTypes", "CCOMP", "DIST_LABEL_"),
@@ -704,6 +716,14 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     **_each(["findTransformECC"], {"criteria": _criteria(50, 0.001)}),
     "findTransformECCWithMask": {"criteria": _criteria(50, 1e-6)},
     "findTransformECCMultiScale": {"eccParams": DROP},
+    "findNonZero": {
+        # float16 is read as if it were float64
+        "src": Say(
+            Annotated[
+                npt.NDArray[np.uint8 | np.int8 | np.uint16 | np.int16 | np.int32 | Reals], Pixels(1), Named("Plane")
+            ]
+        )
+    },
     "fitLine": {
         "param": _float(0.0, 0.0),
         "reps": _float(0.01, 0.0),
@@ -780,9 +800,10 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     },
     "matchTemplate": {"method": _pick("TemplateMatchModes", "CCOEFF_NORMED"), "mask": DROP},
     "medianBlur": {"ksize": _int(3, 1, 255, odd=True)},
-    "minEnclosingConvexPolygon": {"points": Say(Corners), "k": _int(4, 3, 100)},
+    "minEnclosingConvexPolygon": {"points": Say(Corners), "k": _int(4, 4, 100)},  # 3 reads at address 0
     "moments": {"array": Say(Points), "binaryImage": DROP},
     "mulTransposed": {"src": Say(Matrix), "aTa": Say(bool, True), "delta": DROP},
+    "norm": {"mask": Say(Mask, convert=_with_room)},
     "normalize": {
         "dst": NOTHING,
         "norm_type": _words("NORM_ INF L1 L2 MINMAX", "L2"),
@@ -945,14 +966,26 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
 }
 
 
-def _samples_are_near(inputs: Mapping[str, Any]) -> str | None:
+class Need(NamedTuple):
+    """What the values of a firing need besides their types, because OpenCV ends the process for it or never comes back.
+
+    Attributes:
+      says: when it is not met, as a part of a sentence, for the documentation.
+      wrong: says what is wrong, or None; it sees inputs and parameters by OpenCV's names.
+    """
+
+    says: str
+    wrong: Callable[[Mapping[str, Any], Mapping[str, Any]], str | None]
+
+
+def _samples_are_near(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
     """The centres of samples that are not numbers, or so large that squares overflow, are at places that are not."""
     if bool((np.abs(inputs["data"]) <= 1e15).all()):
         return None
     return "data has a number that is not within 1e15"
 
 
-def _matches_name_keypoints(inputs: Mapping[str, Any]) -> str | None:
+def _matches_name_keypoints(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
     pairs = [inputs["matches1to2"]] if not _is_nested(inputs["matches1to2"]) else inputs["matches1to2"]
     first, second = len(inputs["keypoints1"]), len(inputs["keypoints2"])
     for match in (one for pair in pairs for one in pair):
@@ -967,9 +1000,104 @@ def _is_nested(matches: Any) -> bool:
     return bool(matches) and isinstance(matches[0], list)
 
 
-NEEDS: Final[Mapping[str, Callable[[Mapping[str, Any]], str | None]]] = {
-    "kmeans": _samples_are_near,
-    "drawMatches": _matches_name_keypoints,
-    "drawMatchesKnn": _matches_name_keypoints,
+def _anchor_is_inside(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    """Intel's filters read from where the anchor says before OpenCV looks at it."""
+    width, height = parameters.get("ksize") or _size_of(inputs.get("kernel"))
+    x, y = parameters["anchor"]
+    if -1 <= x < width and -1 <= y < height:
+        return None
+    return f"the anchor {x}, {y} is outside of the kernel of {width} x {height}; -1, -1 is its middle"
+
+
+def _size_of(kernel: Any) -> tuple[int, int]:
+    return (3, 3) if kernel is None else (kernel.shape[1], kernel.shape[0])
+
+
+def _power_fits(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    """OpenCV takes integers for float64 when the power is none, and writes beyond the picture."""
+    power = parameters["power"]
+    if inputs["src"].dtype in (np.float32, np.float64) or (float(power).is_integer() and abs(power) < 2**31):
+        return None
+    return f"the power {power:g} needs an array of float32 or float64; {inputs['src'].dtype} takes whole powers only"
+
+
+def _maps_are_alike(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    first, second = inputs["map1"], inputs.get("map2")
+    if second is None or first.shape[:2] == second.shape[:2]:
+        return None
+    return f"map1 is {_shown(first)} and map2 {_shown(second)}; they have one size"
+
+
+def _corners_fill_the_board(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    columns, rows = parameters["patternSize"]
+    count = len(inputs["corners"])
+    if not parameters["patternWasFound"] or count == columns * rows:
+        return None
+    return f"a board of {columns} x {rows} that was found has {columns * rows} corners, and there are {count}"
+
+
+def _points_are_pairs(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    first, second = len(inputs["projPoints1"]), len(inputs["projPoints2"])
+    return None if first == second else f"there are {first} points of the first camera and {second} of the second"
+
+
+def _steps_are_in_the_picture(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    """With longer steps there is no place to count in."""
+    height, width = inputs["image"].shape[:2]
+    rho, most = parameters["rho"], 2 * (width + height) + 1
+    if rho <= most:
+        return None
+    return f"rho is {rho:g}, more than {most}, the most that lines in a picture of {height} x {width} are apart"
+
+
+def _is_wide(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    return None if inputs["src"].shape[1] >= 2 else "src is one pixel wide, and needs two"
+
+
+def _points_are_no_line(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    """OpenCV turns round and round a hull that is as thin as its rounding, 1e-5."""
+    hull = cv2.convexHull(inputs["points"])
+    if len(hull) <= 3 or min(cv2.minAreaRect(hull)[1]) >= 1e-3:
+        return None
+    return "the points lie almost on a line, within a thousandth of a pixel; fit_line takes them"
+
+
+def _disparities_are_of_the_range(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    """OpenCV counts by the disparity without a look whether it is one."""
+    disparity, cost = inputs["disparity"], inputs["cost"]
+    if disparity.shape[:2] != cost.shape[:2]:
+        return f"disparity is {_shown(disparity)} and cost {_shown(cost)}; they have one size"
+    least = parameters["minDisparity"]
+    most = least + parameters["numberOfDisparities"]
+    counted = disparity[disparity != (least - 1) * 16]
+    if not counted.size or (counted.min() >= least * 16 and counted.max() < most * 16):
+        return None
+    return f"disparity has numbers that are not within {least * 16} and {most * 16 - 1}, sixteenths of the disparities"
+
+
+def _is_finite(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    return None if bool(np.isfinite(inputs["src"]).all()) else "src has what is no number"
+
+
+def _shown(array: Any) -> str:
+    return f"{array.shape[0]} x {array.shape[1]}"
+
+
+_ANCHOR: Final = Need("the anchor is outside of the kernel", _anchor_is_inside)
+_MATCHED: Final = Need("a match names a keypoint that is not there", _matches_name_keypoints)
+NEEDS: Final[Mapping[str, Need]] = {
+    "kmeans": Need("data has a number that is not within 1e15", _samples_are_near),
+    "drawMatches": _MATCHED,
+    "drawMatchesKnn": _MATCHED,
+    **dict.fromkeys(["blur", "boxFilter", "dilate", "erode", "filter2D", "morphologyEx", "sqrBoxFilter"], _ANCHOR),
+    "pow": Need("the array is of integers and the power is no whole number", _power_fits),
+    "convertMaps": Need("the maps have two sizes", _maps_are_alike),
+    "drawChessboardCorners": Need("a board that was found has more or fewer corners", _corners_fill_the_board),
+    "triangulatePoints": Need("the cameras do not see equally many points", _points_are_pairs),
+    "HoughLinesP": Need("rho is more than the picture", _steps_are_in_the_picture),
+    "spatialGradient": Need("the picture is one pixel wide", _is_wide),
+    "minEnclosingTriangle": Need("the points lie almost on a line", _points_are_no_line),
+    "validateDisparity": Need("there are disparities outside of their range", _disparities_are_of_the_range),
+    "eigenNonSymmetric": Need("an element is not finite", _is_finite),
 }
-"""What inputs need besides their types, because OpenCV ends the process for it; each says what is wrong, or None."""
+"""What OpenCV does not look at, found by placing each array before a page that nobody may touch."""

@@ -190,10 +190,16 @@ def recipe(name: str, seen: Measured | None = None) -> Recipe:
         outputs=_outputs(name, overload, told, taken, _sure(seen.results, inlets)),
         raises={
             "TypeError": "an input is of another kind than is declared.",
-            "ValueError": "an input is empty, or OpenCV refuses the values; the message says why.",
+            "ValueError": _refusals(name),
         },
         call=_caller(name, function, inlets, knobs, given, seen),
     )
+
+
+def _refusals(name: str) -> str:
+    needs = overrides.NEEDS.get(name)
+    own = "" if needs is None else f", {needs.says}"
+    return f"an input is empty{own}, or OpenCV refuses the values; the message says why."
 
 
 def _sure(results: Sequence[ResultKind], inlets: Sequence[_Inlet]) -> Sequence[ResultKind]:
@@ -349,9 +355,10 @@ def _caller(
             _need_sound(node, inlet, value, deadly)
             inputs[inlet.argument] = value
             arguments[inlet.argument] = np.copy(value) if inlet.copied else value
-        wrong = None if needs is None else needs(inputs)
-        if wrong is not None:
-            raise ValueError(f"{node}: {wrong}")
+        if needs is not None:
+            wrong = needs.wrong(inputs, {knob.argument: parameters[knob.setting.name] for knob in knobs})
+            if wrong is not None:
+                raise ValueError(f"{node}: {wrong}")
         for inlet in inlets:
             if inlet.say.convert is not None and inlet.argument in inputs:
                 arguments[inlet.argument] = inlet.say.convert(arguments[inlet.argument], inputs)
