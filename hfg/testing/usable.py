@@ -1,7 +1,7 @@
 """Tries many node types, in processes of their own: `python -m hfg.testing.usable [MODULE or REFERENCE ...]`.
 
-A type that ends its process, or never comes back, is named and the others go on in a new one. Memory is bounded, there
-is no standard input, and what the nodes print goes nowhere.
+A type that ends its process, or never comes back, is named and the others go on in a new one. Memory is bounded, the
+heap is checked where the C library can, there is no standard input, and what the nodes print goes nowhere.
 Stands on `trying` and the catalogue.
 """
 
@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
+import platform
 import queue
 import resource
 import signal
@@ -17,8 +19,10 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterable, Sequence
-from typing import Any, Final
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
@@ -29,10 +33,22 @@ __all__ = ["main", "try_all"]
 
 _MEMORY_BYTES: Final = 12 << 30  # of addresses, most of which libraries only reserve
 _FILE_BYTES: Final = 64 << 20
+_SUSPECTS: Final = 20
+_STOPPED: Final = "did not come back within"
+_HEAP: Final = (
+    {"MALLOC_CHECK_": "3", "LD_PRELOAD": "libc_malloc_debug.so.0"} if platform.libc_ver()[0] == "glibc" else {}
+)
+"""Lets glibc look after each block that is given back, so that who writes beyond one is stopped while it does it."""
 
 
 def try_all(
-    references: Iterable[str], *, firings: int = 3, seed: int = 0, limit_s: float = 60.0, confirm: bool = True
+    references: Iterable[str],
+    *,
+    firings: int = 3,
+    seed: int = 0,
+    limit_s: float = 60.0,
+    confirm: bool = True,
+    processes: int = 1,
 ) -> list[Trial]:
     """Try node types in processes of their own, and give what became of each, in their order.
 
@@ -40,27 +56,69 @@ def try_all(
       references: "module:name" each.
       firings: as for `try_type`.
       seed: as for `try_type`.
-      limit_s: for one type; one that takes longer is stopped and named.
-      confirm: a type that ended its process is tried alone once more, for the one before it may have done the harm.
+      limit_s: of processor time for one type, and four times as long by the clock, for one that waits; a type that
+        takes longer is stopped and named.
+      confirm: a type that ended its process, or was stopped, is tried alone once more. If it is well then, so it is
+        called if it was stopped; if it had ended its process, those before it are tried alone too, to find who did the
+        harm.
+      processes: how many at once; each has its share of the types.
     """
+    every = list(references)
+    how = _How(firings, seed, limit_s)
+    shares = [every[first::processes] for first in range(processes)]
+    with ThreadPoolExecutor(processes) as pool:
+        found = list(pool.map(lambda share: _share(share, how, confirm), shares))
+    return [found[index % processes][index // processes] for index in range(len(every))]
+
+
+class _How(NamedTuple):
+    """How each process tries what it is given."""
+
+    firings: int
+    seed: int
+    limit_s: float
+
+
+def _share(references: Sequence[str], how: _How, confirm: bool) -> list[Trial]:
+    """Try types one after the other; after a death the next one is in a new process."""
     left = list(references)
     done: list[Trial] = []
     while left:
-        trials, died = _process(left, firings, seed, limit_s)
+        trials, died = _process(left, how)
         done += trials
         left = left[len(trials) :]
         if died and left:
-            fault = died
-            if confirm and len(trials) and not _process(left[:1], firings, seed, limit_s)[1]:
-                before = ", ".join(trial.reference for trial in trials[-3:])
-                fault = f"{died}, but not alone: those before it were {before}"
-            done.append(Trial(left[0], fault=f"{left.pop(0)}: {fault}"))
+            culprit = left.pop(0)
+            before = [trial.reference for trial in trials]
+            done.append(_confirmed(culprit, died, before, how) if confirm else _dead(culprit, died))
     return done
 
 
-def _process(references: Sequence[str], firings: int, seed: int, limit_s: float) -> tuple[list[Trial], str]:
+def _dead(reference: str, died: str) -> Trial:
+    return Trial(reference, fault=f"{reference}: {died}")
+
+
+def _confirmed(reference: str, died: str, before: Sequence[str], how: _How) -> Trial:
+    """Try alone what has died, and if it lives then those before it: what one does to the heap ends another."""
+    alone, again = _process([reference], how)
+    if again:
+        return _dead(reference, again)
+    if died.startswith(_STOPPED):
+        return alone[0]  # it was the load of the machine, or what the others had left behind
+    suspects = list(reversed(before))[:_SUSPECTS]
+    found = [f"{one} alone {death}" for one in suspects for death in [_process([one], how)[1]] if death]
+    if found:
+        return _dead(reference, f"{died}, but not alone; of those before it, {'; '.join(found)}")
+    said = f", and none of these does alone: {', '.join(reversed(suspects))}" if suspects else ""
+    return _dead(reference, f"{died}, but not alone{said}")
+
+
+def _process(references: Sequence[str], how: _How) -> tuple[list[Trial], str]:
     """Try types in one process; give those that came back, and how it died ("" if it did not)."""
-    command = [sys.executable, "-m", "hfg.testing.usable", "--worker", "--firings", str(firings), "--seed", str(seed)]
+    settings = {"--firings": how.firings, "--seed": how.seed, "--limit": how.limit_s}
+    command = [sys.executable, "-m", "hfg.testing.usable", "--worker"]
+    command += [str(word) for setting in settings.items() for word in setting]
+    patience_s = 4 * how.limit_s
     trials: list[Trial] = []
     with (
         tempfile.TemporaryDirectory(prefix="hfg-usable-") as folder,
@@ -68,7 +126,7 @@ def _process(references: Sequence[str], firings: int, seed: int, limit_s: float)
         subprocess.Popen(
             command,
             cwd=folder,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(one or os.getcwd() for one in sys.path)},  # noqa: PTH109
+            env={**os.environ, **_HEAP, "PYTHONPATH": os.pathsep.join(one or os.getcwd() for one in sys.path)},  # noqa: PTH109
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=told,
@@ -83,16 +141,19 @@ def _process(references: Sequence[str], firings: int, seed: int, limit_s: float)
         process.stdin.close()
         while len(trials) < len(references):
             try:
-                line = lines.get(timeout=limit_s if trials else limit_s + 30)  # the first has to import all
+                line = lines.get(timeout=patience_s if trials else patience_s + 30)  # the first has to import all
             except queue.Empty:
                 process.kill()
-                return trials, f"did not come back within {limit_s:g} s"
+                return trials, f"{_STOPPED} {patience_s:g} s"
             except KeyboardInterrupt:
                 process.kill()
                 raise
             if not line:
                 told.seek(0)
-                return trials, _death(process.wait(), told.read())
+                code = process.wait()
+                if code == -signal.SIGXCPU:
+                    return trials, f"{_STOPPED} {how.limit_s:g} s of processor time"
+                return trials, _death(code, told.read())
             trials.append(msgspec.json.decode(line, type=Trial))
         process.wait()
     return trials, ""
@@ -113,7 +174,7 @@ def _death(code: int, told: str) -> str:
     return f"ended its process with exit code {code}" + (f" ({last:.200})" if last else "")
 
 
-def _work(firings: int, seed: int) -> None:
+def _work(how: _How) -> None:
     """Be the process: take references from standard input, write a line for each type that came back."""
     references = json.load(sys.stdin)
     answers = os.fdopen(os.dup(1), "w")
@@ -124,9 +185,12 @@ def _work(firings: int, seed: int) -> None:
         signal.signal(one, lambda *_: None)  # there are nodes that raise them, and that is no crash
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_FSIZE, (_FILE_BYTES, _FILE_BYTES))
+    hardest = resource.getrlimit(resource.RLIMIT_CPU)[1]
     for reference in references:
+        # The kernel ends it by SIGXCPU: a loop inside of C code sees no other signal's handler.
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(time.process_time() + how.limit_s), hardest))
         try:
-            trial = try_type(reference, firings=firings, seed=seed, shrink=False)
+            trial = try_type(reference, firings=how.firings, seed=how.seed, shrink=False)
         except NotUsable as error:
             trial = Trial(reference, fault=str(error))
         except BaseException as error:  # also what leaves the program
@@ -141,15 +205,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("what", nargs="*", help="a module, or a reference module:name; without it all there is")
     parser.add_argument("--firings", type=int, default=3, help="of each node (3)")
     parser.add_argument("--seed", type=int, default=0, help="other values with each (0)")
-    parser.add_argument("--limit", type=float, default=60.0, help="seconds for one type (60)")
+    parser.add_argument("--limit", type=float, default=60.0, help="seconds of processor time for one type (60)")
+    parser.add_argument("--processes", type=int, default=1, help="how many at once (1)")
     parser.add_argument("--json", action="store_true", help="write what became of each type as JSON")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.worker:
-        _work(given.firings, given.seed)
+        _work(_How(given.firings, given.seed, given.limit))
         return 0
     references, problems = _references(given.what)
-    trials = try_all(references, firings=given.firings, seed=given.seed, limit_s=given.limit)
+    trials = try_all(references, firings=given.firings, seed=given.seed, limit_s=given.limit, processes=given.processes)
     if given.json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(trials), indent=2).decode() + "\n")
         return int(bool(problems) or any(trial.fault for trial in trials))

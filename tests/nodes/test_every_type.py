@@ -28,9 +28,9 @@ def test_every_module_of_the_library_can_be_imported(library: Catalogue) -> None
     assert library.problems == ()
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)  # by the clock, on a machine that has much else to do; each type is held to processor time
 def test_every_type_fires_with_what_it_declares(library: Catalogue) -> None:
-    trials = try_all(one.reference for one in library.types)
+    trials = try_all((one.reference for one in library.types), processes=2)
     assert len(trials) == len(library.types) > 0
     faults = [trial.fault for trial in trials if not (trial.usable or (trial.reference in NEEDS and _refuses(trial)))]
     assert not faults, "\n".join(faults)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import doctest
 import os
+import platform
 import signal
 import time
 from collections.abc import Iterator
@@ -268,34 +270,96 @@ def named(*kinds: Any) -> list[str]:
     return [f"tests.testing.test_trying:{kind._type.qualname}" for kind in kinds]
 
 
+@hfg.node
+def counts_without_end(value: int) -> int:
+    while True:
+        value += 1
+
+
+@hfg.node
+def writes_beyond(value: int) -> int:
+    """Write behind what belongs to it, as a library in C may do."""
+    text = ctypes.create_string_buffer(4096)
+    ctypes.memset(text, 0x78, 4096 + 4)
+    return value
+
+
 @pytest.mark.timeout(180)  # four processes that import all
 def test_a_type_that_ends_its_process_or_does_not_come_back_is_named_and_the_others_go_on() -> None:
-    kinds = (half, crashes, leaves, asks_to_leave, hangs, divides)
-    trials = try_all(named(*kinds), confirm=False, limit_s=5)
+    kinds = (half, crashes, leaves, asks_to_leave, hangs, counts_without_end, divides)
+    trials = try_all(named(*kinds), confirm=False, limit_s=3)
     assert [trial.reference for trial in trials] == named(*kinds)
-    assert [trial.usable for trial in trials] == [True, False, False, False, False, True]
+    assert [trial.usable for trial in trials] == [True, False, False, False, False, False, True]
     faults = [trial.fault.removeprefix(f"{trial.reference}: ") for trial in trials if trial.fault]
     assert faults[0].startswith("ended its process by SIGSEGV")
     assert faults[1].startswith("ended its process with exit code 3")
     assert faults[2].startswith("SystemExit: 2")
-    assert faults[3] == "did not come back within 5 s"
+    assert faults[3] == "did not come back within 12 s"
+    assert faults[4] == "did not come back within 3 s of processor time"
 
 
-def test_who_crashes_only_behind_others_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc can look after its heap")
+def test_a_type_that_writes_beyond_its_memory_is_named_although_nothing_else_shows_it() -> None:
+    first, second = try_all(named(writes_beyond, half))
+    assert first.fault.startswith(f"{first.reference}: ended its process by SIGABRT")
+    assert second.usable
+
+
+def test_types_are_shared_by_processes_and_told_in_their_order() -> None:
+    kinds = (half, divides, leaves, brightest, counting)
+    one, two = (try_all(named(*kinds), processes=processes, confirm=False) for processes in (1, 2))
+    assert [trial.reference for trial in two] == named(*kinds)
+    assert two == one
+
+
+class _Processes:
+    """Takes the place of processes: which lists of types end by what."""
+
+    def __init__(self, deaths: dict[tuple[str, ...], tuple[int, str]]) -> None:
+        self.deaths = deaths
+        self.asked: list[str] = []
+
+    def __call__(self, references: Any, how: Any) -> tuple[list[Trial], str]:
+        self.asked.append(" ".join(references))
+        count, died = self.deaths.get(tuple(references), (len(references), ""))
+        return [Trial(one, 1) for one in references[:count]], died
+
+
+@pytest.mark.parametrize(
+    ("deaths", "fault", "asked"),
+    [
+        (
+            {("a", "b", "c"): (2, "ended its process by SIGABRT"), ("a",): (0, "ended its process by SIGSEGV")},
+            "c: ended its process by SIGABRT, but not alone; of those before it, a alone ended its process by SIGSEGV",
+            ["a b c", "c", "b", "a"],
+        ),
+        (
+            {("a", "b", "c"): (2, "ended its process by SIGABRT")},
+            "c: ended its process by SIGABRT, but not alone, and none of these does alone: a, b",
+            ["a b c", "c", "b", "a"],
+        ),
+        (
+            {("a", "b", "c"): (2, "ended its process by SIGABRT"), ("c",): (0, "ended its process by SIGSEGV")},
+            "c: ended its process by SIGSEGV",
+            ["a b c", "c"],
+        ),
+        ({("a", "b", "c"): (2, "did not come back within 3 s")}, "", ["a b c", "c"]),
+        (
+            {("a", "b", "c"): (2, "did not come back within 3 s"), ("c",): (0, "did not come back within 12 s")},
+            "c: did not come back within 12 s",
+            ["a b c", "c"],
+        ),
+    ],
+    ids=["another did it", "nobody does it alone", "it does it alone", "slow only now", "slow always"],
+)
+def test_who_dies_behind_others_is_tried_alone_and_then_those_before_it(
+    deaths: Any, fault: str, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What one type does to the memory of a process may end it under another one's hands."""
-    asked: list[list[str]] = []
-
-    def process(references: Any, *settings: Any) -> tuple[list[Trial], str]:
-        asked.append(list(references))
-        well = [Trial(one, 1) for one in references]
-        return (well[:1], "ended its process by SIGSEGV") if len(references) > 1 else (well, "")
-
-    monkeypatch.setattr(usable, "_process", process)
-    assert [trial.fault for trial in try_all(["a", "b"])] == [
-        "",
-        "b: ended its process by SIGSEGV, but not alone: those before it were a",
-    ]
-    assert asked == [["a", "b"], ["b"]]
+    processes = _Processes(deaths)
+    monkeypatch.setattr(usable, "_process", processes)
+    assert [trial.fault for trial in try_all(["a", "b", "c"])] == ["", "", fault]
+    assert processes.asked == asked
 
 
 def test_the_command_tells_what_is_not_usable(
