@@ -315,6 +315,11 @@ def test_what_another_node_computes_can_move_what_is_drawn() -> None:
             "hough_lines_p: rho is 85, more than 5, the most that lines in a picture of 1 x 1 are apart",
         ),
         (
+            cv.min_max_loc(),
+            {"src": picture("uint8", 1), "mask": np.ones((2, 3), np.uint8)},
+            "min_max_loc: src is 48 x 64 and mask 2 x 3; they have one size",
+        ),
+        (
             cv.spatial_gradient(),
             {"src": np.zeros((5, 1), np.uint8)},
             "spatial_gradient: src is one pixel wide, and needs two",
@@ -363,6 +368,7 @@ def test_what_another_node_computes_can_move_what_is_drawn() -> None:
         "corners of another board",
         "points that are no pairs",
         "steps over the picture",
+        "a mask of another size",
         "a picture of one column",
         "almost a line",
         "disparities beyond",

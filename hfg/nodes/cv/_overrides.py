@@ -805,6 +805,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "mulTransposed": {"src": Say(Matrix), "aTa": Say(bool, True), "delta": DROP},
     "norm": {"mask": Say(Mask, convert=_with_room)},
     "normalize": {
+        "mask": Say(Mask, convert=_with_room),
         "dst": NOTHING,
         "norm_type": _words("NORM_ INF L1 L2 MINMAX", "L2"),
     },
@@ -1050,6 +1051,13 @@ def _steps_are_in_the_picture(inputs: Mapping[str, Any], parameters: Mapping[str
     return f"rho is {rho:g}, more than {most}, the most that lines in a picture of {height} x {width} are apart"
 
 
+def _mask_is_alike(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    src, mask = inputs["src"], inputs.get("mask")
+    if mask is None or src.shape[:2] == mask.shape[:2]:
+        return None
+    return f"src is {_shown(src)} and mask {_shown(mask)}; they have one size"
+
+
 def _is_wide(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
     return None if inputs["src"].shape[1] >= 2 else "src is one pixel wide, and needs two"
 
@@ -1095,6 +1103,7 @@ NEEDS: Final[Mapping[str, Need]] = {
     "drawChessboardCorners": Need("a board that was found has more or fewer corners", _corners_fill_the_board),
     "triangulatePoints": Need("the cameras do not see equally many points", _points_are_pairs),
     "HoughLinesP": Need("rho is more than the picture", _steps_are_in_the_picture),
+    "minMaxLoc": Need("the mask has another size", _mask_is_alike),
     "spatialGradient": Need("the picture is one pixel wide", _is_wide),
     "minEnclosingTriangle": Need("the points lie almost on a line", _points_are_no_line),
     "validateDisparity": Need("there are disparities outside of their range", _disparities_are_of_the_range),
