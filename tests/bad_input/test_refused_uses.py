@@ -22,7 +22,7 @@ from annotated_types import Ge, Interval
 import hfg
 from hfg import commands
 from hfg.cli import show
-from hfg.encoding import decode, encode
+from hfg.encoding import TokenCodec, decode, encode
 from hfg.testing import diagrams, explore, fire, reference_run
 from hfg.trace import TraceEvent
 from tests.cli.conftest import STEPS, Command, command
@@ -453,6 +453,22 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "read data of code": (
         lambda: decode({"$type": "os:system", "value": ""}),
         'is of type "os:system", which is no type',
+    ),
+    "send what has no type": (
+        lambda: TokenCodec(dict[str, Any]),
+        "dict[str, Any] cannot cross to another process: Any says nothing of",
+    ),
+    "send code": (
+        lambda: TokenCodec(list[Callable[[], None]]),
+        "is code, and no code crosses; send data that says what to do",
+    ),
+    "send another type": (
+        lambda: TokenCodec(list[int], what='the value of "a.out"').encode(hfg.Token(["x"])),  # type: ignore[arg-type]
+        "the value of \"a.out\"[0] cannot be sent: expected int, found str: 'x'; send what the port declares",
+    ),
+    "receive what nobody sends": (
+        lambda: TokenCodec(int, what='a value for "b.value"').decode(b"\x80\x04", b""),
+        'a value for "b.value" was refused on arrival: Expected `array`, got `object`',
     ),
     "set a wrong type": (
         running(lambda run, g: run.set(g["count"].ports.parameters["limit"], "x")),

@@ -35,7 +35,7 @@ from hfg.errors import EncodingError
 from hfg.types import accepts, bare_type, describe, describe_value
 from hfg.values import Colour, Span, same
 
-__all__ = ["TAG", "decode", "encode", "find_reference", "has_tag", "read_text", "reference_to"]
+__all__ = ["TAG", "Find", "decode", "encode", "find_reference", "has_tag", "read_text", "reference_to"]
 
 TAG: Final = "$type"
 """The key of data that says of itself what it is."""
@@ -113,7 +113,7 @@ def decode(data: Any, hint: Any = Any, *, where: str = "the value", find: Find |
       '.png'
       >>> decode("red", Colour)
       Traceback (most recent call last):
-      hfg.errors.EncodingError: the value must be Colour, got 'red'
+      hfg.errors.EncodingError: the value must be a colour, as in "#ff8000", got 'red'
     """
     try:
         return _decode(data, hint, where, find or find_reference)

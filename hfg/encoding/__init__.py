@@ -1,0 +1,36 @@
+"""Values as data: plain data for files and people, bytes between processes.
+
+    data         any value as what YAML and JSON hold, and back by its declared type; what parameters and files use
+    codecs       what a value of a type consists of, compiled once for each type
+    arrays       which arrays travel as raw bytes
+    descriptions what two ends compare before the first value
+    wire         tokens as bytes and back
+
+Whoever wants a value in a file takes `encode` and `decode`; whoever sends tokens takes `TokenCodec`.
+"""
+
+from hfg.encoding.arrays import ArrayHead, Lease
+from hfg.encoding.codecs import codec_for, wire_problem
+from hfg.encoding.data import TAG, Find, decode, encode, find_reference, has_tag, read_text, reference_to
+from hfg.encoding.descriptions import description_of, difference, type_fingerprint
+from hfg.encoding.wire import Limits, TokenCodec
+
+__all__ = [
+    "TAG",
+    "ArrayHead",
+    "Find",
+    "Lease",
+    "Limits",
+    "TokenCodec",
+    "codec_for",
+    "decode",
+    "description_of",
+    "difference",
+    "encode",
+    "find_reference",
+    "has_tag",
+    "read_text",
+    "reference_to",
+    "type_fingerprint",
+    "wire_problem",
+]

@@ -1,0 +1,893 @@
+"""How the values of a type become data that msgspec writes, and back: compiled once for each type.
+
+One idea: a type is *carried* by a simpler one, down to what msgspec writes by itself. A dataclass is carried by the
+tuple of its fields, an enum by a number, a fraction by two integers, an array by its place among the frame's arrays.
+Numbers and texts are leaves, which cost nothing but a look at their class, and msgspec reads all of it back by the
+declared type, so what arrives is of that type or is refused. No class is named in the data: both ends have the type.
+
+What arrives is of the same class as what was sent, or nothing is sent: of a value's class nothing is guessed. Where a
+type allows several (a union, a Sequence), the number of the one that it was goes along. Stands on `arrays` and types.
+"""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import datetime
+import decimal
+import enum
+import fractions
+import functools
+import inspect
+import json
+import numbers
+import operator
+import os
+import pathlib
+import types
+import typing
+import uuid
+import zoneinfo
+from collections import abc
+from collections.abc import Callable, Iterable, Sequence
+from typing import Annotated, Any, Final, Literal, NamedTuple
+
+import msgspec
+import numpy as np
+
+from hfg.encoding.arrays import array_problem, unsafe_content
+from hfg.errors import EncodingError
+from hfg.types import accepts, array_facts, bare_type, describe, describe_value
+
+__all__ = ["Codec", "Unfit", "codec_for", "wire_problem"]
+
+Arrays = list["np.ndarray[Any, Any]"]
+Lower = Callable[[Any, Arrays], Any]
+"""Gives what carries a value, and puts its arrays with the others of the frame."""
+Lift = Callable[[Any, Arrays], Any]
+"""Gives the value that is carried."""
+
+_NONE: Final = type(None)
+_LONGEST_NUMBER: Final = 2**16  # bytes of an integer beyond 64 bits: arithmetic on longer ones takes for ever
+_REMEMBERED: Final = 64
+
+
+class Unfit(Exception):
+    """A value is not exactly of a type; `where` grows on its way out of the value."""
+
+    def __init__(self, value: Any, hint: Any, why: str = "") -> None:
+        super().__init__()
+        self.value = value
+        self.hint = hint
+        self.why = why
+        self.where = ""
+
+    def inside(self, place: str) -> Unfit:
+        """Say in which part of a value it is."""
+        self.where = place + self.where
+        return self
+
+    def sentence(self, what: str) -> str:
+        """Say it to those who sent it."""
+        found = f"expected {describe(self.hint)}, found {describe_value(self.value)}"
+        why = self.why or (
+            "it would arrive as another class: send exactly the declared one"
+            if accepts(self.value, self.hint)
+            else "send what the port declares, or declare what it sends"
+        )
+        return f"{what}{self.where} cannot be sent: {found}; {why}"
+
+
+class _CannotCross(Exception):
+    """A type says too little of its values, or allows some that are no data."""
+
+    def __init__(self, hint: Any, why: str) -> None:
+        super().__init__()
+        self.hint = hint
+        self.why = why
+        self.where: str | None = None
+
+    def sentence(self, whole: Any) -> str:
+        """Say it of the type that the port declares."""
+        part = describe(self.hint)
+        where = f"{describe(whole)} cannot cross to another process"
+        if self.where is not None:
+            return f"{where}: its part {self.where} is {part}, which {self.why}"
+        return f"{where}: {part if part != describe(whole) else 'it'} {self.why}"
+
+
+class Codec(NamedTuple):
+    """How values of one type travel.
+
+    Attributes:
+      hint: the type.
+      form: plain data that says all that two ends must agree on.
+      wire: the type that carries it, which msgspec writes and reads.
+      exact: classes whose values are what carries them; empty unless the type is a leaf.
+      lower: checks a value and gives what carries it.
+      lift: gives the value; None where it is what carries it.
+    """
+
+    hint: Any
+    form: Any
+    wire: Any
+    exact: frozenset[type]
+    lower: Lower
+    lift: Lift | None
+
+
+def codec_for(hint: Any, *, wide: bool = False) -> Codec:
+    """Give the codec of a type.
+
+    Args:
+      hint: the declared type.
+      wide: integers have any size, which costs more; both ends must say the same.
+
+    Raises:
+      EncodingError: values of this type cannot cross; the message names the part that cannot.
+    """
+    try:
+        return _codec_for(hint, wide)
+    except TypeError:  # a hint with an unhashable part
+        return _compiled(hint, wide)
+
+
+@functools.lru_cache(maxsize=1024)
+def _codec_for(hint: Any, wide: bool) -> Codec:
+    return _compiled(hint, wide)
+
+
+def _compiled(hint: Any, wide: bool) -> Codec:
+    try:
+        return _Compiler(wide).compile(hint)
+    except _CannotCross as problem:
+        raise EncodingError(problem.sentence(hint)) from None
+    except RecursionError:
+        raise EncodingError(f"{describe(hint)} cannot cross to another process: it is nested too deep") from None
+
+
+def wire_problem(hint: Any) -> str | None:
+    """Say what of a type cannot cross to another process and why, or None if all its values can.
+
+    Example:
+      >>> print(wire_problem(dict[str, list[int | None]]))
+      None
+      >>> print(wire_problem(list[Any]))
+      list[Any] cannot cross to another process: Any says nothing of its values; name their type
+    """
+    try:
+        codec_for(hint)
+    except EncodingError as error:
+        return str(error)
+    return None
+
+
+# --- what stands for what ---
+
+
+class _Carried(NamedTuple):
+    """Values of a class are carried by values of a type: those of nobody's own that hfg knows."""
+
+    by: Any
+    lower: Callable[[Any], Any]
+    lift: Callable[[Any], Any]
+
+
+def _zone_of(value: datetime.datetime) -> tuple[str, str | None]:
+    zone = value.tzinfo
+    if isinstance(zone, zoneinfo.ZoneInfo) and zone.key:
+        return f"{value.fold}{value.replace(tzinfo=None).isoformat()}", zone.key
+    if zone is not None and type(zone) is not datetime.timezone:
+        raise ValueError("its time zone is none that has a name; use datetime.timezone or zoneinfo.ZoneInfo")
+    return f"{value.fold}{value.isoformat()}", None
+
+
+def _in_zone(data: tuple[str, str | None]) -> datetime.datetime:
+    text, key = data
+    value = datetime.datetime.fromisoformat(text[1:]).replace(fold=int(text[:1]))
+    return value if key is None else value.replace(tzinfo=zoneinfo.ZoneInfo(key))
+
+
+def _time_text(value: datetime.time) -> str:
+    if value.tzinfo is not None and type(value.tzinfo) is not datetime.timezone:
+        raise ValueError("its time zone has no fixed offset")
+    return f"{value.fold}{value.isoformat()}"
+
+
+def _fraction(data: tuple[int, int]) -> fractions.Fraction:
+    made = fractions.Fraction(*data)
+    if (made.numerator, made.denominator) != data:
+        raise ValueError("a fraction is not in lowest terms")
+    return made
+
+
+_NATIVE: Final = (bool, str, bytes, bytearray, decimal.Decimal, uuid.UUID, datetime.date)
+"""Leaves that msgspec writes and reads without loss."""
+
+_CARRIED: Final[dict[type, _Carried]] = {
+    fractions.Fraction: _Carried(tuple[int, int], fractions.Fraction.as_integer_ratio, _fraction),
+    range: _Carried(
+        tuple[int, int, int], lambda value: (value.start, value.stop, value.step), lambda data: range(*data)
+    ),
+    datetime.datetime: _Carried(tuple[str, str | None], _zone_of, _in_zone),
+    datetime.time: _Carried(
+        str, _time_text, lambda data: datetime.time.fromisoformat(data[1:]).replace(fold=int(data[:1]))
+    ),
+    datetime.timedelta: _Carried(
+        tuple[int, int, int],
+        lambda value: (value.days, value.seconds, value.microseconds),
+        lambda data: datetime.timedelta(*data),
+    ),
+}
+
+_CODE: Final = "is code, and no code crosses; send data that says what to do"
+_NO_DATA: Final = (
+    "is no data that hfg can carry; use numbers, texts, arrays, enums, dataclasses, structs, named tuples, "
+    "and containers of them"
+)
+_SAYS_NOTHING: Final = "says nothing of its values; name their type"
+
+_SEQUENCES: Final = (abc.Sequence, abc.MutableSequence, abc.Collection, abc.Iterable, abc.Reversible, abc.Container)
+_SETS: Final = (abc.Set, abc.MutableSet)
+_MAPPINGS: Final = (abc.Mapping, abc.MutableMapping)
+_PAIRS: Final[dict[type, Callable[[Any], Any]]] = {
+    dict: dict,
+    collections.OrderedDict: collections.OrderedDict,
+    collections.Counter: lambda pairs: collections.Counter(dict(pairs)),
+}
+_NUMBERS: Final[dict[Any, Any]] = {
+    numbers.Integral: int,
+    numbers.Rational: int | fractions.Fraction,
+    numbers.Real: float | fractions.Fraction,
+    numbers.Complex: complex | fractions.Fraction,
+    numbers.Number: complex | fractions.Fraction | decimal.Decimal,
+    typing.SupportsFloat: float | fractions.Fraction | decimal.Decimal,
+    typing.SupportsInt: float | fractions.Fraction | decimal.Decimal,
+}
+
+
+class _Compiler:
+    """Makes the codec of one type; a method for each manner of types."""
+
+    def __init__(self, wide: bool) -> None:
+        self._wide = wide
+        self._under_way: dict[Any, _Later] = {}
+
+    def compile(self, hint: Any) -> Codec:
+        bare = bare_type(hint)
+        if hasattr(bare, "__supertype__"):
+            return self.compile(bare.__supertype__)
+        if array_facts(hint) is not None:
+            return self._array(hint)
+        origin, arguments = typing.get_origin(bare), typing.get_args(bare)
+        if origin in (typing.Union, types.UnionType):
+            return self._union(bare, [self.compile(member) for member in arguments])
+        if origin is Literal:
+            return self._literal(bare, arguments)
+        if bare in (Any, object, abc.Hashable):
+            raise _CannotCross(hint, _SAYS_NOTHING)
+        if bare in _NUMBERS:
+            return self.compile(_NUMBERS[bare])
+        cls = origin or bare
+        if cls is abc.Callable or cls in (type, types.FunctionType, types.BuiltinFunctionType, types.MethodType):
+            raise _CannotCross(bare, _CODE)
+        if not isinstance(cls, type):
+            raise _CannotCross(bare, _NO_DATA)
+        return self._class(bare, cls, arguments)
+
+    def _class(self, hint: Any, cls: type, arguments: tuple[Any, ...]) -> Codec:
+        scalar = self._scalar(hint, cls)
+        if scalar is not None:
+            return scalar
+        container = self._container(hint, cls, arguments)
+        if container is not None:
+            return container
+        fields = _fields_of(cls, arguments)
+        if fields is None:
+            raise _CannotCross(hint, _NO_DATA)
+        later = self._under_way.get(hint)
+        if later is not None:
+            return later.codec
+        self._under_way[hint] = later = _Later(hint, cls.__name__)
+        try:
+            made = self._keyed(hint, fields) if typing.is_typeddict(cls) else self._record(hint, cls, fields)
+        finally:
+            del self._under_way[hint]
+        later.made = made
+        return made
+
+    # --- scalars ---
+
+    def _scalar(self, hint: Any, cls: type) -> Codec | None:
+        if cls in (int, float):
+            return self._number(cls)
+        if cls is _NONE:
+            return _leaf(None, "None", None, _NONE)
+        if cls in _NATIVE:
+            return _leaf(cls, cls.__name__, cls, cls)
+        if cls is complex:
+            parts = _Carried(tuple[float, float], _parts_of_complex, lambda data: complex(*data))
+            return self._union(complex, [self._carried(complex, parts), self._number(float)])
+        if cls in _CARRIED:
+            return self._carried(cls, _CARRIED[cls])
+        if issubclass(cls, enum.Enum):
+            return self._enum(cls)
+        if cls is os.PathLike or issubclass(cls, pathlib.PurePath):
+            return self._path(hint, cls)
+        if issubclass(cls, np.generic):
+            return self._numpy_scalar(cls)
+        return None
+
+    def _number(self, cls: type) -> Codec:
+        """Integers, which are numbers of any kind, too (PEP 484); beyond 64 bits they are bytes."""
+        exact = frozenset({int, bool} if cls is int else {float, int, bool})
+        if not self._wide:
+            return _leaf(cls, cls.__name__, int | bool if cls is int else float | int | bool, *exact)
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if isinstance(value, np.generic):
+                value = value.item()
+            if type(value) is int:
+                return value.to_bytes(value.bit_length() // 8 + 1, "little", signed=True)
+            if type(value) not in exact:
+                raise Unfit(value, cls)
+            return value
+
+        def lift(data: Any, arrays: Arrays) -> Any:
+            if type(data) is not bytes:
+                return data
+            if len(data) > _LONGEST_NUMBER:
+                raise ValueError(f"an integer has {len(data)} bytes, which is too long")
+            return int.from_bytes(data, "little", signed=True)
+
+        wire: Any = bytes | bool if cls is int else bytes | bool | float
+        return Codec(cls, [cls.__name__], wire, frozenset(), lower, lift)
+
+    def _carried(self, cls: type, how: _Carried, name: str | None = None) -> Codec:
+        inner = self.compile(how.by)
+        give, make, lower_inner, lift_inner = how.lower, how.lift, inner.lower, inner.lift
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not cls:
+                raise Unfit(value, cls)
+            try:
+                return lower_inner(give(value), arrays)
+            except (ValueError, TypeError, OverflowError) as error:
+                raise Unfit(value, cls, str(error)) from None
+
+        def lift(data: Any, arrays: Arrays) -> Any:
+            return make(data if lift_inner is None else lift_inner(data, arrays))
+
+        return Codec(cls, [name or cls.__name__], inner.wire, frozenset(), lower, lift)
+
+    def _enum(self, cls: Any) -> Codec:
+        if issubclass(cls, enum.Flag):
+            made = self._carried(cls, _Carried(int, lambda value: value.value, cls))
+            return made._replace(form=["flag", cls.__name__, [[one.name, one.value] for one in cls]])
+        members = list(cls)
+        return self._chosen(cls, members, ["enum", cls.__name__, [one.name for one in members]], {cls})
+
+    def _literal(self, hint: Any, values: tuple[Any, ...]) -> Codec:
+        ordered = sorted(values, key=lambda one: (type(one).__name__, repr(one)))  # two ways to write it are equal
+        form = ["literal", [[type(one).__name__, repr(one)] for one in ordered]]
+        return self._chosen(hint, ordered, form, {type(one) for one in values})
+
+    def _chosen(self, hint: Any, members: list[Any], form: Any, kinds: set[Any]) -> Codec:
+        """One of a few values: its number."""
+        if not members:
+            raise _CannotCross(hint, "has no values")
+        index = {(type(one), one.name if isinstance(one, enum.Enum) else one): i for i, one in enumerate(members)}
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            kind = type(value)
+            if kind not in kinds:
+                raise Unfit(value, hint)
+            number = index.get((kind, value.name if isinstance(value, enum.Enum) else value))
+            if number is None:
+                raise Unfit(value, hint)
+            return number
+
+        wire = Annotated[int, msgspec.Meta(ge=0, lt=len(members))]
+        return Codec(hint, form, wire, frozenset(), lower, lambda data, arrays: members[data])
+
+    def _path(self, hint: Any, cls: Any) -> Codec:
+        text = _Carried(str, str, cls)
+        concrete = [one for one in _PATHS if issubclass(one, cls)] if cls is not os.PathLike else list(_PATHS)
+        if cls is pathlib.Path:  # the path of this system, whichever that is
+            return self._carried(type(pathlib.Path()), _Carried(str, str, pathlib.Path), "Path")
+        if cls in (pathlib.PurePath, os.PathLike):
+            return self._union(hint, [self.compile(one) for one in concrete])
+        return self._carried(cls, text)
+
+    def _numpy_scalar(self, cls: Any) -> Codec:
+        try:
+            dtype = np.dtype(cls).newbyteorder("<")
+            problem = array_problem(dtype) or (None if dtype.type is cls and dtype.itemsize else "is of several kinds")
+        except TypeError:
+            problem = "is of several kinds"
+        if problem is not None:
+            raise _CannotCross(cls, "is of no one size; name a type like numpy.float64")
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not cls:
+                raise Unfit(value, cls)
+            return np.asarray(value).astype(dtype).tobytes()
+
+        def lift(data: Any, arrays: Arrays) -> Any:
+            made = np.frombuffer(data, dtype)
+            if made.size != 1 or unsafe_content(made) is not None:
+                raise ValueError(f"these bytes are no {cls.__name__}")
+            return cls(made.astype(dtype.newbyteorder("="))[0])
+
+        return Codec(cls, [cls.__name__], bytes, frozenset(), lower, lift)
+
+    def _array(self, hint: Any) -> Codec:
+        facts = array_facts(hint)
+        assert facts is not None
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not np.ndarray:
+                raise Unfit(value, hint, "send numpy.asarray(...) of it" if isinstance(value, np.ndarray) else "")
+            if not accepts(value, hint):
+                raise Unfit(value, hint)
+            why = array_problem(value.dtype) or unsafe_content(value)
+            if why is not None:
+                raise Unfit(value, hint, f"{why} that another process could read")
+            arrays.append(value)
+            return len(arrays) - 1
+
+        def lift(data: Any, arrays: Arrays) -> Any:
+            found = arrays[data]
+            if not accepts(found, hint):
+                raise ValueError(f"expected {describe(hint)}, found {describe_value(found)}")
+            return found
+
+        layouts = [repr(one) for one in getattr(hint, "__metadata__", ()) if hasattr(one, "shapes")]
+        form = ["array", sorted({one.__name__ for one in facts.dtypes}), layouts]
+        return Codec(hint, form, Annotated[int, msgspec.Meta(ge=0)], frozenset(), lower, lift)
+
+    # --- several types in one ---
+
+    def _union(self, hint: Any, members: list[Codec]) -> Codec:
+        """One of several types, with the number of the one that it is, unless msgspec sees that by itself.
+
+        `int | str` and `str | int` are equal and must be the same on both ends, so the order is that of the forms.
+        """
+        by_form = {json.dumps(member.form): member for member in members}
+        members = [by_form[form] for form in sorted(by_form)]
+        if len(members) == 1:
+            return members[0]
+        form = ["union", [member.form for member in members]]
+        nothing = [member for member in members if member.wire is None]
+        others = [member for member in members if member.wire is not None]
+        exact = frozenset[type]().union(*(member.exact for member in members))
+        if all(member.exact and member.exact <= _TOLD_APART for member in others) and not {str, bytes} <= exact:
+            wire = functools.reduce(operator.or_, (member.wire for member in others), None) if nothing else None
+            wire = wire or functools.reduce(operator.or_, (member.wire for member in others))
+            return _leaf(hint, form, wire, *exact)
+        if len(others) == 1:
+            return _optional(hint, form, others[0])
+        return _tagged(hint, form, others, bool(nothing))
+
+    def _container(self, hint: Any, cls: type, arguments: tuple[Any, ...]) -> Codec | None:
+        if cls is tuple:
+            return self._tuple(hint, arguments)
+        if cls in (list, set, frozenset, collections.deque):
+            return self._items(hint, cls, self._part(hint, arguments, 0))
+        if cls in _PAIRS:
+            key = self._part(hint, arguments, 0)
+            item = self._number(int) if cls is collections.Counter else self._part(hint, arguments, 1)
+            return self._pairs(hint, cls, key, item)
+        if cls in _SEQUENCES:
+            return self._sequence(hint, cls, self._part(hint, arguments, 0))
+        if cls in _SETS:
+            part = self._part(hint, arguments, 0)
+            return self._union(hint, [self._items(_generic(one, part.hint), one, part) for one in (set, frozenset)])
+        if cls in _MAPPINGS:
+            key, item = self._part(hint, arguments, 0), self._part(hint, arguments, 1)
+            return self._pairs(hint, dict, key, item)
+        return None
+
+    def _part(self, hint: Any, arguments: tuple[Any, ...], number: int) -> Codec:
+        if len(arguments) <= number:
+            raise _CannotCross(hint, f"does not say what it holds; write {describe(hint)}[...] with a type")
+        return self.compile(arguments[number])
+
+    def _sequence(self, hint: Any, cls: type, part: Codec) -> Codec:
+        item = part.hint
+        members = [
+            self._items(_generic(list, item), list, part),
+            self._items(_generic(tuple, item, ...), tuple, part),
+            self._items(_generic(collections.deque, item), collections.deque, part),
+        ]
+        if cls not in (abc.Sequence, abc.MutableSequence, abc.Reversible):
+            members += [self._items(_generic(one, item), one, part) for one in (set, frozenset)]
+        if bare_type(item) is str:
+            members.append(self.compile(str))
+        if bare_type(item) is int:
+            members += [self.compile(one) for one in (bytes, bytearray, range)]
+        return self._union(hint, members)
+
+    def _items(self, hint: Any, cls: Any, part: Codec) -> Codec:
+        exact, lower_part, lift_part = part.exact, part.lower, part.lift
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not cls:
+                raise Unfit(value, hint)
+            if exact and exact.issuperset(map(type, value)):
+                return value
+            return _each(value, lower_part, arrays)
+
+        def lower_deque(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not cls:
+                raise Unfit(value, hint)
+            return value.maxlen, _each(value, lower_part, arrays)
+
+        def lift(data: Any, arrays: Arrays) -> Any:
+            return cls(data if lift_part is None else [lift_part(one, arrays) for one in data])
+
+        def lift_deque(data: Any, arrays: Arrays) -> Any:
+            longest, items = data
+            if longest is not None and not len(items) <= longest <= 2**31:
+                raise ValueError(f"a deque of at most {longest} items has {len(items)}")
+            return cls(items if lift_part is None else [lift_part(one, arrays) for one in items], longest)
+
+        form = [cls.__name__, part.form]
+        if cls is collections.deque:
+            wire = _generic(tuple, int | None, _generic(list, part.wire))
+            return Codec(hint, form, wire, frozenset(), lower_deque, lift_deque)
+        if exact:  # msgspec makes the container by itself
+            wire = _generic(tuple, part.wire, ...) if cls is tuple else _generic(cls, part.wire)
+            return Codec(hint, form, wire, frozenset(), lower, None)
+        return Codec(hint, form, _generic(list, part.wire), frozenset(), lower, lift)
+
+    def _tuple(self, hint: Any, arguments: tuple[Any, ...]) -> Codec:
+        if len(arguments) == 2 and arguments[1] is ...:
+            return self._items(hint, tuple, self.compile(arguments[0]))
+        if not arguments and hint in (tuple, typing.Tuple):  # noqa: UP006
+            raise _CannotCross(hint, "does not say what it holds; write tuple[...] with types")
+        parts = [self.compile(one) for one in arguments if one != ()]
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not tuple or len(value) != len(parts):
+                raise Unfit(value, hint)
+            return lower_parts(value, arrays)
+
+        lower_parts = _lower_parts(parts, [f"[{number}]" for number in range(len(parts))])
+        lift_parts = _lift_parts(parts)
+        wire = _generic(tuple, *[part.wire for part in parts])
+        lift = None if lift_parts is None else lambda data, arrays: tuple(lift_parts(data, arrays))
+        return Codec(hint, ["tuple", [part.form for part in parts]], wire, frozenset(), lower, lift)
+
+    def _pairs(self, hint: Any, cls: type, key: Codec, item: Codec) -> Codec:
+        make, form = _PAIRS[cls], [cls.__name__, key.form, item.form]
+        if cls is dict and key.exact and key.exact <= _KEYS and item.exact:
+
+            def lower_plain(value: Any, arrays: Arrays) -> Any:
+                if type(value) is not dict:
+                    raise Unfit(value, hint)
+                if key.exact.issuperset(map(type, value)) and item.exact.issuperset(map(type, value.values())):
+                    return value
+                return dict(_each_pair(value, key.lower, item.lower, arrays))
+
+            return Codec(hint, form, _generic(dict, key.wire, item.wire), frozenset(), lower_plain, None)
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not cls:
+                raise Unfit(value, hint)
+            return _each_pair(value, key.lower, item.lower, arrays)
+
+        lift_key, lift_item = key.lift or _as_it_is, item.lift or _as_it_is
+
+        def lift(data: Any, arrays: Arrays) -> Any:
+            return make([(lift_key(one, arrays), lift_item(other, arrays)) for one, other in data])
+
+        wire = _generic(list, _generic(tuple, key.wire, item.wire))
+        return Codec(hint, form, wire, frozenset(), lower, lift)
+
+    # --- classes with fields ---
+
+    def _field(self, cls: type, name: str, hint: Any) -> Codec:
+        try:
+            return self.compile(hint)
+        except _CannotCross as problem:
+            problem.where = problem.where or f"{cls.__name__}.{name}"
+            raise
+
+    def _record(self, hint: Any, cls: Any, fields: dict[str, Any]) -> Codec:
+        parts = [self._field(cls, name, one) for name, one in fields.items()]
+        give, make = _giver(cls, tuple(fields)), _maker(cls, tuple(fields))
+        lower_parts = _lower_parts(parts, [f".{name}" for name in fields])
+        lift_parts = _lift_parts(parts)
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not cls:
+                raise Unfit(value, hint)
+            try:
+                items = give(value)
+            except AttributeError as error:
+                raise Unfit(value, hint, str(error)) from None
+            return lower_parts(items, arrays)
+
+        def lift(data: Any, arrays: Arrays) -> Any:
+            if lift_parts is not None:
+                data = lift_parts(data, arrays)
+            try:
+                return make(data)
+            except Exception as error:  # of users, who check what they hold
+                raise ValueError(f"it is no {cls.__name__} ({type(error).__name__}: {error})") from error
+
+        form = ["class", cls.__name__, [[name, part.form] for name, part in zip(fields, parts, strict=True)]]
+        wire = _generic(tuple, *[part.wire for part in parts])
+        return Codec(hint, form, wire, frozenset(), lower, lift)
+
+    def _keyed(self, hint: Any, fields: dict[str, Any]) -> Codec:
+        """A dict with known keys; each is a list of one value, or of none where the key is missing."""
+        parts = {name: self._field(hint, name, one) for name, one in fields.items()}
+        required = _required_keys(hint)
+
+        def lower(value: Any, arrays: Arrays) -> Any:
+            if type(value) is not dict or not required <= value.keys() <= parts.keys():
+                raise Unfit(value, hint)
+            return [
+                _each([value[name]], part.lower, arrays, f'["{name}"]') if name in value else ()
+                for name, part in parts.items()
+            ]
+
+        def lift(data: Any, arrays: Arrays) -> Any:
+            made = {}
+            for (name, part), found in zip(parts.items(), data, strict=True):
+                if len(found) > 1 or (not found and name in required):
+                    raise ValueError(f'the key "{name}" stands {len(found)} times')
+                for one in found:
+                    made[name] = one if part.lift is None else part.lift(one, arrays)
+            return made
+
+        form = ["dict", hint.__name__, [[name, part.form, name in required] for name, part in parts.items()]]
+        wire = _generic(tuple, *[_generic(list, part.wire) for part in parts.values()])
+        return Codec(hint, form, wire, frozenset(), lower, lift)
+
+
+_PATHS: Final = (type(pathlib.Path()), pathlib.PurePosixPath, pathlib.PureWindowsPath)
+_TOLD_APART: Final = frozenset({_NONE, bool, int, float, str, bytes})
+"""Classes that msgspec tells apart by what is written, but not texts from bytes."""
+_KEYS: Final = frozenset({bool, int, str})
+"""Classes of keys that msgspec writes as such."""
+
+
+class _Later:
+    """The codec of a type that contains itself, while it is made: what it carries is read in a second step."""
+
+    def __init__(self, hint: Any, name: str) -> None:
+        self.made: Codec | None = None
+        self.codec = Codec(hint, ["again", name], Any, frozenset(), self._lower, self._lift)
+
+    def _lower(self, value: Any, arrays: Arrays) -> Any:
+        assert self.made is not None
+        return self.made.lower(value, arrays)
+
+    def _lift(self, data: Any, arrays: Arrays) -> Any:
+        assert self.made is not None
+        data = msgspec.convert(data, self.made.wire)
+        return data if self.made.lift is None else self.made.lift(data, arrays)
+
+
+def _generic(cls: Any, *parts: Any) -> Any:
+    return cls[parts]
+
+
+def _or_none(wire: Any) -> Any:
+    """Give the type that carries None, too."""
+    return None if wire is None else wire | None
+
+
+def _parts_of_complex(value: complex) -> tuple[float, float]:
+    return value.real, value.imag
+
+
+def _as_it_is(data: Any, arrays: Arrays) -> Any:
+    return data
+
+
+def _leaf(hint: Any, form: Any, wire: Any, *classes: type) -> Codec:
+    exact = frozenset(classes)
+
+    def lower(value: Any, arrays: Arrays) -> Any:
+        if type(value) in exact:
+            return value
+        if isinstance(value, np.generic):  # a number that numpy has made is the same number
+            item = value.item()
+            if type(item) in exact:
+                return item
+        raise Unfit(value, hint)
+
+    return Codec(hint, [form] if isinstance(form, str) else form, wire, exact, lower, None)
+
+
+def _optional(hint: Any, form: Any, other: Codec) -> Codec:
+    lower_other, lift_other = other.lower, other.lift
+
+    def lower(value: Any, arrays: Arrays) -> Any:
+        return None if value is None else lower_other(value, arrays)
+
+    def lift(data: Any, arrays: Arrays) -> Any:
+        return None if data is None or lift_other is None else lift_other(data, arrays)
+
+    return Codec(hint, form, _or_none(other.wire), frozenset(), lower, None if lift_other is None else lift)
+
+
+def _tagged(hint: Any, form: Any, members: list[Codec], may_be_none: bool) -> Codec:
+    boxes: list[Any] = [
+        msgspec.defstruct(f"Box{number}", [("value", member.wire)], tag=number, array_like=True, frozen=True)
+        for number, member in enumerate(members)
+    ]
+    first: dict[type, int] = {}  # of a class, the member that took one last: most often it takes the next one too
+
+    def lower(value: Any, arrays: Arrays) -> Any:
+        if value is None and may_be_none:
+            return None
+        begin, kind = len(arrays), type(value)
+        likely = first.get(kind)
+        order: Iterable[int] = range(len(members))
+        for number in order if likely is None else (likely, *order):
+            try:
+                made = boxes[number](members[number].lower(value, arrays))
+            except Unfit:
+                del arrays[begin:]
+                continue
+            if len(first) < _REMEMBERED:
+                first[kind] = number
+            return made
+        raise Unfit(value, hint)
+
+    lifts = {box: member.lift for box, member in zip(boxes, members, strict=True)}
+
+    def lift(data: Any, arrays: Arrays) -> Any:
+        if data is None:
+            return None
+        inner = lifts[type(data)]
+        return data.value if inner is None else inner(data.value, arrays)
+
+    wire = functools.reduce(operator.or_, boxes)
+    return Codec(hint, form, wire | None if may_be_none else wire, frozenset(), lower, lift)
+
+
+def _each(values: Iterable[Any], lower: Lower, arrays: Arrays, place: str | None = None) -> list[Any]:
+    made: list[Any] = []
+    try:
+        for value in values:
+            made.append(lower(value, arrays))  # noqa: PERF401 - its length says which value did not fit
+    except Unfit as problem:
+        raise problem.inside(place or f"[{len(made)}]") from None
+    return made
+
+
+def _each_pair(value: Any, lower_key: Lower, lower_item: Lower, arrays: Arrays) -> list[tuple[Any, Any]]:
+    made, key = [], None
+    try:
+        for key, item in value.items():
+            made.append((lower_key(key, arrays), lower_item(item, arrays)))
+    except Unfit as problem:
+        raise problem.inside(f"[{key!r:.40}]") from None
+    return made
+
+
+def _lower_parts(parts: Sequence[Codec], places: Sequence[str]) -> Lower:
+    """Lower a tuple of values of different types.
+
+    A tuple of classes that has been right for the leaves among them is right again: one look for all of these.
+    """
+    leaves = [number for number, part in enumerate(parts) if part.exact]
+    others = [(number, part.lower) for number, part in enumerate(parts) if not part.exact]
+    right: set[tuple[type, ...]] = set()
+
+    def lower(items: tuple[Any, ...], arrays: Arrays) -> Any:
+        kinds = tuple(map(type, items))
+        made: Any = items
+        number = 0
+        try:
+            if kinds not in right:
+                made = list(items)
+                for number in leaves:
+                    made[number] = parts[number].lower(items[number], arrays)
+                if len(right) < _REMEMBERED and all(map(operator.is_, made, items)):
+                    right.add(kinds)
+            elif others:
+                made = list(items)
+            for number, one in others:
+                made[number] = one(items[number], arrays)
+        except Unfit as problem:
+            raise problem.inside(places[number]) from None
+        return made
+
+    return lower
+
+
+def _lift_parts(parts: Sequence[Codec]) -> Callable[[Any, Arrays], list[Any]] | None:
+    if all(part.lift is None for part in parts):
+        return None
+    lifts = [(number, part.lift) for number, part in enumerate(parts) if part.lift is not None]
+
+    def lift(data: Any, arrays: Arrays) -> list[Any]:
+        made = list(data)
+        for number, one in lifts:
+            made[number] = one(made[number], arrays)
+        return made
+
+    return lift
+
+
+# --- classes with fields ---
+
+
+def _fields_of(cls: Any, arguments: tuple[Any, ...]) -> dict[str, Any] | None:
+    """Give the fields of a class with their types; None if it has none."""
+    is_struct, is_data = issubclass(cls, msgspec.Struct), dataclasses.is_dataclass(cls)
+    is_named = issubclass(cls, tuple) and hasattr(cls, "_fields")
+    if not (is_struct or is_data or is_named or typing.is_typeddict(cls)):
+        return None
+    try:
+        hints = typing.get_type_hints(cls, include_extras=True)
+    except Exception as error:  # names that exist for type checkers alone
+        raise _CannotCross(cls, f"has fields whose types cannot be found ({error}); import them where it is") from None
+    if is_struct:
+        names: Sequence[str] = cls.__struct_fields__
+    elif is_data:
+        if any(isinstance(one, dataclasses.InitVar) for one in hints.values()):
+            raise _CannotCross(cls, "takes arguments that it does not keep (InitVar), so it cannot be made again")
+        names = [one.name for one in dataclasses.fields(cls)]
+    elif is_named:
+        names = cls._fields
+    else:
+        names = list(hints)
+    known = dict(zip(getattr(cls, "__parameters__", ()), arguments, strict=False))
+    return {name: _filled(hints.get(name, Any), known) for name in names}
+
+
+def _required_keys(cls: Any) -> frozenset[str]:
+    """Give the keys that must be there; of annotations that are texts the class itself does not know it."""
+    hints = typing.get_type_hints(cls, include_extras=True)
+    marked = {name: typing.get_origin(hint) for name, hint in hints.items()}
+    required = {name for name in cls.__required_keys__ if marked.get(name) is not typing.NotRequired}
+    return frozenset(required | {name for name, mark in marked.items() if mark is typing.Required})
+
+
+def _filled(hint: Any, known: dict[Any, Any]) -> Any:
+    """Put the types of a generic class's parameters into the type of a field."""
+    if isinstance(hint, typing.TypeVar):
+        return known.get(hint, hint)
+    unknown = getattr(hint, "__parameters__", ())
+    if known and unknown and typing.get_origin(hint) is not None:
+        return hint[tuple(known.get(one, one) for one in unknown)]
+    return hint
+
+
+def _giver(cls: Any, names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
+    if issubclass(cls, tuple):
+        return tuple
+    if not names:
+        return lambda value: ()
+    give = operator.attrgetter(*names)
+    return give if len(names) > 1 else lambda value: (give(value),)
+
+
+def _maker(cls: Any, names: tuple[str, ...]) -> Callable[[Any], Any]:
+    """Make an object of its fields by its class, whose own checks then hold, and what it derives is derived."""
+    if issubclass(cls, tuple):
+        return lambda items: cls._make(items)
+    arguments = inspect.signature(cls).parameters
+    if tuple(arguments) == names and not any(one.kind is one.KEYWORD_ONLY for one in arguments.values()):
+        return lambda items: cls(*items)
+    if set(arguments) == set(names):
+        return lambda items: cls(**dict(zip(names, items, strict=True)))
+    finish = getattr(cls, "__post_init__", None)
+
+    def make(items: Sequence[Any]) -> Any:  # fields that the class makes by itself, or an __init__ of its own
+        made = object.__new__(cls)
+        for name, item in zip(names, items, strict=True):
+            object.__setattr__(made, name, item)
+        if finish is not None:
+            finish(made)
+        return made
+
+    return make
