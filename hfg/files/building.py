@@ -315,7 +315,14 @@ class _Making:
         if isinstance(box, Document):
             for name, group in box.groups.items():
                 with self.told((*key, "groups", name), f'group "{name}"'):
-                    graph.group(name, threads=group.threads, policy=group.policy, seed=group.seed)
+                    graph.group(
+                        name,
+                        threads=group.threads,
+                        policy=group.policy,
+                        seed=group.seed,
+                        process=group.process,
+                        host=group.host,
+                    )
         if owner is None:
             self.declare(graph, box, key)
         for name, node in box.nodes.items():

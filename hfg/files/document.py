@@ -99,11 +99,15 @@ class GroupDocument(msgspec.Struct, omit_defaults=True):
       threads: 1 for a thread of its own, more for as many, 0 for the event loop.
       policy: who is first when several can run.
       seed: for policy "random"; by default the run's.
+      process: it has a process of its own.
+      host: the agent that runs that process.
     """
 
     threads: int = 1
     policy: Policy = "fifo"
     seed: int | None = None
+    process: bool = False
+    host: str = ""
 
 
 class ParameterDocument(msgspec.Struct, omit_defaults=True):

@@ -315,20 +315,30 @@ class Graph:
     # --- groups and gates ---
 
     def group(
-        self, name: str, *, threads: int | None = None, policy: Policy = "fifo", seed: int | None = None
+        self,
+        name: str,
+        *,
+        threads: int | None = None,
+        policy: Policy = "fifo",
+        seed: int | None = None,
+        process: bool = False,
+        host: str | None = None,
     ) -> GroupSpec:
         """Declare where nodes run; groups belong to the whole graph, wherever they are declared.
 
         Args:
           name: what `add(..., group=name)` refers to; "loop" is the event loop, of which only the policy can be chosen.
-          threads: 1 for a thread of its own (the default), more for as many, 0 for the event loop.
+          threads: 1 for a thread of its own (the default), more for as many, 0 for the event loop (the default where
+            there is a process).
           policy: who is first when several can run (rule R2).
           seed: for policy "random"; by default the run's.
+          process: True for a process of its own; edges to and from its nodes become links (rule L1).
+          host: the agent that is to run that process, as in host="arm"; it implies `process`.
 
         Raises:
           GraphError: a value is out of its range, or the group is declared otherwise already.
         """
-        return declare_group(self._level, name, threads, policy, seed)
+        return declare_group(self._level, name, threads, policy, seed, process, host)
 
     def move(self, node: Node | str, *, group: str | None) -> None:
         """Let a node run in another group; with a subgraph go all inside that have no group of their own.

@@ -285,6 +285,8 @@ class Core:
         self.sources: list[Worker] = []
         self.feeds: list[Worker] = []  # the graph's own inputs (P10)
         self.readers: list[Worker] = []  # the graph's own outputs
+        self.outlets: list[Worker] = []  # where edges leave for another part of a graph that is cut (L1)
+        self.inlets: list[Worker] = []  # where they come in
         self.piped: list[tuple[Any, tuple[Any, ...]]] = []  # edges with operators (P9)
         self.outside: dict[tuple[int, str], Any] = {}  # edges by which signals come from outside the graph
         self.observables: list[tuple[Any, Any, tuple[Any, ...]]] = []  # outside sources of edges

@@ -40,34 +40,48 @@ __all__ = [
     "end_events",
     "give_up",
     "grow",
+    "grow_queue",
     "node_ended",
     "only_futile_in_flight",
     "only_waiting_for_room",
+    "smallest_full",
     "stall",
+    "stalled",
+    "stuck",
     "unread",
     "waits_for",
 ]
 
 
 def grow(core: Core, among: Sequence[Worker] | None = None) -> bool:
-    """F8: if only full queues hold nodes back, the smallest of them gets one more place.
+    """F8: if only full queues hold nodes back, the smallest of them gets one more place; whether that was so.
 
     Args:
       core: the run.
       among: those inside of a subgraph that iterates, where nothing else moves (G4); else all.
     """
+    edge = smallest_full(core, among)
+    if edge is not None:
+        grow_queue(core, edge)
+    return edge is not None
+
+
+def smallest_full(core: Core, among: Sequence[Worker] | None = None) -> EventEdge | None:
+    """F8: give the queue that is to grow now that nothing moves, if that would let a node go on."""
     if not core.full_edges:
-        return False
+        return None
     if among is None and any(reader.inputs_ready() for reader in core.readers):
-        return False  # somebody outside holds a node back: growing would not help, only fill memory
+        return None  # somebody outside holds a node back: growing would not help, only fill memory
     workers = core.workers if among is None else among
     if any([_rate_holds(worker) for worker in workers]):  # noqa: C419 - each sets its timer
-        return False
+        return None
     held = [worker for worker in workers if _held_by_queue_alone(worker)]
     full = [edge for worker in held for edge in worker.event_edges() if edge.full]
-    if not full:
-        return False
-    edge = min(full, key=lambda one: (one.capacity, one.index))
+    return min(full, key=lambda one: (one.capacity, one.index), default=None)
+
+
+def grow_queue(core: Core, edge: EventEdge) -> None:
+    """F8: this queue gets one more place, or the run fails, for it may not grow."""
     if edge.capacity_limit is not None and edge.capacity >= edge.capacity_limit:
         core.host.finish(
             "failed",
@@ -78,13 +92,12 @@ def grow(core: Core, among: Sequence[Worker] | None = None) -> bool:
                 f"than it is sent"
             ),
         )
-        return True
+        return
     edge.grow()
     if core.seldom is not None:
         core.seldom(QueueGrown(core.now(), edge.label, edge.capacity))
     freed(edge)
     core.host.kick()
-    return True
 
 
 def _held_by_queue_alone(worker: Worker) -> bool:
@@ -196,19 +209,28 @@ def only_waiting_for_room(core: Core) -> bool:
 
 def stall(core: Core) -> Stalled | None:
     """R5: say who waits for what, if a source is blocked or tokens lie where they can never be taken."""
+    reasons = stuck(core)
+    return stalled(reasons) if reasons else None
+
+
+def stuck(core: Core) -> list[str]:
+    """R5: who waits for what, now that nothing moves any more; none if all is well."""
     core.settle_barriers()
-    stuck: dict[Worker, list[AnyEdge]] = {}
+    lies: dict[Worker, list[AnyEdge]] = {}
     for edge in core.edges:
         if _lies_for_good(edge):
-            stuck.setdefault(edge.target, []).append(edge)
-    reasons = [_why_stuck(target, edges) for target, edges in stuck.items()]
+            lies.setdefault(edge.target, []).append(edge)
+    reasons = [_why_stuck(target, edges) for target, edges in lies.items()]
     reasons.extend(
         f'source "{source.path}" has not ended and {waits_for(source)}'
         for source in core.sources
         if source not in core.futile and not source.blocked & (ENDED | DISABLED | RESTING)
     )
-    if not reasons:
-        return None
+    return reasons
+
+
+def stalled(reasons: Sequence[str]) -> Stalled:
+    """R5: what a run that stands still for these reasons fails with."""
     shown = "; ".join(reasons[:5]) + (f"; and {len(reasons) - 5} more" if len(reasons) > 5 else "")
     return Stalled(
         f"the run has stalled: {shown}. Nothing can change this from inside: connect or end what is "
@@ -242,6 +264,7 @@ def _lies_for_good(edge: AnyEdge) -> bool:
     target: Worker = edge.target
     return (
         edge.untaken > 0
+        and target not in target.core.outlets  # what lies there lies before who is to take it, too, in another part
         and target.within is None  # what is kept inside of what iterates waits for its next firing (G4)
         and bool(edge.live or edge.source.blocked & DISABLED)
         and not target.blocked & (DISABLED | ENDED)

@@ -100,6 +100,8 @@ class Engine:
       holds: people outside who may still bring something (R5).
       readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
       read_out: those whose END somebody has read.
+      agreement: in a part of a graph that is cut, told that nothing moves here any more: what follows from that is
+        for the whole to say, by the methods that `quiet` calls otherwise.
     """
 
     def __init__(self, flat: FlatGraph, settings: Settings) -> None:
@@ -129,6 +131,7 @@ class Engine:
         self.senders: list[Worker] = []  # feeds for which somebody outside has a token, once for each
         self._told_unread: set[str] = set()
         self._quiet_waiters: list[asyncio.Future[None]] = []
+        self.agreement: Callable[[], None] | None = None
         self.ended_how: tuple[str, HfgError | None] | None = None
         self.ending: asyncio.Event = asyncio.Event()
         self._scheduled = False
@@ -466,23 +469,39 @@ class Engine:
         core = self.core
         if any(not feed.outputs.missing for feed in self.senders):
             return  # a token is about to come
-        if quiet.grow(core) or core.timers:
+        if self.agreement is not None:
+            self.agreement()
             return
-        self._answer_quiet()
-        if self.holds and core.readers:
-            self._tell_unread()
-        if self.holds or any(reader.inputs_ready() for reader in self.readers):
+        if quiet.grow(core) or core.timers or self.is_held_open():
             return
-        if quiet.give_up(core) or quiet.complete_operators(core):
-            self.kick()
-            return
-        if core.timers > 0:
-            return
-        if quiet.end_events(core):
-            self.kick()
+        if self.give_up() or self.complete_operators() or core.timers > 0 or self.end_events():
             return
         stalled = quiet.stall(core)
         self.finish("done" if stalled is None else "stalled", stalled)
+
+    def is_held_open(self) -> bool:
+        """Tell those who wait for quiet, and say whether somebody outside may still bring or take something (R5)."""
+        self._answer_quiet()
+        if self.holds and self.core.readers:
+            self._tell_unread()
+        return bool(self.holds) or any(reader.inputs_ready() for reader in self.readers)
+
+    def give_up(self) -> bool:
+        """R5: sources that work for nobody count as ended; whether there were any."""
+        return self._kicked(quiet.give_up(self.core))
+
+    def complete_operators(self) -> bool:
+        """P9: whether operators on edges had something left to give out."""
+        return self._kicked(quiet.complete_operators(self.core))
+
+    def end_events(self) -> bool:
+        """F13: whether END was sent to inputs that nothing comes to any more."""
+        return self._kicked(quiet.end_events(self.core))
+
+    def _kicked(self, moves: bool) -> bool:
+        if moves:
+            self.kick()
+        return moves
 
     def _tell_unread(self) -> None:
         """P10: a graph that stands still for want of a reader looks like any quiet one, so that is told, once."""

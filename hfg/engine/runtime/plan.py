@@ -15,7 +15,7 @@ from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import DISABLED, STARTING, UNWIRED, Worker
 from hfg.engine.rules.wiring import is_live, rewire
 from hfg.errors import GraphError, UsageError
-from hfg.graph.flat import End, FlatEdge, FlatGraph, FlatNode, scope_end
+from hfg.graph.flat import LINK, End, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat import Scope as FlatScope
 from hfg.graph.structure.places import edge_place, home_of, node_place
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
@@ -179,6 +179,36 @@ class Ends:
             return owner
         return self.at_border(end, self._around)
 
+    def join(self, edge: Any, flat: FlatEdge) -> None:
+        """Lead an edge from end to end; where that is in another part there is what stands for the link to it (L1)."""
+        if flat.target.node == LINK:
+            source = self.of(flat.source)
+            edge.join(source, self._outlet(flat.target.name, source.group))
+        elif flat.source.node == LINK:
+            target = self.of(flat.target)
+            edge.join(self._inlet(flat.source, target.group), target)
+        else:
+            edge.join(self.of(flat.source), self.of(flat.target))
+
+    def _outlet(self, name: str, group: Group) -> Worker:
+        outlet = Worker(self.core, "", None, None, self.loop if group.threaded else group)
+        outlet.be_graph_output(name)
+        self.core.workers.append(outlet)
+        self.core.outlets.append(outlet)
+        return outlet
+
+    def _inlet(self, end: End, group: Group) -> Worker:
+        """It is in the group of who takes from it: what it lays down is processed when all that follows is (F5)."""
+        inlet = Worker(self.core, "", None, None, group)
+        if end.kind == "event":
+            inlet.stand_outside(end.name)
+        else:
+            inlet.be_graph_input(end.name)
+        inlet.block(UNWIRED)  # it never fires
+        self.core.workers.append(inlet)
+        self.core.inlets.append(inlet)
+        return inlet
+
     def scopes_of(self, flat: FlatEdge) -> tuple[Scope, ...]:
         """Give the scopes through whose ports an edge passes."""
         return tuple(self._scopes[scope] for scope in flat.via)
@@ -253,7 +283,7 @@ def make_edge(core: Core, flat: FlatEdge, ends: Ends) -> Any:
         edge = BufferEdge(flat.index, flat.label, flat.active, flat.initial, flat.buffer)
     else:
         edge = SyncEdge(flat.index, flat.label, flat.active)
-    edge.join(ends.of(flat.source), ends.of(flat.target))
+    ends.join(edge, flat)
     derive_release(edge)
     describe(edge, flat, ends)
     return edge

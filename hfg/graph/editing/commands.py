@@ -131,6 +131,8 @@ class AddGroup(Command, frozen=True):
     threads: int | None = None
     policy: Policy = "fifo"
     seed: int | None = None
+    process: bool = False
+    host: str | None = None
 
 
 class ChangeGroup(Command, frozen=True):
@@ -140,6 +142,8 @@ class ChangeGroup(Command, frozen=True):
     threads: int | msgspec.UnsetType = msgspec.UNSET
     policy: Policy | msgspec.UnsetType = msgspec.UNSET
     seed: int | msgspec.UnsetType | None = msgspec.UNSET
+    process: bool | msgspec.UnsetType = msgspec.UNSET
+    host: str | msgspec.UnsetType = msgspec.UNSET
 
 
 class RemoveGroup(Command, frozen=True):

@@ -263,12 +263,12 @@ class _Hand:
                 f'group "{command.name}" is declared already, as {known.by_name[command.name]}; '
                 "change it with ChangeGroup, or choose another name"
             )
-        threads = (0 if command.name == "loop" else 1) if command.threads is None else command.threads
-        self._declare(group_spec(command.name, threads, command.policy, command.seed))
+        given = msgspec.structs.asdict(command)
+        self._declare(group_spec(**given))
 
     def _changegroup(self, command: c.ChangeGroup) -> None:
         said = msgspec.structs.asdict(self._group(command.name))
-        given = {name: getattr(command, name) for name in ("threads", "policy", "seed")}
+        given = {name: getattr(command, name) for name in ("threads", "policy", "seed", "process", "host")}
         self._declare(group_spec(**said | {name: value for name, value in given.items() if value is not msgspec.UNSET}))
 
     def _declare(self, spec: GroupSpec) -> None:

@@ -74,7 +74,7 @@ class _Telling:
         """Tell all."""
         for spec in self.root.whole.groups.by_name.values():
             if spec != self.made.whole.groups.by_name.get(spec.name):
-                self.say(c.AddGroup(spec.name, spec.threads, spec.policy, spec.seed))
+                self.say(c.AddGroup(**msgspec.structs.asdict(spec)))
         for name, port in self.root.ports.inputs.items():
             self.say(c.AddInput(name, _text(port.type, f'input "{name}" of the graph')))
         for name, out in self.root.ports.outputs.items():

@@ -19,12 +19,16 @@ from hfg.problem import Problem
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph
 
-__all__ = ["ROOT", "End", "EndKind", "FlatEdge", "FlatGate", "FlatGraph", "FlatNode", "Scope", "scope_end"]
+__all__ = ["LINK", "ROOT", "End", "EndKind", "FlatEdge", "FlatGate", "FlatGraph", "FlatNode", "Scope", "scope_end"]
 
 EndKind: TypeAlias = Literal["input", "output", "event", "slot", "parameter", "observable"]
 
 ROOT: Final = -1
 """`End.node` of the graph's own ports."""
+
+
+LINK: Final = -(2**62)
+"""`End.node` of a link to another part, in a graph that is cut: tokens leave by its inputs."""
 
 
 def scope_end(scope: int) -> int:
@@ -69,8 +73,8 @@ class End(msgspec.Struct, frozen=True, eq=False, gc=False):
     """One end of an edge.
 
     Attributes:
-      node: index of the node; `ROOT` for the graph's own ports, among which an input of the graph is an "output" and an
-        output an "input";
+      node: index of the node; `LINK` where the edge goes on in another part (see `cutting`); `ROOT` for the graph's own
+        ports, among which an input of the graph is an "output" and an output an "input";
         `scope_end(k)` for the automatic ports of scope k.
       port: the bound port; for an observable itself.
     """

@@ -14,7 +14,15 @@ from hfg.nodetype import Node
 __all__ = ["declare_group", "move"]
 
 
-def declare_group(level: Level, name: str, threads: int | None, policy: Policy, seed: int | None) -> GroupSpec:
+def declare_group(
+    level: Level,
+    name: str,
+    threads: int | None,
+    policy: Policy,
+    seed: int | None,
+    process: bool = False,
+    host: str | None = None,
+) -> GroupSpec:
     """Declare a group of the whole graph.
 
     Raises:
@@ -24,7 +32,7 @@ def declare_group(level: Level, name: str, threads: int | None, policy: Policy, 
     groups = level.whole.groups
     declared: GroupSpec | None = None
     with Refusable(name):
-        declared = group_spec(name, (0 if name == "loop" else 1) if threads is None else threads, policy, seed)
+        declared = group_spec(name, threads, policy, seed, process, host)
         groups.declare(declared)
     # One that is refused while refusals are kept is there nevertheless, so that nodes in it are not refused as well.
     return declared if declared is not None else groups.by_name.setdefault(str(name), GroupSpec(str(name)))

@@ -125,12 +125,16 @@ class GroupSpec(msgspec.Struct, frozen=True):
       threads: 0 is the event loop, 1 a thread of the group's own; with n of them n of its nodes run at once.
       policy: who runs next when several can.
       seed: for "random"; None is the run's.
+      process: its nodes run in a process of its own, on the loop or the threads there.
+      host: of that process; "" is the one where the graph is run.
     """
 
     name: str
     threads: int = 0
     policy: Policy = "fifo"
     seed: int | None = None
+    process: bool = False
+    host: str = ""
 
 
 _PAUSES: Final = {
@@ -249,8 +253,18 @@ def _listed(where: Callable[[], str], name: str, given: object, example: str) ->
     return tuple(given)
 
 
-def group_spec(name: str, threads: int, policy: str, seed: int | None) -> GroupSpec:
+def group_spec(
+    name: str, threads: int | None, policy: str, seed: int | None, process: bool = False, host: str | None = None
+) -> GroupSpec:
     """Check a group.
+
+    Args:
+      name: of the group.
+      threads: None is one, but none for "loop" and for a group with a process of its own.
+      policy: who runs next.
+      seed: for "random".
+      process: whether it has a process of its own.
+      host: where that is; whoever names one asks for a process.
 
     Raises:
       GraphError: a value is out of its range.
@@ -258,6 +272,14 @@ def group_spec(name: str, threads: int, policy: str, seed: int | None) -> GroupS
     if type(name) is not str or not name:
         raise GraphError(f"a group needs a name, got {name!r}")
     at = f'group "{name}"'
+    host = "" if host is None else host
+    if type(process) is not bool:
+        raise GraphError(f"{at}: process must be True or False, got {process!r}; host= names another host than this")
+    if type(host) is not str or "/" in host:
+        raise GraphError(f'{at}: host must be the name of an agent, as in host="arm", got {host!r}')
+    process = process or bool(host)
+    if threads is None:
+        threads = 0 if process or name == "loop" else 1
     if type(threads) is not int or threads < 0:
         raise GraphError(
             f"{at}: threads must be 0 (on the loop), 1 (a thread of its own) or the number of its threads, "
@@ -267,10 +289,14 @@ def group_spec(name: str, threads: int, policy: str, seed: int | None) -> GroupS
         raise GraphError(
             f'{at}: it is the event loop itself and takes no thread; declare another, graph.group("work", threads=1)'
         )
+    if name == "loop" and process:
+        raise GraphError(
+            f'{at}: it is the event loop of the program itself; declare another, graph.group("vision", process=True)'
+        )
     _need_choice(at, "policy", policy, POLICY, GraphError)
     if seed is not None:
         _need_whole(at, "seed", seed, None, GraphError)
-    return GroupSpec(name, threads, policy, seed)  # type: ignore[arg-type]  # checked above
+    return GroupSpec(name, threads, policy, seed, process, host)  # type: ignore[arg-type]  # checked above
 
 
 def _is_number(value: object) -> TypeGuard[int | float]:

@@ -1,0 +1,158 @@
+"""When a graph in parts is quiet, and what follows from that (rules F8, P9, F13, R5).
+
+What a run does when nothing moves any more, it does when nothing moves *anywhere*, and all of it at one moment. So the
+parts say when they rest and what they have sent, received and taken until then; whoever runs the whole compares. Where
+all rest and nothing is on its way, he asks each part whether that still holds (Mattern's second wave), and then lets
+them go through the steps of rule R5 together. A part that has moved meanwhile breaks this off; it will rest again, and
+say so.
+
+A state machine: what it is told are method calls, what it wants done is what `ask` is called with, and the answers may
+come at any time and in any order. Knows no network and no engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, Final, Literal, TypeAlias
+
+import msgspec
+
+__all__ = ["Agreement", "Answer", "Question", "Rest", "Step"]
+
+Step: TypeAlias = Literal["rests", "fullest", "grow", "held", "give_up", "complete", "end", "stuck", "finish"]
+
+_STEPS: Final[tuple[Step, ...]] = ("rests", "fullest", "held", "give_up", "complete", "end", "stuck")
+"""What is asked of all parts, in this order (SEMANTICS "quiet"); `grow` and `finish` are asked for by the answers."""
+
+
+class Rest(msgspec.Struct, frozen=True):
+    """A part rests.
+
+    Attributes:
+      part: its name.
+      number: how often it has rested; from 1.
+      sent: by label of edges that leave it: how many tokens have left.
+      freed: of those, how many it knows to be taken.
+      received: by label of edges that come in: how many tokens have come.
+      taken: of those, how many were taken.
+    """
+
+    part: str
+    number: int
+    sent: dict[str, int]
+    freed: dict[str, int]
+    received: dict[str, int]
+    taken: dict[str, int]
+
+
+class Question(msgspec.Struct, frozen=True):
+    """What a part is to do or say, if it still rests.
+
+    Attributes:
+      step: see `Step`.
+      rest: the number of the rest that is meant.
+      value: for `grow` the label of the edge; for `finish` the reasons why the run has stalled.
+    """
+
+    step: Step
+    rest: int
+    value: Any = None
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """What a part has answered.
+
+    Attributes:
+      part: its name.
+      step: of the question.
+      rest: of the question.
+      moved: the part does not rest any more, or not since then; nothing was done.
+      value: `fullest`: (capacity, number, label) of a queue, or None. `held`: whether somebody outside may still bring
+        or take something. `give_up`, `complete`, `end`: whether that made something move. `stuck`: reasons.
+    """
+
+    part: str
+    step: Step
+    rest: int
+    moved: bool = False
+    value: Any = None
+
+
+class Agreement:
+    """Sees to it that what follows from quiet happens when the whole is quiet."""
+
+    def __init__(self, parts: Iterable[str], ask: Callable[[str, Question], None]) -> None:
+        """Begin with parts that have not rested yet.
+
+        Args:
+          parts: their names.
+          ask: brings a question to a part; its answer is to be given to `hear`.
+        """
+        self._rests: dict[str, Rest | None] = dict.fromkeys(parts)
+        self._ask = ask
+        self._step: Step | None = None
+        self._round: dict[str, int] = {}  # the rest of each part that is meant
+        self._answers: dict[str, Any] = {}
+
+    def rest(self, rest: Rest) -> None:
+        """A part rests; what it said before holds no more."""
+        self._rests[rest.part] = rest
+        self._step = None
+        if self._balanced():
+            self._begin("rests")
+
+    def leave(self, part: str) -> None:
+        """A part is gone, or begins anew: what it said does not count."""
+        self._rests[part] = None
+        self._step = None
+
+    def hear(self, answer: Answer) -> None:
+        """A part has answered."""
+        if self._step is None or answer.step != self._step or self._round.get(answer.part) != answer.rest:
+            return  # to a question of which nothing comes any more
+        if answer.moved:
+            self._step = None  # it will rest again
+            return
+        self._answers[answer.part] = answer.value
+        if len(self._answers) == len(self._round):
+            self._decide(self._step, self._answers)
+
+    def _begin(self, step: Step, value: Any = None) -> None:
+        self._step = step
+        self._answers = {}
+        self._round = {part: rest.number for part, rest in self._rests.items() if rest is not None}
+        for part, number in list(self._round.items()):
+            if self._step != step:
+                return  # an answer that came at once has ended it
+            self._ask(part, Question(step, number, value))
+
+    def _decide(self, step: Step, answers: dict[str, Any]) -> None:
+        if step == "fullest":
+            full = [(tuple(found), part) for part, found in answers.items() if found is not None]
+            if full:
+                (_, _, label), part = min(full)
+                self._step = None
+                self._ask(part, Question("grow", self._round[part], label))
+                return
+        elif step == "stuck":
+            self._begin("finish", [reason for reasons in answers.values() for reason in reasons])
+            return
+        elif step == "finish":
+            self._step = None
+            return
+        elif step != "rests" and any(answers.values()):
+            self._step = None  # it goes on, or is held open by somebody outside
+            return
+        self._begin(_STEPS[_STEPS.index(step) + 1])
+
+    def _balanced(self) -> bool:
+        """Whether all rest, and nothing is on its way between them, not even that something was taken."""
+        rests = list(self._rests.values())
+        sent: dict[str, tuple[int, int]] = {}
+        received: dict[str, tuple[int, int]] = {}
+        for rest in rests:
+            if rest is None:
+                return False
+            sent |= {label: (count, rest.freed[label]) for label, count in rest.sent.items()}
+            received |= {label: (count, rest.taken[label]) for label, count in rest.received.items()}
+        return sent == received

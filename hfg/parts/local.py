@@ -1,0 +1,121 @@
+"""All parts of a graph on one event loop: what a cut means, without processes (rules L1, F7).
+
+Each part has a graph of its own, as each process would, so that nothing is shared by mistake. Tokens go from part to
+part at the next pass of the loop. It stands beside the run over real links as the plain statement of what that does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from hfg.engine.face import outside
+from hfg.engine.observing.report import Report
+from hfg.engine.runtime.settings import Settings
+from hfg.errors import CheckFailed, HfgError
+from hfg.graph import Graph
+from hfg.graph.flat import MAIN, CutEdge, Cutting, cut, flatten
+from hfg.parts.agreement import Agreement, Question
+from hfg.parts.part import Part
+from hfg.token import Token
+
+__all__ = ["LocalParts"]
+
+
+class LocalParts:
+    """A graph in parts, run to its end on one event loop.
+
+    Attributes:
+      parts: by name, the main part first.
+    """
+
+    def __init__(self, build: Callable[[], Graph], make_settings: Callable[[str], Settings]) -> None:
+        """Cut the graph; nothing is set up yet.
+
+        Args:
+          build: makes the graph; called once for each part.
+          make_settings: gives how a part is to be run.
+
+        Raises:
+          CheckFailed: it cannot be cut so.
+        """
+        self._loop = asyncio.get_running_loop()
+        self.cutting = cut(flatten(build()))
+        if self.cutting.findings:
+            raise CheckFailed(self.cutting.findings)
+        self.parts: dict[str, Part] = {}
+        self._agreement = Agreement(self.cutting.parts, self._ask)
+        self._ended: tuple[str, HfgError | None] | None = None
+        for name in self.cutting.parts:
+            again: Cutting = cut(flatten(build()))
+            edges = list(again.edges_of(name))
+            part = self.parts[name] = Part(name, again.parts[name], make_settings(name), edges, rests=self._rest)
+            part.engine.callbacks.finished.append(lambda part=part: self._part_ended(part))
+        for edge in self.cutting.edges:
+            self._link(edge)
+
+    def _link(self, edge: CutEdge) -> None:
+        source, target = self.parts[edge.source], self.parts[edge.target]
+        link = _Link(self._loop, edge, source, target)
+        source.connect({edge.label: link}, {})
+        target.connect({}, {edge.label: link})
+
+    def _rest(self, rest: Any) -> None:
+        self._loop.call_soon(self._agreement.rest, rest)
+
+    def _ask(self, part: str, question: Question) -> None:
+        self._loop.call_soon(lambda: self._agreement.hear(self.parts[part].answer(question)))
+
+    def _part_ended(self, part: Part) -> None:
+        """One has ended: all do, with its outcome."""
+        if self._ended is None:
+            self._ended = part.engine.ended_how
+            for other in self.parts.values():
+                if other is not part:
+                    self._loop.call_soon(other.finish, part.engine.outcome, None)
+
+    async def run(self) -> dict[str, Report]:
+        """Run it to its end; gives the report of each part.
+
+        Raises:
+          HfgError: the run has failed.
+        """
+        main = self.parts[MAIN].composition
+        for worker in main.engine.core.readers:
+            outside.collect(main.engine, worker, main.outputs.setdefault(worker.port_name, []))
+        try:
+            for part in self.parts.values():
+                await part.composition.lifetime.start()
+            for part in self.parts.values():
+                await part.engine.ending.wait()
+        finally:
+            for part in self.parts.values():
+                await part.composition.lifetime.close()
+        for part in self.parts.values():
+            part.composition.raise_failure()
+        return {name: part.composition.report() for name, part in self.parts.items()}
+
+
+class _Link:
+    """A link that loses nothing, for its two ends are on one loop."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, edge: CutEdge, source: Part, target: Part) -> None:
+        self._loop = loop
+        self._edge = edge
+        self._source = source
+        self._target = target
+
+    def room(self) -> int:
+        """See `Outgoing`."""
+        return 2**31
+
+    def send(self, tokens: list[Token[Any]]) -> None:
+        """See `Outgoing`."""
+        bare = [(token.value, token.activity, token.stamp) for token in tokens]
+        self._loop.call_soon(self._target.receive, self._edge.label, bare)
+
+    def taken(self, count: int) -> None:
+        """See `Incoming`."""
+        if self._edge.guarantee == "exact":
+            self._loop.call_soon(self._source.taken, self._edge.label, count)

@@ -1,0 +1,212 @@
+"""One part of a graph that is cut: an engine, and the tokens that leave it and come in (rules L1, L3, R5).
+
+A part is a run like any other, but for its ends: what lies before an `Outlet` goes into a link, what comes out of one
+goes into an `Inlet`, and what it does when nothing moves is for the whole to say. It knows neither transports nor
+processes. Stands on the engine and `agreement`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from hfg.engine.face.composition import Composition
+from hfg.engine.rules import quiet
+from hfg.engine.runtime.borders import Inlet, Outlet
+from hfg.engine.runtime.engine import Engine
+from hfg.engine.runtime.settings import Settings
+from hfg.errors import EngineInternalError, HfgError
+from hfg.graph.flat import CutEdge, FlatGraph
+from hfg.parts.agreement import Answer, Question, Rest
+from hfg.ports.edges import EventEdge
+from hfg.token import Token
+
+__all__ = ["Incoming", "Outgoing", "Part"]
+
+
+class Outgoing(Protocol):
+    """The link behind an edge that leaves the part."""
+
+    def room(self) -> int:
+        """How many tokens it would take now."""
+
+    def send(self, tokens: list[Token[Any]]) -> None:
+        """Take tokens, oldest first, no more than there is room for."""
+
+
+class Incoming(Protocol):
+    """The link before an edge that comes into it."""
+
+    def taken(self, count: int) -> None:
+        """So many more tokens were taken, and what came of them in this part is done."""
+
+
+class Part:
+    """One part of a run.
+
+    Attributes:
+      name: of its group.
+      composition: its engine, and what stands on that.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        flat: FlatGraph,
+        settings: Settings,
+        edges: list[CutEdge],
+        *,
+        rests: Callable[[Rest], None],
+    ) -> None:
+        """Make it; nothing is set up yet.
+
+        Args:
+          name: of its group.
+          flat: what is in it.
+          settings: of the run.
+          edges: those between it and other parts.
+          rests: told when nothing moves in it any more.
+        """
+        self.name = name
+        self.composition = Composition(flat, settings)
+        self._rests = rests
+        self._numbered = 0
+        self._is_at_rest = False
+        engine = self.engine
+        keeps = {edge.label: edge.guarantee == "exact" for edge in edges}
+        self.outlets: dict[str, Outlet] = {
+            worker.port_name: Outlet(engine, worker, keeps=keeps[worker.port_name], wake=self._wake)
+            for worker in engine.core.outlets
+        }
+        self.inlets: dict[str, Inlet] = {
+            worker.port_name: Inlet(engine, worker, self._moved) for worker in engine.core.inlets
+        }
+        self._outgoing: dict[str, Outgoing] = {}
+        self._incoming: dict[str, Incoming] = {}
+        self._leaving = False
+        engine.agreement = self._nothing_moves
+        engine.callbacks.pumped.append(self._pumped)
+
+    @property
+    def engine(self) -> Engine:
+        """What runs it."""
+        return self.composition.engine
+
+    def connect(self, outgoing: Mapping[str, Outgoing], incoming: Mapping[str, Incoming]) -> None:
+        """Give the links at its ends, by label of the edge."""
+        self._outgoing.update(outgoing)
+        self._incoming.update(incoming)
+
+    # --- tokens -----------------------------------------------------------------------------------------------------
+
+    def receive(self, label: str, tokens: list[tuple[Any, int, float]]) -> None:
+        """Tokens have come over a link: value, modifier and stamp of each."""
+        inlet = self.inlets[label]
+        for value, activity, stamp in tokens:
+            inlet.arrive(value, activity, stamp)
+        self._is_at_rest = False
+        inlet.lay()
+        self.engine.kick()
+
+    def taken(self, label: str, count: int) -> None:
+        """So many more tokens that have left were taken."""
+        self._is_at_rest = False
+        self.outlets[label].be_taken(count)
+        self.send()
+
+    def room(self, label: str) -> None:
+        """A link takes tokens again."""
+        self._wake()
+
+    def send(self) -> None:
+        """Let go what is to leave."""
+        for label, outlet in self.outlets.items():
+            if outlet.has_more:
+                link = self._outgoing[label]
+                tokens = outlet.leave(link.room())
+                if tokens:
+                    link.send(tokens)
+
+    def _moved(self, inlet: Inlet, count: int) -> None:
+        self._incoming[inlet.label].taken(count)
+
+    def _wake(self) -> None:
+        """Something lies before an outlet: it leaves when the engine is done with what it does now."""
+        if not self._leaving:
+            self._leaving = True
+            self.engine.soon(self._leave)
+
+    def _leave(self) -> None:
+        self._leaving = False
+        if not self.engine.core.over:
+            self.send()
+
+    def _pumped(self) -> None:
+        """A slice is over: what has gathered meanwhile leaves together."""
+        self._is_at_rest = False
+        for inlet in self.inlets.values():
+            inlet.lay()
+        self.send()
+
+    # --- quiet ------------------------------------------------------------------------------------------------------
+
+    def _nothing_moves(self) -> None:
+        if self._is_at_rest or any(outlet.has_more for outlet in self.outlets.values()):
+            return
+        self._is_at_rest = True
+        self._numbered += 1
+        self._rests(
+            Rest(
+                self.name,
+                self._numbered,
+                {label: outlet.sent for label, outlet in self.outlets.items()},
+                {label: outlet.taken for label, outlet in self.outlets.items()},
+                {label: inlet.received for label, inlet in self.inlets.items()},
+                {label: inlet.taken for label, inlet in self.inlets.items()},
+            )
+        )
+
+    def answer(self, question: Question) -> Answer:
+        """Do what follows from quiet, if the part still rests."""
+        engine = self.engine
+        if not self._is_at_rest or question.rest != self._numbered or engine.core.over:
+            return Answer(self.name, question.step, question.rest, moved=True)
+        return Answer(self.name, question.step, question.rest, value=self._do(question))
+
+    def _do(self, question: Question) -> Any:
+        engine = self.engine
+        match question.step:
+            case "rests":
+                return None
+            case "fullest":
+                edge = quiet.smallest_full(engine.core)
+                return None if edge is None else (edge.capacity, edge.index, edge.label)
+            case "grow":
+                return self._grow(question.value)
+            case "held":
+                return engine.is_held_open()
+            case "give_up":
+                return engine.give_up()
+            case "complete":
+                return engine.complete_operators() or engine.core.timers > 0
+            case "end":
+                return engine.end_events()
+            case "stuck":
+                return quiet.stuck(engine.core)
+            case "finish":
+                return self._finish(question.value)
+
+    def _grow(self, label: str) -> None:
+        for edge in self.engine.core.edges:
+            if edge.label == label and isinstance(edge, EventEdge):
+                quiet.grow_queue(self.engine.core, edge)
+                return
+        raise EngineInternalError(f'queue "{label}" is to grow and is not full')
+
+    def _finish(self, reasons: list[str]) -> None:
+        stalled = quiet.stalled(reasons) if reasons else None
+        self.finish("done" if stalled is None else "stalled", stalled)
+
+    def finish(self, outcome: str, error: HfgError | None) -> None:
+        """End the run of this part."""
+        self.engine.finish(outcome, error)
