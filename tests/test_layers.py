@@ -50,6 +50,7 @@ FLOORS = {
     "hfg.nodes": 6,
     "hfg.files": 6,
     "hfg.recording": 6,
+    "hfg.parts": 6,
     "hfg.catalogue": 6,
     "hfg.cli": 7,
     "hfg.studio": 7,

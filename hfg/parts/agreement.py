@@ -25,24 +25,25 @@ _STEPS: Final[tuple[Step, ...]] = ("rests", "fullest", "held", "give_up", "compl
 """What is asked of all parts, in this order (SEMANTICS "quiet"); `grow` and `finish` are asked for by the answers."""
 
 
+Account: TypeAlias = tuple[int, int, str, bool]
+"""What one side knows of an edge: how many tokens have left or come, how many of them were taken, whether the consumer
+takes, drains or is sent none, and whether the producer is enabled."""
+
+
 class Rest(msgspec.Struct, frozen=True):
     """A part rests.
 
     Attributes:
       part: its name.
       number: how often it has rested; from 1.
-      sent: by label of edges that leave it: how many tokens have left.
-      freed: of those, how many it knows to be taken.
-      received: by label of edges that come in: how many tokens have come.
-      taken: of those, how many were taken.
+      leaving: what it knows of edges that leave it, by label.
+      coming: what it knows of edges that come in. Where nothing is on its way the two sides know the same.
     """
 
     part: str
     number: int
-    sent: dict[str, int]
-    freed: dict[str, int]
-    received: dict[str, int]
-    taken: dict[str, int]
+    leaving: dict[str, Account]
+    coming: dict[str, Account]
 
 
 class Question(msgspec.Struct, frozen=True):
@@ -147,12 +148,11 @@ class Agreement:
 
     def _balanced(self) -> bool:
         """Whether all rest, and nothing is on its way between them, not even that something was taken."""
-        rests = list(self._rests.values())
-        sent: dict[str, tuple[int, int]] = {}
-        received: dict[str, tuple[int, int]] = {}
-        for rest in rests:
+        leaving: dict[str, Account] = {}
+        coming: dict[str, Account] = {}
+        for rest in self._rests.values():
             if rest is None:
                 return False
-            sent |= {label: (count, rest.freed[label]) for label, count in rest.sent.items()}
-            received |= {label: (count, rest.taken[label]) for label, count in rest.received.items()}
-        return sent == received
+            leaving |= rest.leaving
+            coming |= rest.coming
+        return leaving == coming

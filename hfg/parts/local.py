@@ -12,6 +12,7 @@ from typing import Any
 
 from hfg.engine.face import outside
 from hfg.engine.observing.report import Report
+from hfg.engine.runtime.borders import Hearing
 from hfg.engine.runtime.settings import Settings
 from hfg.errors import CheckFailed, HfgError
 from hfg.graph import Graph
@@ -115,7 +116,15 @@ class _Link:
         bare = [(token.value, token.activity, token.stamp) for token in tokens]
         self._loop.call_soon(self._target.receive, self._edge.label, bare)
 
+    def speaks(self, speaking: bool) -> None:
+        """See `Outgoing`."""
+        self._loop.call_soon(self._target.speak, self._edge.label, speaking)
+
+    def hears(self, hearing: Hearing) -> None:
+        """See `Incoming`."""
+        self._loop.call_soon(self._source.hear, self._edge.label, hearing)
+
     def taken(self, count: int) -> None:
         """See `Incoming`."""
         if self._edge.guarantee == "exact":
-            self._loop.call_soon(self._source.taken, self._edge.label, count)
+            self._loop.call_soon(self._source.be_taken, self._edge.label, count)

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from hfg.engine.face.composition import Composition
 from hfg.engine.rules import quiet
-from hfg.engine.runtime.borders import Inlet, Outlet
+from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.settings import Settings
 from hfg.errors import EngineInternalError, HfgError
@@ -33,12 +33,18 @@ class Outgoing(Protocol):
     def send(self, tokens: list[Token[Any]]) -> None:
         """Take tokens, oldest first, no more than there is room for."""
 
+    def speaks(self, speaking: bool) -> None:
+        """Say, behind what was sent, whether the producer is enabled from now on."""
+
 
 class Incoming(Protocol):
     """The link before an edge that comes into it."""
 
     def taken(self, count: int) -> None:
         """So many more tokens were taken, and what came of them in this part is done."""
+
+    def hears(self, hearing: Hearing) -> None:
+        """What the consumer does with tokens from now on; what it has taken until then was told before."""
 
 
 class Part:
@@ -83,6 +89,8 @@ class Part:
         }
         self._outgoing: dict[str, Outgoing] = {}
         self._incoming: dict[str, Incoming] = {}
+        self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
+        self._speaking = dict.fromkeys(self.outlets, True)
         self._leaving = False
         engine.agreement = self._nothing_moves
         engine.callbacks.pumped.append(self._pumped)
@@ -108,10 +116,22 @@ class Part:
         inlet.lay()
         self.engine.kick()
 
-    def taken(self, label: str, count: int) -> None:
+    def be_taken(self, label: str, count: int) -> None:
         """So many more tokens that have left were taken."""
         self._is_at_rest = False
         self.outlets[label].be_taken(count)
+        self.send()
+
+    def speak(self, label: str, speaking: bool) -> None:
+        """The producer of an edge that comes in was disabled or enabled."""
+        self._is_at_rest = False
+        self.inlets[label].speak(speaking)
+        self.inlets[label].lay()
+
+    def hear(self, label: str, hearing: Hearing) -> None:
+        """The consumer of an edge that leaves does otherwise with tokens from now on."""
+        self._is_at_rest = False
+        self.outlets[label].hear(hearing)
         self.send()
 
     def room(self, label: str) -> None:
@@ -121,8 +141,11 @@ class Part:
     def send(self) -> None:
         """Let go what is to leave."""
         for label, outlet in self.outlets.items():
+            link = self._outgoing[label]
+            if outlet.speaking != self._speaking[label]:
+                self._speaking[label] = outlet.speaking
+                link.speaks(outlet.speaking)
             if outlet.has_more:
-                link = self._outgoing[label]
                 tokens = outlet.leave(link.room())
                 if tokens:
                     link.send(tokens)
@@ -144,7 +167,11 @@ class Part:
     def _pumped(self) -> None:
         """A slice is over: what has gathered meanwhile leaves together."""
         self._is_at_rest = False
-        for inlet in self.inlets.values():
+        for label, inlet in self.inlets.items():
+            hearing = inlet.hearing
+            if hearing != self._hearing[label]:
+                self._hearing[label] = hearing
+                self._incoming[label].hears(hearing)
             inlet.lay()
         self.send()
 
@@ -159,10 +186,8 @@ class Part:
             Rest(
                 self.name,
                 self._numbered,
-                {label: outlet.sent for label, outlet in self.outlets.items()},
-                {label: outlet.taken for label, outlet in self.outlets.items()},
-                {label: inlet.received for label, inlet in self.inlets.items()},
-                {label: inlet.taken for label, inlet in self.inlets.items()},
+                {label: (one.sent, one.taken, one.hearing, one.speaking) for label, one in self.outlets.items()},
+                {label: (one.received, one.taken, one.hearing, one.speaking) for label, one in self.inlets.items()},
             )
         )
 

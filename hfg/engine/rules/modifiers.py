@@ -118,6 +118,8 @@ def count_dropped(edge: Edge, token: Token[Any], reason: DropReason) -> None:
 def give_back(edge: Edge) -> None:
     """A8: activity is never lost unseen: the sender has it again, or its loss is counted."""
     sender: Worker = edge.source
+    if sender in edge.target.core.inlets:
+        return  # the sender is in another part, where the token lies as well and goes back from (L1)
     if sender.node is None or sender.scope is not None or sender.blocked & REMOVED:
         lose(edge)
     else:

@@ -144,6 +144,8 @@ def end_events(core: Core) -> bool:
         for edge in core.edges
         if type(edge) is EventEdge
         and edge.target_kind == "input"
+        and (edge.target_port is None or edge.target_port.kind == "input")  # not that of a slot in another part (L1)
+        and edge.source not in core.inlets  # who gets it from where the edge begins
         and edge.target.within is None
         and edge.live
         and not edge.end_sent

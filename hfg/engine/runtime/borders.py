@@ -11,16 +11,23 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from itertools import islice
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
-from hfg.engine.model.worker import ENDED, Worker
+from hfg.engine.model.worker import DISABLED, ENDED, Worker
+from hfg.engine.rules.ending import drain_left
+from hfg.engine.rules.lifecycle import disable_around, enable_around
+from hfg.engine.rules.quiet import node_ended
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import enqueue, put_outputs
+from hfg.engine.rules.wiring import reaches
 from hfg.engine.runtime.engine import Engine
 from hfg.ports.edges import EventEdge, SyncEdge
 from hfg.token import Token
 
-__all__ = ["Inlet", "Outlet"]
+__all__ = ["Hearing", "Inlet", "Outlet"]
+
+Hearing: TypeAlias = Literal["open", "over", "deaf"]
+"""What the consumer of an edge does with tokens: takes them; drains them, having ended (F12); is sent none (F10)."""
 
 
 class Outlet:
@@ -30,6 +37,7 @@ class Outlet:
       label: of the edge.
       sent: how many tokens have left.
       taken: how many of them count as taken by the consumer.
+      hearing: what that does with them, as far as is known here.
     """
 
     def __init__(self, engine: Engine, worker: Worker, *, keeps: bool, wake: Callable[[], None]) -> None:
@@ -46,6 +54,7 @@ class Outlet:
         self._keeps = keeps
         (self._edge,) = worker.in_edges
         self._waiting = 0  # tokens that have left and still lie here
+        self.hearing: Hearing = "open"
         self.label: str = worker.port_name
         self.sent = 0
         self.taken = 0
@@ -74,16 +83,43 @@ class Outlet:
         return tokens
 
     @property
+    def speaking(self) -> bool:
+        """Whether the producer is enabled: what waits for one that is not waits for nobody (F10)."""
+        return not self._edge.source.blocked & DISABLED
+
+    @property
     def has_more(self) -> bool:
         """Whether something lies here that has not left."""
         return bool(self._edge.untaken > self._waiting)
 
     def be_taken(self, count: int) -> None:
         """So many more were taken by the consumer: their places are free (F5, F8)."""
+        self.taken += count
+        self._waiting = min(self._waiting, self._edge.untaken)  # what a disabled producer took back is gone (F10)
         for _ in range(min(count, self._waiting)):
             self._waiting -= 1
-            self.taken += 1
             take_from_reader(self._worker)
+        self._engine.kick()
+
+    def hear(self, hearing: Hearing) -> None:
+        """The consumer hears otherwise from now on: what lies here for it is treated as it would be there."""
+        before, self.hearing = self.hearing, hearing
+        worker = self._worker
+        if before == "deaf":
+            enable_around(worker)
+        elif before == "over":
+            worker.allow(ENDED)
+            worker.not_ended()
+            enable_around(worker)
+        if hearing == "deaf":
+            self._waiting = 0
+            disable_around([worker])
+        elif hearing == "over":
+            self._waiting = 0
+            worker.end()
+            drain_left(worker.in_edges)
+            worker.take_deferred()
+            node_ended(worker)
         self._engine.kick()
 
 
@@ -94,6 +130,7 @@ class Inlet:
       label: of the edge.
       received: how many tokens have come.
       taken: how many of them their consumer has taken.
+      speaking: whether their producer is enabled, as far as is known here.
     """
 
     def __init__(self, engine: Engine, worker: Worker, moved: Callable[[Inlet, int], None]) -> None:
@@ -110,6 +147,8 @@ class Inlet:
         self._moved = moved
         self._inbox: deque[tuple[Any, int, float]] = deque()
         self._waits = False
+        self._joins = self._edge.joins()
+        self.speaking = True
         self.label: str = worker.port_name
         self.received = 0
         self.taken = 0
@@ -119,10 +158,25 @@ class Inlet:
         self.received += 1
         self._inbox.append((value, activity, stamp))
 
+    def speak(self, speaking: bool) -> None:
+        """The producer was disabled or enabled; what came before counts for signals alone (F10)."""
+        self.speaking = speaking
+        if speaking:
+            enable_around(self._worker)
+        else:
+            disable_around([self._worker])
+            if type(self._edge) is not EventEdge:
+                self._inbox.clear()
+        self._engine.kick()
+
     def lay(self) -> None:
         """Lay what has come on the edge, as far as there is room; say what was taken since the last time."""
         if self._engine.core.over:
             return
+        if not reaches(self._edge):
+            while self._inbox:  # what lies where it comes from goes back from there (A8)
+                self._inbox.popleft()
+                self._edge.count_dropped()
         if type(self._edge) is EventEdge:
             self._lay_signals(self._edge)
         else:
@@ -162,6 +216,9 @@ class Inlet:
             self._moved(self, more)
 
     @property
-    def is_over(self) -> bool:
-        """Whether its consumer takes nothing any more, so that nobody need send (F12)."""
-        return bool(self._edge.target.blocked & ENDED)
+    def hearing(self) -> Hearing:
+        """What its consumer does with tokens; those that carry activity are for it even if it has ended (F12)."""
+        if not reaches(self._edge):
+            return "deaf"
+        over = self._joins and not self._edge.active and self._edge.target.blocked & ENDED
+        return "over" if over else "open"
