@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from hfg.engine.face import outside
@@ -52,7 +53,7 @@ class LocalParts:
             again: Cutting = cut(flatten(build()))
             edges = list(again.edges_of(name))
             part = self.parts[name] = Part(name, again.parts[name], make_settings(name), edges, rests=self._rest)
-            part.engine.callbacks.finished.append(lambda part=part: self._part_ended(part))
+            part.engine.callbacks.finished.append(partial(self._part_ended, part))
         for edge in self.cutting.edges:
             self._link(edge)
 

@@ -69,7 +69,7 @@ class Outlet:
         """Give the tokens that have come since the last time, oldest first, at most so many; they are on their way."""
         worker, edge = self._worker, self._edge
         if not self._keeps:
-            tokens = []
+            tokens: list[Token[Any]] = []
             while edge.untaken and len(tokens) < most:
                 tokens.append(take_from_reader(worker))
             self.taken += len(tokens)
