@@ -197,7 +197,7 @@ def test_a_run_that_fails_keeps_the_pictures_before(tmp_path: Path) -> None:
     ("path", "codec", "sentence"),
     [
         ("", "MJPG", "no video is named"),
-        ("nowhere/out.avi", "MJPG", 'for the video "nowhere/out.avi": make it, or mend path'),
+        ("/dev/null/out.avi", "MJPG", 'cannot write "/dev/null/out.avi": a part of the path is a file, no directory'),
         ("out.txt", "MJPG", 'OpenCV does not write "out.txt" with the codec MJPG'),
     ],
 )
@@ -208,6 +208,12 @@ def test_a_video_that_cannot_be_written_is_one_sentence(
     with pytest.raises(Exception, match=sentence):
         recorded(video.WriteVideo(path=path, codec=codec), [frame(0)])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_folders_that_are_missing_are_made(tmp_path: Path) -> None:
+    path = tmp_path / "a" / "b" / "out.avi"
+    recorded(video.WriteVideo(path=str(path)), [frame(0)])
+    assert read(path)[0] == 1
 
 
 # --- pictures ---

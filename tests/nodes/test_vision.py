@@ -214,3 +214,44 @@ def test_the_event_of_a_code_goes_its_own_way_in_a_graph() -> None:
     graph.connect(reader.read, graph.add(act()).ports.inputs["text"])
     hfg.run(graph, clock="virtual", debug=True)
     assert told == ["door 4"]
+
+
+def test_boxes_are_drawn_with_their_words_and_the_picture_stays_as_it_is() -> None:
+    image = np.full((60, 80), 100, np.uint8)
+    drawn = fire(vision.draw_boxes(thickness=1), image=image, boxes=[(10, 20, 30, 25)], labels=["ä 1"]).outputs["out"]
+    green = np.all(drawn == (0, 255, 0), axis=2)
+    assert green[20, 10:40].all()
+    assert green[44, 10:40].all()
+    assert green[20:45, 10].all()
+    assert green[20:45, 39].all()
+    assert not green[21:44, 11:39].any()
+    assert (drawn[:19] != 100).any()  # the words
+    assert (image == 100).all()
+
+
+def test_words_stay_within_the_picture_and_boxes_without_words_have_none() -> None:
+    image = np.zeros((60, 80, 3), np.uint8)
+    boxes = [(70, 0, 30, 25), (-5, 50, 30, 25)]
+    plain = fire(vision.draw_boxes(), image=image, boxes=boxes).outputs["out"]
+    named = fire(vision.draw_boxes(color=hfg.Colour(255, 0, 0)), image=image, boxes=boxes, labels=["door"]).outputs[
+        "out"
+    ]
+    assert plain[10, 71].tolist() == [0, 255, 0]
+    columns = np.argwhere(named[:12, :68, 2])[:, 1]
+    assert 20 < columns.min() < 50  # moved to the left, so that it can be read
+    assert fire(vision.draw_boxes(), image=image, boxes=[]).outputs["out"].any() is np.False_
+
+
+def test_a_box_that_is_too_far_away_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"within 32767 pixels, got \(40000, 0, 1, 1\)"):
+        fire(vision.draw_boxes(), image=np.zeros((9, 9), np.uint8), boxes=[(40000, 0, 1, 1)])
+
+
+def test_a_qr_code_is_read_however_it_is_turned() -> None:
+    code = fire(vision.qr_code(scale=6), text="https://example.org/article/4006381333931").outputs["out"]
+    side = 2 * code.shape[0]
+    for angle in range(0, 90, 10):
+        turn = cv2.getRotationMatrix2D((code.shape[1] / 2, code.shape[0] / 2), angle, 1)
+        turn[:, 2] += code.shape[0] / 2
+        seen = cv2.GaussianBlur(cv2.warpAffine(code, turn, (side, side), borderValue=255), (3, 3), 0)
+        assert len(fire(vision.BarcodeReader(kinds="qr"), image=seen).outputs["texts"]) == 1, angle

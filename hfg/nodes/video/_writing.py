@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from pathlib import Path
@@ -12,6 +13,7 @@ from annotated_types import Interval
 
 from hfg.images import Picture
 from hfg.nodes._pictures import colour, need_picture
+from hfg.nodes.files.access import reaching
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Parameter, State, slot
 
@@ -27,7 +29,7 @@ class WriteVideo(Node):
     `path` was changed.
 
     Attributes:
-      path: the file; its folder is there.
+      path: the file; directories that are missing are made.
       codec: how pictures are packed: "MJPG" and "XVID" for .avi, "mp4v" for .mp4.
       fps: pictures per second that players show.
       width: in pixels; pictures are scaled to it. 0 takes that of the first picture.
@@ -38,7 +40,8 @@ class WriteVideo(Node):
       written: the path of a video that is complete.
 
     Raises:
-      FileNotFoundError: there is no such folder.
+      FileNotFoundError: no video is named.
+      OSError: the file cannot be written; the sentence says why.
       ValueError: a picture has another size than the first, or OpenCV does not write such a file.
 
     CS::APEX: csapex::MakeVideo.
@@ -65,8 +68,11 @@ class WriteVideo(Node):
 
     def _folder(self) -> Path:
         folder = Path(self.path).absolute().parent
-        if not folder.is_dir():
-            raise FileNotFoundError(f'there is no folder "{folder}" for the video "{self.path}": make it, or mend path')
+        with reaching(self.path, "write"):
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except FileExistsError:  # as a file
+                raise NotADirectoryError(errno.ENOTDIR, "") from None
         return folder
 
     def process(self, image: Picture) -> None:

@@ -6,6 +6,7 @@ These are OpenCV's objects: each keeps a detector or a matcher that is costly to
     _keypoints     KeypointDetector, match_descriptors
     _depth         StereoDepth, CameraCalibration
     _improving     EqualizeLocally
+    _drawing       draw_boxes
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from hfg.nodes.vision._detecting import (  # noqa: E402
     PeopleDetector,
     qr_code,
 )
+from hfg.nodes.vision._drawing import draw_boxes  # noqa: E402
 from hfg.nodes.vision._improving import EqualizeLocally  # noqa: E402
 from hfg.nodes.vision._keypoints import KeypointDetector, match_descriptors  # noqa: E402
 
@@ -38,6 +40,7 @@ __all__ = [
     "MarkerDetector",
     "PeopleDetector",
     "StereoDepth",
+    "draw_boxes",
     "match_descriptors",
     "qr_code",
 ]
