@@ -12,6 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted(file for file in (ROOT / "examples").glob("*.py") if not file.name.startswith("_"))
+ON_PICTURES = sorted((ROOT / "examples" / "vision").glob("*.py"))  # tests/examples/test_vision.py runs them
 
 
 def hfg(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -28,13 +29,13 @@ def test_there_are_examples() -> None:
     assert EXAMPLES
 
 
-@pytest.mark.parametrize("file", EXAMPLES, ids=example_id)
+@pytest.mark.parametrize("file", [*EXAMPLES, *ON_PICTURES], ids=example_id)
 def test_example_says_what_it_shows(file: Path) -> None:
     docstring = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8")))
     assert docstring, f"{example_id(file)} begins with a docstring that says what it shows"
 
 
-@pytest.mark.parametrize("file", EXAMPLES, ids=example_id)
+@pytest.mark.parametrize("file", [*EXAMPLES, *ON_PICTURES], ids=example_id)
 def test_example_has_a_sound_graph(file: Path) -> None:
     checked = hfg("check", str(file), "--json")
     assert checked.returncode == 0, checked.stdout + checked.stderr
