@@ -278,8 +278,8 @@ class OutgoingLink(Protocol):
         Those are done or, if the link says so (edges into slots), accepted by all consumers.
         """
 
-    def send_nowait(self, token: EncodedToken, position: Position | None = None) -> Position:
-        """Take the next token.
+    def send_nowait(self, token: EncodedToken, position: Position | None = None) -> int:
+        """Take the next token and give its number in the stream.
 
         Args:
           token: what to send; its value is left as it is until it is done.
@@ -289,7 +289,7 @@ class OutgoingLink(Protocol):
           UsageError: the window is full; look at `free` first, or await `send`.
         """
 
-    async def send(self, token: EncodedToken, position: Position | None = None) -> Position:
+    async def send(self, token: EncodedToken, position: Position | None = None) -> int:
         """The same, but wait while the window is full."""
 
     def admit(self, consumer: str, incarnation: int | None = None, *, after: int | None = None) -> None:
@@ -307,8 +307,12 @@ class OutgoingLink(Protocol):
     def statistics(self) -> Mapping[str, int]:
         """What was sent, resent, acknowledged, refused and lost, in numbers."""
 
-    async def close(self) -> None:
-        """End it; what was not done is given up and counted."""
+    async def close(self, *, over: bool = False) -> None:
+        """End this life of it; what was not done is given up and counted.
+
+        Args:
+          over: there will be no other, so consumers are told to wait no longer.
+        """
 
 
 @runtime_checkable

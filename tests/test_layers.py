@@ -45,6 +45,7 @@ FLOORS = {
     "hfg.graph": 3,
     "hfg.activity": 4,
     "hfg.links": 4,
+    "hfg.links.running": 5,
     "hfg.timeline": 4,
     "hfg.engine": 5,
     "hfg.nodes": 6,
@@ -63,6 +64,7 @@ FIRST_FLOOR_THAT_WAITS = 5
 SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and what a node type is
 SAME_FLOOR_PAIRS = {
     ("hfg.cli", "hfg.studio"),
+    ("hfg.engine", "hfg.links.running"),
     ("hfg.__main__", "hfg.cli"),
     ("hfg.testing", "hfg"),
     ("hfg.nodes", "hfg.recording"),  # a family of it is made there

@@ -12,7 +12,17 @@ from collections import deque
 import msgspec
 
 from hfg.errors import MessageTooLarge, UsageError
-from hfg.links.frames import OtherVersion, Outgoing, Tokens, Unreadable, batches, read_from_producer, values_of, write
+from hfg.links.frames import (
+    LONGEST_METADATA,
+    OtherVersion,
+    Outgoing,
+    Tokens,
+    Unreadable,
+    batches,
+    read_from_producer,
+    values_of,
+    write,
+)
 from hfg.transport import Buffer, Delivery, EncodedToken, LinkOverflow, Position
 
 __all__ = ["BoundedConsumer", "BoundedConsumerCounts", "BoundedProducer", "BoundedProducerCounts"]
@@ -58,22 +68,24 @@ class BoundedProducer:
         """That of the last token that was sent."""
         return Position(self.epoch, self._next - 1)
 
-    def send(self, token: EncodedToken) -> Position:
-        """Take the next token; it leaves with the next `flush`.
+    def send(self, token: EncodedToken) -> int:
+        """Take the next token and give its number; it leaves with the next `flush`.
 
         Raises:
-          MessageTooLarge: the value is too large for the transport.
+          MessageTooLarge: the value is too large for the transport, or its metadata for a header.
         """
         metadata, value = token
         if type(value) is memoryview and (value.ndim != 1 or value.itemsize != 1):
-            token = (metadata, value.cast("B"))
-        if len(token[1]) + len(metadata) > self._largest_token:
+            value = value.cast("B")
+            token = (metadata, value)
+        if len(value) > self._largest_token or len(metadata) > LONGEST_METADATA:
             raise MessageTooLarge(
-                f"a token of {len(token[1])} bytes cannot be sent: the transport carries {self._largest_token} at once"
+                f"a token of {len(value)} bytes and {len(metadata)} of metadata cannot be sent: the transport carries "
+                f"{self._largest_token} and {LONGEST_METADATA} at once"
             )
         self._unsent.append(token)
         self._next += 1
-        return Position(self.epoch, self._next - 1)
+        return self._next - 1
 
     def flush(self) -> list[Outgoing]:
         """Give what is to be sent now."""

@@ -254,6 +254,7 @@ class ExactConsumer:
         if probe.epoch > self.epoch:
             self.epoch = probe.epoch
             self._seen = 0
+            self.closed = False
         self._seen = max(self._seen, probe.serial)
         if probe.stream < self._stream or probe.lowest < 1:
             self.counts.stale += 1

@@ -15,6 +15,7 @@ import msgspec
 from hfg.transport import Buffer, EncodedToken
 
 __all__ = [
+    "LONGEST_METADATA",
     "MOST_TOKENS",
     "VERSION",
     "FromConsumer",
@@ -35,14 +36,15 @@ __all__ = [
 VERSION: Final = 1
 MOST_TOKENS: Final = 1024
 """Tokens of one datagram."""
+LONGEST_METADATA: Final = 4096
+"""Bytes of what is small about a token."""
 _LARGEST: Final = 2**62  # so that sums of two stay in 64 bits, whoever reads them
 _LONGEST_NAME: Final = 512
-_LONGEST_METADATA: Final = 4096
 _TAG: Final = VERSION * 16  # the lower four bits say what it is
 
 Number: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=_LARGEST)]
 Name: TypeAlias = Annotated[str, msgspec.Meta(max_length=_LONGEST_NAME)]
-Metadata: TypeAlias = Annotated[bytes, msgspec.Meta(max_length=_LONGEST_METADATA)]
+Metadata: TypeAlias = Annotated[bytes, msgspec.Meta(max_length=LONGEST_METADATA)]
 
 
 class Unreadable(Exception):

@@ -18,6 +18,7 @@ import msgspec
 
 from hfg.errors import MessageTooLarge, UsageError
 from hfg.links.frames import (
+    LONGEST_METADATA,
     OtherVersion,
     Outgoing,
     Probe,
@@ -137,16 +138,18 @@ class ExactProducer:
         self._next = kept.first + len(kept.tokens)
         self._put = kept.first - 1  # what was sent to all, but for those out of step
         self._released = kept.first - 1
+        self._limit = 0
         self._serial = 0
         self._peers: dict[str, Peer] = {}
         self._closed = False
+        self._open_up()
 
     # --- what the producing node asks and does
 
     @property
     def free(self) -> bool:
         """Whether it takes a token."""
-        return self._next - 1 - self._released < self._window and len(self._kept) < self._most
+        return self._next <= self._limit
 
     @property
     def released(self) -> int:
@@ -170,33 +173,40 @@ class ExactProducer:
             return self.free if follows else not self._kept
         return self.free or position is not None
 
-    def send(self, token: EncodedToken, position: Position | None = None) -> Position:
-        """Take the next token; it leaves with the next `flush`.
+    def send(self, token: EncodedToken, position: Position | None = None) -> int:
+        """Take the next token and give its number; it leaves with the next `flush`.
 
         Raises:
           UsageError: the window is full, or the link is closed.
-          MessageTooLarge: the value is too large for the transport.
+          MessageTooLarge: the value is too large for the transport, or its metadata for a header.
         """
         if position is not None and not self._begin_at(position):
             self.counts.repeated += 1
-            return position
-        if not self.free or self._closed:
-            raise UsageError("the link is closed" if self._closed else f"the window of {self._window} tokens is full")
+            return position.sequence
+        number = self._next
+        if number > self._limit:
+            raise self._why_not()
         metadata, value = token
         if type(value) is memoryview and (value.ndim != 1 or value.itemsize != 1):
-            token = (metadata, value.cast("B"))
-        if len(token[1]) + len(metadata) > self._largest_token:
+            value = value.cast("B")
+            token = (metadata, value)
+        if len(value) > self._largest_token or len(metadata) > LONGEST_METADATA:
             raise MessageTooLarge(
-                f"a token of {len(token[1])} bytes cannot be sent: the transport carries {self._largest_token} at once"
+                f"a token of {len(value)} bytes and {len(metadata)} of metadata cannot be sent: the transport carries "
+                f"{self._largest_token} and {LONGEST_METADATA} at once"
             )
-        number = self._next
-        if self._stream == 0:
-            raise UsageError("this link inherits its numbers: give the position of the input with the first token")
         self._kept.append(token)
         self._next = number + 1
-        if not self._peers or number <= self._released:  # done before: a relay that began anew comes to it again
+        if number <= self._released or not self._peers:  # done before: a relay that began anew comes to it again
             self._free()
-        return Position(self._stream, number)
+        return number
+
+    def _why_not(self) -> UsageError:
+        if self._closed:
+            return UsageError("the link is closed")
+        if self._stream == 0:
+            return UsageError("this link inherits its numbers: give the position of the input with each token")
+        return UsageError(f"the window of {self._window} tokens is full: look at `free` first, or await send()")
 
     def _begin_at(self, position: Position) -> bool:
         """Whether a token of that position is new; numbers go on from there if they jump."""
@@ -210,6 +220,7 @@ class ExactProducer:
         self._stream = position.stream
         self._next = position.sequence
         self._put = self._released = position.sequence - 1
+        self._open_up()
         for peer in self._peers.values():
             peer.move_to(position.sequence - 1)
         return True
@@ -241,13 +252,18 @@ class ExactProducer:
             self.counts.given_up += self._next - 1 - peer.done
             self._free()
 
-    def close(self) -> list[Outgoing]:
-        """End it: what is not done is given up, and consumers are told."""
+    def close(self, *, over: bool = False) -> list[Outgoing]:
+        """End this life of it: what is not done is given up.
+
+        Args:
+          over: there will be no other, so consumers are told to wait no longer.
+        """
         if self._closed:
             return []
         self._closed = True
+        self._open_up()
         self.counts.given_up += len(self._kept)
-        return [self._probe(peer) for peer in self._peers.values() if self._stream]
+        return [self._probe(peer) for peer in self._peers.values()] if over and self._stream else []
 
     # --- what arrives
 
@@ -330,6 +346,12 @@ class ExactProducer:
             for _ in range(done - first + 1):
                 self._kept.popleft()
         self._put = max(self._put, min(done, last))
+        self._open_up()
+
+    def _open_up(self) -> None:
+        """See up to which number tokens may be sent."""
+        before = self._next - 1 - len(self._kept)  # done by all
+        self._limit = 0 if self._closed or not self._stream else min(self._released + self._window, before + self._most)
 
     # --- what leaves
 

@@ -14,6 +14,7 @@
     reference      the oracle: the rules as a machine of permitted moves
     conformance    replay the trace of a run on the oracle
     waves          the same, and that waves go depth first (R2)
+    transports     the tests that any transport passes
     pytest_plugin  fixtures and the `rule` mark
 
 Sees all of hfg; nothing of hfg sees it. What needs hypothesis is imported when it is used.

@@ -112,8 +112,10 @@ def test_a_large_value_goes_alone_and_is_not_copied() -> None:
 
 def test_a_value_that_no_datagram_holds_is_refused_before_anything_is_sent() -> None:
     producer, consumer = pair(largest_token=10)
-    with pytest.raises(MessageTooLarge, match="a token of 11 bytes cannot be sent: the transport carries 10 at once"):
+    with pytest.raises(MessageTooLarge, match="a token of 11 bytes and 0 of metadata cannot be sent: the"):
         producer.send((b"", b"x" * 11))
+    with pytest.raises(MessageTooLarge, match="a token of 1 bytes and 5000 of metadata cannot be sent"):
+        producer.send((b"m" * 5000, b"x"))
     assert settle(producer, consumer) == 0
 
 
@@ -416,11 +418,25 @@ def test_a_consumer_has_no_more_than_its_capacity_whatever_the_producer_thinks()
     assert producer.counts.resent == 0, "credits kept it from sending what there was no room for"
 
 
-def test_a_consumer_is_told_when_the_link_is_closed() -> None:
+def test_a_life_of_a_producer_ends_without_a_word_and_the_next_goes_on() -> None:
+    producer, consumer = pair()
+    assert producer.close() == []
+    heir = ExactProducer(3)
+    heir.admit("a")
+    settle(heir, consumer)
+    deliver(heir.close(over=True), consumer)
+    assert consumer.closed
+    another = ExactProducer(4)
+    another.admit("a")
+    settle(another, consumer)
+    assert not consumer.closed, "it was not over after all"
+
+
+def test_a_consumer_is_told_when_the_link_is_over() -> None:
     producer, consumer = pair()
     producer.send(token("x"))
     settle(producer, consumer)
-    deliver(producer.close(), consumer)
+    deliver(producer.close(over=True), consumer)
     assert consumer.closed
     assert producer.counts.given_up == 1
     assert producer.close() == []
@@ -449,6 +465,76 @@ def test_more_cannot_be_done_than_was_taken() -> None:
     settle(producer, consumer)
     with pytest.raises(UsageError, match="1 tokens cannot be done, 0 have been taken and are not"):
         consumer.done()
+
+
+@pytest.mark.rule("L2")
+def test_a_datagram_that_is_still_on_its_way_is_not_sent_again() -> None:
+    producer, consumer = pair()
+    producer.send(token("x"))
+    settle(producer, consumer)
+    values(consumer)
+    producer.send(token("y"))
+    on_its_way = producer.flush(0.0)
+    consumer.done()
+    deliver(consumer.flush(), producer)  # knows nothing of y, nor of what it came in
+    assert producer.flush(0.0) == []
+    deliver(on_its_way, consumer)
+    assert values(consumer) == ["y"]
+    assert producer.counts.resent == 0
+
+
+@pytest.mark.rule("L2")
+def test_what_a_zombie_adds_to_a_stream_that_its_heir_carries_on_is_refused() -> None:
+    zombie, consumer = pair()
+    zombie.send(token("x"))
+    settle(zombie, consumer)
+    heir = ExactProducer(5, outbox=Outbox(1, 1, (token("x"),)))
+    heir.admit("a", after=0)
+    settle(heir, consumer)
+    zombie.send(token("forged y"))
+    settle(zombie, consumer)
+    heir.send(token("y"))
+    settle(heir, consumer)
+    assert values(consumer) == ["x", "y"]
+
+
+@pytest.mark.rule("L2")
+@pytest.mark.parametrize(("epoch", "stream"), [(1, 1), (1, 5), (5, 1), (5, 4), (0, 9)])
+def test_a_probe_of_a_former_life_or_stream_moves_nobody(epoch: int, stream: int) -> None:
+    _, consumer = pair()
+    heir = ExactProducer(5)
+    heir.admit("a")
+    heir.send(token("x"))
+    settle(heir, consumer)
+    consumer.receive(write(Probe("a", 2, epoch, stream, 70, 80, 9, False, False)))
+    heir.send(token("y"))
+    settle(heir, consumer)
+    assert values(consumer) == ["x", "y"]
+    assert consumer.counts.stale == 1
+
+
+@pytest.mark.rule("L2")
+def test_what_was_seen_of_a_former_life_proves_nothing_to_a_new_one() -> None:
+    producer, consumer = pair()
+    for now in range(50):
+        producer.send(token("x"))
+        settle(producer, consumer, now=float(now))
+        values(consumer)
+        consumer.done()
+        settle(producer, consumer, now=float(now))
+    heir = ExactProducer(5)
+    heir.admit("a")
+    settle(heir, consumer)
+    (one,) = [one for one in _statuses(heir, consumer) if one.epoch == 5]
+    assert one.seen < 5
+
+
+def _statuses(producer: ExactProducer, consumer: ExactConsumer) -> list[Status]:
+    producer.send(token("x"))
+    deliver(producer.flush(0.0), consumer)
+    values(consumer)
+    consumer.done()
+    return [read_from_consumer(one.header) for one in consumer.flush()]
 
 
 # --- what is hostile

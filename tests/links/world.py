@@ -161,7 +161,7 @@ class Head:
                 self.world.kill(self)  # another life has the lock
                 return True
             store.tokens.append(token)
-        assert self.end.send(token) == position
+        assert self.end.send(token) == position.sequence
         self._forget()
         if self is self.world.head:
             self.world.sent[position.stream] = position.sequence

@@ -1,0 +1,455 @@
+"""The ends of links at work: over a session of a transport, on the event loop that is running.
+
+What is sent in one turn of the loop leaves in one datagram at its end, and so do the words on what is done. Nothing
+here decides: that is done by the machines beside this module, asked after each burst, at the end of each turn in
+which something was sent or done, and at the time when one has something to say by itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+import msgspec
+
+from hfg.errors import TransportError
+from hfg.links.bounded import BoundedConsumer, BoundedProducer
+from hfg.links.consumer import ExactConsumer
+from hfg.links.frames import Outgoing
+from hfg.links.producer import ExactProducer
+from hfg.transport import Closing, Delivery, EncodedToken, Message, Position, Publisher, Session, Traffic
+
+__all__ = ["BoundedReceiver", "BoundedSender", "LinkReceiver", "LinkSender"]
+
+_HEADROOM = 8192  # bytes of a datagram that are kept for the header
+_TIMER_SLACK_S = 0.01
+
+
+def _to_all(name: str) -> str:
+    return f"{name}/tokens"
+
+
+def _to_one(name: str, consumer: str) -> str:
+    return f"{name}/to/{consumer}"
+
+
+def _back(name: str) -> str:
+    return f"{name}/back"
+
+
+class _Batch:
+    """Does something once at the end of the turn of the loop in which it was asked for."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, function: Callable[[], None]) -> None:
+        self.loop = loop
+        self._function = function
+        self.asked = False
+
+    def ask(self) -> None:
+        if not self.asked:
+            self.asked = True
+            self.loop.call_soon(self._run)
+
+    def _run(self) -> None:
+        self.asked = False
+        self._function()
+
+
+class LinkSender:
+    """The sending end of an exact link at work.
+
+    Args:
+      session: of the transport, on the running loop.
+      name: of the link, as a key; both ends use the same.
+      epoch: which life of the producer this is.
+      released: called when more tokens are released than before.
+      **options: of `ExactProducer`.
+
+    Attributes:
+      machine: what decides; to be asked, not to be told.
+    """
+
+    def __init__(
+        self, session: Session, name: str, *, epoch: int, released: Callable[[], None] | None = None, **options: Any
+    ) -> None:
+        room = session.largest_message - _HEADROOM
+        options = {"largest_token": room, "largest_batch": min(60_000, room)} | options
+        self.machine = ExactProducer(epoch, **options)
+        self.name = name
+        self._loop = asyncio.get_running_loop()
+        self._session = session
+        self._batch = _Batch(self._loop, self._flush)
+        self._told = self.machine.released
+        self._on_released = released
+        self._all = session.publisher(_to_all(name), Traffic.TOKENS)
+        self._one: dict[str, Publisher] = {}
+        self._subscription: Closing = session.subscribe(_back(name), self._receive)
+        self._timer: asyncio.TimerHandle | None = None
+        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._closed = False
+
+    @property
+    def free(self) -> bool:
+        """Whether `send_nowait` would take a token."""
+        return self.machine.free and not self._waiting
+
+    @property
+    def released(self) -> int:
+        """The last number of the stream for which the producer's output counts as free again."""
+        return self.machine.released
+
+    def send_nowait(self, token: EncodedToken, position: Position | None = None) -> int:
+        """Take the next token; see `OutgoingLink`."""
+        machine = self.machine
+        number = machine.send(token, position)
+        if not machine.free:
+            self._flush()  # nothing can join it
+        elif not self._batch.asked:
+            self._batch.ask()
+        return number
+
+    async def send(self, token: EncodedToken, position: Position | None = None) -> int:
+        """The same, but wait while the window is full."""
+        if self._waiting or not (self.machine.free if position is None else self.machine.takes(position)):
+            await self._wait(position)
+        number = self.send_nowait(token, position)
+        if self._waiting:
+            self._wake()
+        return number
+
+    async def wait_finished(self) -> None:
+        """Wait until all that was sent is done."""
+        while self.machine.unfinished:
+            await self._wait(None, until_finished=True)
+        self._wake()
+
+    async def _wait(self, position: Position | None, *, until_finished: bool = False) -> None:
+        """In the order of the calls; each wakes the next."""
+        turn: asyncio.Future[None] = self._loop.create_future()
+        self._waiting.append(turn)
+        try:
+            while True:
+                self._check_open()
+                await turn
+                self._check_open()
+                if self.machine.unfinished == 0 if until_finished else self.machine.takes(position):
+                    break
+                turn = self._loop.create_future()
+                self._waiting.appendleft(turn)
+        except BaseException:
+            if turn in self._waiting:
+                self._waiting.remove(turn)
+            else:
+                self._wake()  # it was its turn: somebody else's now
+            raise
+
+    def _wake(self) -> None:
+        while self._waiting:
+            turn = self._waiting.popleft()
+            if not turn.done():
+                turn.set_result(None)
+                return
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise TransportError(f'link "{self.name}" is closed')
+
+    def admit(self, consumer: str, incarnation: int | None = None, *, after: int | None = None) -> None:
+        """Let a consumer take part; see `ExactProducer.admit`."""
+        if consumer not in self._one:
+            self._one[consumer] = self._session.publisher(_to_one(self.name, consumer), Traffic.TOKENS)
+        self.machine.admit(consumer, incarnation, after=after)
+        self._batch.ask()
+
+    def dismiss(self, consumer: str) -> None:
+        """Wait for a consumer no longer."""
+        self.machine.dismiss(consumer)
+        publisher = self._one.pop(consumer, None)
+        if publisher is not None:
+            publisher.close()
+        self._after()
+
+    def statistics(self) -> dict[str, int]:
+        """What was sent, resent, acknowledged, refused and lost, in numbers."""
+        counts: dict[str, int] = msgspec.structs.asdict(self.machine.counts)
+        return counts | {"unfinished": self.machine.unfinished, "released": self.machine.released}
+
+    async def close(self, *, over: bool = False) -> None:
+        """End this life of it; what was not done is given up and counted.
+
+        Args:
+          over: there will be no other, so consumers are told to wait no longer.
+        """
+        if self._closed:
+            return
+        self._flush()
+        self._put(self.machine.close(over=over))
+        self._closed = True
+        if self._timer is not None:
+            self._timer.cancel()
+        self._subscription.close()
+        for publisher in (self._all, *self._one.values()):
+            publisher.close()
+        while self._waiting:
+            self._wake()
+
+    def _receive(self, messages: list[Message]) -> None:
+        receive = self.machine.receive
+        for header, payload in messages:
+            receive(header, payload)
+        self._after()
+
+    def _after(self) -> None:
+        """Something was learnt: send what follows from it, and let those go on that have waited for it."""
+        self._flush()
+        released = self.machine.released
+        if released != self._told:
+            self._told = released
+            if self._on_released is not None:
+                self._on_released()
+        self._wake()
+
+    def _flush(self, *, rung: bool = False) -> None:
+        if self._closed:
+            return
+        now = self._loop.time()
+        due = self.machine.due if rung else None
+        if due is not None and due <= now + _TIMER_SLACK_S:
+            now = max(now, due)  # a timer may ring a little early, and would be set for the same moment again
+        out = self.machine.flush(now)
+        if out:
+            self._put(out)
+        due = self.machine.due
+        if due is None:
+            return
+        if self._timer is not None:
+            if self._timer.when() <= due + _TIMER_SLACK_S:
+                return  # it will look again when it rings, which is cheaper than setting it at each token
+            self._timer.cancel()
+        self._timer = self._loop.call_at(max(due, now), self._ring)
+
+    def _ring(self) -> None:
+        self._timer = None
+        self._flush(rung=True)
+
+    def _put(self, out: list[Outgoing]) -> None:
+        for to, header, payload in out:
+            publisher = self._all if to is None else self._one.get(to)
+            if publisher is not None:
+                publisher.put(header, payload)
+
+
+class _Receiver:
+    """What both receiving ends have in common: waiting for tokens."""
+
+    machine: ExactConsumer | BoundedConsumer
+
+    def __init__(self, session: Session, name: str, arrived: Callable[[], None] | None) -> None:
+        self.name = name
+        self._loop = asyncio.get_running_loop()
+        self._session = session
+        self._on_arrived = arrived
+        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._subscriptions: list[Closing] = [session.subscribe(_to_all(name), self._receive)]
+        self._closed = False
+
+    def take_nowait(self) -> Delivery | None:
+        """Give the next token if there is one."""
+        return self.machine.take()
+
+    async def take(self) -> Delivery:
+        """Give the next token, waiting for it.
+
+        Raises:
+          TransportError: the link is closed, from this end or the other, and no token is left.
+        """
+        while True:
+            token = None if self._waiting else self.machine.take()
+            if token is not None:
+                return token
+            if self._closed or self._is_over():
+                raise TransportError(f'link "{self.name}" is closed')
+            turn: asyncio.Future[None] = self._loop.create_future()
+            self._waiting.append(turn)
+            try:
+                await turn
+            except BaseException:
+                if turn in self._waiting:
+                    self._waiting.remove(turn)
+                else:
+                    self._wake()
+                raise
+            token = self.machine.take()
+            if token is not None:
+                if self.machine.waiting:
+                    self._wake()
+                return token
+
+    async def __aiter__(self) -> AsyncIterator[Delivery]:
+        """Give all tokens, until the link is closed."""
+        while True:
+            try:
+                token = await self.take()
+            except TransportError:
+                return
+            yield token
+
+    def statistics(self) -> dict[str, int]:
+        """What was received, refused, repeated, missing and dropped, in numbers."""
+        counts: dict[str, int] = msgspec.structs.asdict(self.machine.counts)
+        return counts | {"waiting": self.machine.waiting}
+
+    async def close(self) -> None:
+        """End it; what was not done will be delivered to whoever comes next."""
+        if not self._closed:
+            self._closed = True
+            for one in self._subscriptions:
+                one.close()
+            while self._waiting:
+                self._wake()
+
+    def _is_over(self) -> bool:
+        return False
+
+    def _receive(self, messages: list[Message]) -> None:
+        receive = self.machine.receive
+        for header, payload in messages:
+            receive(header, payload)
+        if self.machine.waiting or self._is_over():
+            if self._on_arrived is not None:
+                self._on_arrived()
+            self._wake()
+
+    def _wake(self) -> None:
+        while self._waiting:
+            turn = self._waiting.popleft()
+            if not turn.done():
+                turn.set_result(None)
+                return
+
+
+class LinkReceiver(_Receiver):
+    """The receiving end of an exact link at work.
+
+    Args:
+      session: of the transport, on the running loop.
+      name: of the link, as a key; both ends use the same.
+      consumer: by which name the producer has admitted this end.
+      incarnation: which life of the consumer this is.
+      arrived: called when tokens have come; what is taken and done in it is told at once.
+      **options: of `ExactConsumer`.
+
+    Attributes:
+      machine: what decides; to be asked, not to be told.
+    """
+
+    machine: ExactConsumer
+
+    def __init__(
+        self,
+        session: Session,
+        name: str,
+        *,
+        consumer: str,
+        incarnation: int,
+        arrived: Callable[[], None] | None = None,
+        **options: Any,
+    ) -> None:
+        self.machine = ExactConsumer(consumer, incarnation, **options)
+        super().__init__(session, name, arrived)
+        self._subscriptions.append(session.subscribe(_to_one(name, consumer), self._receive))
+        self._back = session.publisher(_back(name), Traffic.ACKNOWLEDGEMENTS)
+        self._batch = _Batch(self._loop, self._flush)
+        self._batch.ask()  # to say that it is here
+
+    def done(self, count: int = 1) -> None:
+        """Say that the oldest tokens that were taken are processed; see `IncomingLink`."""
+        self.machine.done(count)
+        if not self.machine.unfinished:
+            self._flush()  # nothing can join it
+        elif not self._batch.asked:
+            self._batch.ask()
+
+    async def close(self) -> None:
+        """End it; what was not done will be delivered to whoever comes next."""
+        if not self._closed:
+            self._flush()
+            await super().close()
+            self._back.close()
+
+    def _is_over(self) -> bool:
+        return self.machine.closed
+
+    def _receive(self, messages: list[Message]) -> None:
+        super()._receive(messages)
+        self._flush()
+
+    def _flush(self) -> None:
+        if not self._closed:
+            for _, header, payload in self.machine.flush():
+                self._back.put(header, payload)
+
+
+class BoundedSender:
+    """The sending end of a link that may lose tokens, at work; it never waits.
+
+    Args:
+      session: of the transport, on the running loop.
+      name: of the link, as a key; both ends use the same.
+      epoch: which life of the producer this is.
+    """
+
+    def __init__(self, session: Session, name: str, *, epoch: int) -> None:
+        room = session.largest_message - _HEADROOM
+        self.machine = BoundedProducer(epoch, largest_token=room, largest_batch=min(60_000, room))
+        self.name = name
+        self._publisher = session.publisher(_to_all(name), Traffic.BULK)
+        self._batch = _Batch(asyncio.get_running_loop(), self._flush)
+        self._closed = False
+
+    def send_nowait(self, token: EncodedToken) -> int:
+        """Take the next token and give its number."""
+        if self._closed:
+            raise TransportError(f'link "{self.name}" is closed')
+        number = self.machine.send(token)
+        if not self._batch.asked:
+            self._batch.ask()
+        return number
+
+    def statistics(self) -> dict[str, int]:
+        """What was sent, in numbers."""
+        counts: dict[str, int] = msgspec.structs.asdict(self.machine.counts)
+        return counts
+
+    async def close(self) -> None:
+        """End it; what was sent is put."""
+        if not self._closed:
+            self._flush()
+            self._closed = True
+            self._publisher.close()
+
+    def _flush(self) -> None:
+        if not self._closed:
+            for _, header, payload in self.machine.flush():
+                self._publisher.put(header, payload)
+
+
+class BoundedReceiver(_Receiver):
+    """The receiving end of a link that may lose tokens, at work.
+
+    Args:
+      session: of the transport, on the running loop.
+      name: of the link, as a key; both ends use the same.
+      arrived: called when tokens have come.
+      **options: of `BoundedConsumer`.
+    """
+
+    machine: BoundedConsumer
+
+    def __init__(
+        self, session: Session, name: str, *, arrived: Callable[[], None] | None = None, **options: Any
+    ) -> None:
+        self.machine = BoundedConsumer(**options)
+        super().__init__(session, name, arrived)
