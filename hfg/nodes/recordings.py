@@ -14,8 +14,9 @@ from hfg.errors import UsageError
 from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import Event, Output, Parameter
-from hfg.recording.playing import Player, Track, recorded_ports
+from hfg.recording.players import Player
 from hfg.recording.reading import File
+from hfg.recording.tracks import Track, recorded_ports
 
 __all__ = ["Playback"]
 

@@ -1,6 +1,8 @@
 """Recording what passes ports of a run to MCAP files, and playing it back.
 
 playing     nodes that send what was recorded             `hfg play`
+players     step by step, at its time
+tracks      what one node did: firings, calls, signals
 reading     files, also those that were cut off           `hfg info`
 recording   which ports, what is said about the run       `run.record`, `hfg record`
 writing     the thread that encodes and writes

@@ -14,6 +14,7 @@ from typing import Any, Final, Literal
 import msgspec
 import numpy as np
 
+from hfg.engine.observing.recorder import Told
 from hfg.errors import UsageError
 from hfg.recording import schemas
 from hfg.recording.values import CannotKeep, Codec, is_plain
@@ -28,6 +29,7 @@ __all__ = [
     "Timed",
     "TokenReader",
     "TokenWriter",
+    "circumstances",
 ]
 
 MARKERS: Final = "hfg/markers"
@@ -38,8 +40,22 @@ EVENTS: Final = "hfg/events"
 
 Images = Literal["raw", "png", "jpeg"]
 
+_TOLD: Final = ("began", "call", "beside", "silent", "last", "waited")
 
-class Marked(msgspec.Struct, omit_defaults=True):
+
+class _Circumstances(msgspec.Struct, omit_defaults=True, kw_only=True):
+    """How it came to be sent, as far as the token itself does not say that; see `recorder.Told`."""
+
+    time: float | None = None
+    began: float | None = None
+    call: int = 0
+    beside: bool = False
+    silent: bool = False
+    last: bool = False
+    waited: bool = False
+
+
+class Marked(_Circumstances, omit_defaults=True):
     """A marker that has passed a port."""
 
     port: str
@@ -47,17 +63,15 @@ class Marked(msgspec.Struct, omit_defaults=True):
     stamp: float
     activity: int = 0
     sequence: int = 0
-    time: float | None = None
 
 
-class Timed(msgspec.Struct):
+class Timed(_Circumstances):
     """A token that passed at another time than that of its stamp, in virtual time, which is exact."""
 
     value: Any
     activity: int
     stamp: float
     sequence: int
-    time: float
 
 
 class _Time(msgspec.Struct):
@@ -65,7 +79,7 @@ class _Time(msgspec.Struct):
     nsec: int
 
 
-class _Raw(msgspec.Struct, omit_defaults=True):
+class _Raw(_Circumstances, omit_defaults=True):
     timestamp: _Time
     frame_id: str
     width: int
@@ -78,10 +92,9 @@ class _Raw(msgspec.Struct, omit_defaults=True):
     stamp: float
     activity: int = 0
     sequence: int = 0
-    time: float | None = None
 
 
-class _Compressed(msgspec.Struct, omit_defaults=True):
+class _Compressed(_Circumstances, omit_defaults=True):
     timestamp: _Time
     frame_id: str
     data: Any
@@ -90,7 +103,14 @@ class _Compressed(msgspec.Struct, omit_defaults=True):
     stamp: float
     activity: int = 0
     sequence: int = 0
-    time: float | None = None
+
+
+def circumstances(token: Token[Any], time: float | None) -> dict[str, Any]:
+    """What is written of how a token came to be sent; `time`: when it passed, if that is to be written."""
+    found: dict[str, Any] = {} if time is None else {"time": time}
+    if type(token) is Told:
+        found |= {name: getattr(token, name) for name in _TOLD}
+    return found
 
 
 class TokenWriter:
@@ -151,10 +171,10 @@ class TokenWriter:
         kind = type(value)
         if self.keep is None and (kind is str or (kind is float and not isfinite(value))):
             value = self._codec.encode(value)
-            token = Token(value, token.activity, token.stamp, token.sequence)
-        if time is None:
+            token = msgspec.structs.replace(token, value=value)
+        if time is None and type(token) is Token:
             return token
-        return Timed(value, token.activity, token.stamp, token.sequence, time)
+        return Timed(value, token.activity, token.stamp, token.sequence, **circumstances(token, time))
 
     def _image(self, token: Token[Any], time: float | None) -> Any:
         value = token.value
@@ -166,7 +186,7 @@ class TokenWriter:
             "stamp": token.stamp,
             "activity": token.activity,
             "sequence": token.sequence,
-            "time": time,
+            **circumstances(token, time),
         }
         if self.images == "raw":
             step = value.nbytes // height if height else 0

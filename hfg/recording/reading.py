@@ -146,10 +146,13 @@ class File:
                 if channels is None or message[0] in channels:
                     yield message
 
+    def numbers_of(self, topic: str) -> frozenset[int]:
+        """Give the channels of one topic."""
+        return frozenset(number for number, one in self.channels.items() if one.topic == topic)
+
     def began(self) -> float:
         """When its graph began to move, on its clock; when the recording did if that was later."""
-        events = frozenset(number for number, one in self.channels.items() if one.topic == EVENTS)
-        for _, _, data in self.messages(events):
+        for _, _, data in self.messages(self.numbers_of(EVENTS)):
             event = msgspec.json.decode(data)
             if event.get("type") == "RunStarted":
                 return float(event["time"])

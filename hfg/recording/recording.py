@@ -12,6 +12,7 @@ from typing import Any, Final
 import msgspec
 
 from hfg.engine import Run
+from hfg.engine.model.worker import DISABLED
 from hfg.engine.observing.recorder import Place, Recorder
 from hfg.errors import GraphError, UsageError
 from hfg.graph import commands
@@ -19,6 +20,7 @@ from hfg.graph.flat import flatten
 from hfg.graph.structure.naming import suggest
 from hfg.logs import Log
 from hfg.ports import Port
+from hfg.ports.automatic import sent_name
 from hfg.recording.messages import Images, TokenWriter
 from hfg.recording.values import reference
 from hfg.recording.writing import RecordingWriter, open_new
@@ -155,6 +157,7 @@ class Recording:
             "node": node.place.path if kind is not None else "",
             "port": port.name,
             "node_type": (kind.reference or "") if kind is not None else "",
+            "source": str(kind is not None and kind.is_source).lower(),
         }
         typed: Place = place
         self._recorder.look_at(port, typed)
@@ -265,17 +268,43 @@ class _Probe:
 
 
 def ports_of(run: Run) -> dict[str, Any]:
-    """Give the ports that send in a run, by path: outputs with an edge, and events that node types declare."""
+    """Give the ports that send in a run, by path: outputs with an edge, and events that node types declare.
+
+    Of a source whose outputs nobody may take `processed` says when it has fired, and what goes with an output without
+    an edge as an event is all that anybody sees of it.
+    """
     found: dict[str, Any] = {}
+    taken: set[Any] = set()  # outputs of sources that always are; by port
+    speaking: set[Any] = set()  # whose these are
     for edge in run._engine.core.edges:
         if edge.segments and edge.source_port.kind == "output":
             found[edge.source_port.path] = edge.source_port
+            if edge.source.is_source and _is_always_live(edge.target):
+                taken.add(edge.source_port)
+                speaking.add(edge.source)
     for worker in run._engine.core.workers:
         if worker.node is not None and worker.type is not None and worker.scope is None:
-            for name in worker.type.events:
+            names = list(worker.type.events)
+            if worker.is_source:
+                outputs = worker.type.outputs
+                unsure = [name for name in outputs if worker.node._port("output", name) not in taken]
+                names += [name for name in map(sent_name, unsure) if name in worker.events]
+                names += [] if worker in speaking else ["processed"]
+            for name in names:
                 port = worker.node._port("event", name)
                 found[port.path] = port
     return found
+
+
+def _is_always_live(target: Any) -> bool:
+    """Whether nothing in the graph disables a node, or one that it stands in (F10)."""
+    around = [target, *(scope.worker for scope in target.around)]
+    return not any(
+        worker.blocked & DISABLED
+        or (worker.options is not None and worker.options.on_error == "disable")
+        or any(edge.port_name in ("disable", "enable") for edge in worker.slot_edges)
+        for worker in around
+    )
 
 
 def _fits(path: str, pattern: str) -> bool:

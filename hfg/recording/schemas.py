@@ -32,6 +32,12 @@ _TOKEN: Final[dict[str, Any]] = {
     "stamp": {"type": "number", "description": "Seconds on the run's clock"},
     "sequence": {"type": "integer", "description": "Number of the token on its edge, from 1"},
     "time": {"type": "number", "description": "When it passed, if that was not at its stamp; in virtual time"},
+    "began": {"type": "number", "description": "When the firing began that has sent it, if not at its stamp"},
+    "call": {"type": "integer", "description": "Number of the slot call in which it was triggered"},
+    "beside": {"type": "boolean", "description": "It was triggered in no firing and no slot call"},
+    "silent": {"type": "boolean", "description": "The function was not run in this firing"},
+    "last": {"type": "boolean", "description": "The node's end() has written it"},
+    "waited": {"type": "boolean", "description": "The firing waited, though no time passed"},
 }
 _BYTES: Final = {"type": "string", "contentEncoding": "base64"}
 

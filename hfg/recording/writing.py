@@ -23,8 +23,8 @@ import numpy.typing as npt
 from hfg.engine.observing.recorder import ITEM
 from hfg.errors import UsageError
 from hfg.recording.mcap import Writer
-from hfg.recording.messages import EVENTS, MARKERS, Marked, TokenWriter
-from hfg.token import Marker
+from hfg.recording.messages import EVENTS, MARKERS, Marked, TokenWriter, circumstances
+from hfg.token import Marker, Token
 
 __all__ = ["PROFILE", "RecordingWriter", "open_new"]
 
@@ -35,6 +35,7 @@ _CHUNK_S: Final = 1.0
 _LOOK_S: Final = 0.3
 _BATCH: Final = 1024
 _NUMBERS: Final = frozenset({int, float, bool})
+_PLAIN: Final = {Token}
 _MARKED_SCHEMA: Final = b'{"title":"hfg marker","type":"object"}'
 _EVENT_SCHEMA: Final = b'{"title":"hfg event","type":"object"}'
 
@@ -166,6 +167,8 @@ class RecordingWriter:
         """Where all are finite numbers, tokens are what is encoded; None: somewhere there is something else."""
         if None in places or any([place.keep is not None for place in places]):  # noqa: C419 - faster
             return None
+        if {*map(type, tokens)} != _PLAIN:
+            return None
         values = [token.value for token in tokens]
         if not _NUMBERS.issuperset(map(type, values)):
             return None
@@ -190,8 +193,9 @@ class RecordingWriter:
                 continue
             passed = when if self._exact and when != token.stamp else None
             if type(token.value) is Marker:
+                told = circumstances(token, passed)
                 bodies.append(
-                    Marked(place.path, token.value.value, token.stamp, token.activity, token.sequence, passed)
+                    Marked(place.path, token.value.value, token.stamp, token.activity, token.sequence, **told)
                 )
                 place.markers += 1
                 rest.append((self._own_channel(MARKERS), token.sequence, token.stamp))

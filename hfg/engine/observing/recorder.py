@@ -13,21 +13,24 @@ import asyncio
 import threading
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
+from types import SimpleNamespace, TracebackType
 from typing import Any, Final, Protocol
 
-from hfg.engine.model.worker import RECORDED, Worker
+from msgspec.structs import replace
+
+from hfg.engine.model.worker import ENDED, RECORDED, Worker
 from hfg.engine.observing.consumers import Consumers, Listener
 from hfg.engine.observing.taps import Taps
 from hfg.engine.rules.agenda import unblock
 from hfg.engine.runtime.engine import Engine
 from hfg.logs import Log
-from hfg.token import Marker, Token
+from hfg.token import END, Marker, Token
 from hfg.trace import TraceEvent
 
-__all__ = ["ITEM", "MOST_BYTES", "MOST_ITEMS", "Place", "Recorder", "RecordingThread", "RunRecording"]
+__all__ = ["ITEM", "MOST_BYTES", "MOST_ITEMS", "Place", "Recorder", "RecordingThread", "RunRecording", "Told"]
 
 _LOGGER = Log("hfg.engine")
 
@@ -43,6 +46,7 @@ MOST_BYTES: Final = 128 * 1024 * 1024
 
 _WAKE_AFTER: Final = 4000 * ITEM  # the thread looks a few times a second anyway
 _JOIN_S: Final = 0.002
+_NO_SOURCE: Final = SimpleNamespace(is_source=False)
 
 
 class Place(Protocol):
@@ -133,15 +137,44 @@ class RunRecording(Protocol):
     ) -> None: ...
 
 
+class Told(Token[Any], frozen=True):
+    """A token that did not come to be sent as it mostly is: at the end of a firing that began at its stamp.
+
+    Who plays the node that has sent it is to send it alike.
+
+    Attributes:
+      began: when the firing began, if its stamp does not say so.
+      call: the number of the slot call in which it was triggered; 0: in none.
+      beside: it was triggered in no firing and no call.
+      silent: the function was not run in this firing.
+      last: `end()` has written it, or triggered it.
+      waited: the firing waited, though no time passed.
+    """
+
+    began: float | None = None
+    call: int = 0
+    beside: bool = False
+    silent: bool = False
+    last: bool = False
+    waited: bool = False
+
+
 class _Looker:
-    """Looks at one place."""
+    """Looks at one place.
 
-    __slots__ = ("end", "place", "put")
+    Attributes:
+      worker: who sends there, if that is known.
+      silent: how many of its firings were silent when it last sent.
+    """
 
-    def __init__(self, place: Place, put: Callable[[Token[Any]], None]) -> None:
+    __slots__ = ("end", "place", "put", "silent", "worker")
+
+    def __init__(self, place: Place) -> None:
         self.place = place
-        self.put = put
+        self.put: Callable[[Token[Any]], None] = _no_token
         self.end = _nothing
+        self.worker: Worker | None = None
+        self.silent = 0
 
 
 class Recorder(Listener):
@@ -189,8 +222,55 @@ class Recorder(Listener):
           UsageError: nothing passes there.
           GraphError: there is no such path.
         """
-        looker = _Looker(place, self._look(place))
+        looker = _Looker(place)
+        put = self._look(place)
+        if getattr(what, "kind", "") == "event":
+            put = partial(self._signal, looker, put)
+        elif getattr(getattr(what, "node", None), "_type", _NO_SOURCE).is_source:
+            put = partial(self._output_of_source, looker, put)
+        looker.put = put
         self._lookers[looker] = self._taps.look(what, looker)
+        self._find_sender(looker)
+
+    def _find_sender(self, looker: _Looker) -> None:
+        workers = self._taps.workers(looker)
+        looker.worker = workers[0] if len(workers) == 1 else None
+        looker.silent = 0 if looker.worker is None else looker.worker.silent
+
+    # --- what the tokens themselves do not say ------------------------------------------------------------------------
+
+    def _signal(self, looker: _Looker, put: Callable[[Token[Any]], None], token: Token[Any]) -> None:
+        """A signal leaves; mostly in a firing, which one of the tokens that follow will close."""
+        worker: Any = looker.worker
+        if worker is not None:
+            amid, began = worker.busy, worker.stamp
+            if amid == "ending" or (amid == "firing" and worker.blocked & ENDED):
+                token = _told(token, last=True)
+            elif amid != "firing":
+                called = amid == "call" or (not amid and began is not None)  # the fast path of calls says no more
+                token = _told(token, call=worker.call_number) if called else _told(token, beside=True)
+            elif worker.is_source and began is not None and (began != token.stamp or _waited(worker)):
+                token = _told(token, began=None if began == token.stamp else began, waited=_waited(worker))
+        put(token)
+
+    def _output_of_source(self, looker: _Looker, put: Callable[[Token[Any]], None], token: Token[Any]) -> None:
+        """What a source has written leaves."""
+        worker: Any = looker.worker
+        if worker is None:
+            put(token)
+            return
+        if token.value is END:  # which may have had to wait until the outputs were free
+            put(_told(token, waited=True) if worker.busy == "over" and _waited(worker) else token)
+            return
+        began = token.stamp if worker.stamp is None else worker.stamp
+        last, silent = bool(worker.blocked & ENDED), worker.silent != looker.silent
+        looker.silent = worker.silent
+        waited = not last and _waited(worker)
+        if last or silent or waited or began != token.stamp:
+            began = None if began == token.stamp else began
+            put(_told(token, began=began, silent=silent, last=last, waited=waited))
+        else:
+            put(token)
 
     def _look(self, place: Place) -> Callable[[Token[Any]], None]:
         extend, items, sizes = self._items.extend, self._items, self._thread.sizes
@@ -219,7 +299,7 @@ class Recorder(Listener):
                     place.refused += 1
                     self.on_refused(place, error)
                     return
-                token = Token(kept, token.activity, token.stamp, token.sequence)
+                token = replace(token, value=kept)
                 self._bytes_put += size
                 sizes.append(size)
             extend((place, token, now()))
@@ -316,6 +396,8 @@ class Recorder(Listener):
 
     def _structure_changed(self) -> None:
         if self._open and not self._engine.core.over:
+            for looker in self._lookers:
+                self._find_sender(looker)
             self.on_structure()
 
     def stop(self) -> None:
@@ -341,7 +423,20 @@ class Recorder(Listener):
             await asyncio.sleep(0)
 
 
+def _waited(worker: Worker) -> bool:
+    """Whether the firing that is over has waited: an async one that has not is over in its turn."""
+    return worker.is_async and not worker.core.pumping
+
+
+def _told(token: Token[Any], **how: Any) -> Told:
+    return Told(token.value, token.activity, token.stamp, token.sequence, **how)
+
+
 def _nothing() -> None:
+    pass
+
+
+def _no_token(_token: Token[Any]) -> None:
     pass
 
 

@@ -259,8 +259,8 @@ def send_end(worker: Worker) -> None:
         let_follow(core, since)
         worker.leave()  # no firing or call goes on that could use it: the next slot call must not (A3)
         _sent(core)
-        if core.trace is not None:
-            core.trace(NodeEnded(core.now(), worker.path))
+        if core.seldom is not None:
+            core.seldom(NodeEnded(core.now(), worker.path))
         deferred = worker.take_deferred()
         for modifier in deferred:
             receive(worker, (modifier,))

@@ -95,6 +95,7 @@ class Engine:
       callbacks: what those who stand on the engine want to be told.
       code: runs the nodes' code.
       tasks: runs what that has started beside itself.
+      moving_since: when all nodes were set up and the graph began to move, on the run's clock; None before.
       ending: set from the moment the run is over.
       ended_how: its outcome, and what it failed with; None before.
       holds: people outside who may still bring something (R5).
@@ -133,6 +134,7 @@ class Engine:
         self._quiet_waiters: list[asyncio.Future[None]] = []
         self.agreement: Callable[[], None] | None = None
         self.ended_how: tuple[str, HfgError | None] | None = None
+        self.moving_since: float | None = None
         self.ending: asyncio.Event = asyncio.Event()
         self._scheduled = False
         self._resumed: deque[Callable[[], None]] = deque()  # code that goes on when all is done that is ready now

@@ -71,8 +71,9 @@ class Lifetime:
             return
         if engine.settings.until_s is not None:
             engine.loop.call_at(engine.loop.time() + engine.settings.until_s, self._until)
+        engine.moving_since = engine.now()
         if core.seldom is not None:
-            core.seldom(RunStarted(engine.now()))
+            core.seldom(RunStarted(engine.moving_since))
         core.started = True
         self._discard_initial(core)
         self._connect_operators(core)

@@ -1,0 +1,259 @@
+"""What a node did, step by step, read from a recording as it is needed: firings, slot calls, signals beside both.
+
+A recording holds tokens; which of them belong together follows from their order. The outputs of a firing leave
+together, behind the signals that it has triggered; what is otherwise is written beside the token (`recorder.Told`).
+Stands on `reading` and `messages`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import msgspec
+
+from hfg.errors import UsageError
+from hfg.ports.automatic import sent_of
+from hfg.recording.messages import EVENTS, MARKERS, TokenReader
+from hfg.recording.reading import File
+from hfg.recording.values import CannotKeep
+from hfg.token import END, NO_MESSAGE, Token
+from hfg.types import accepts, describe
+
+__all__ = ["Record", "Step", "Track", "recorded_ports"]
+
+_PROCESSED = "processed"
+
+
+class Record(msgspec.Struct):
+    """One token of a recording.
+
+    Attributes:
+      port: which it has passed.
+      when: it did, in seconds of the recording's clock.
+      token: what.
+      told: what else is known of how it came to be sent, see `recorder.Told`.
+    """
+
+    port: str
+    when: float
+    token: Token[Any]
+    told: Mapping[str, Any]
+
+
+class Step(msgspec.Struct):
+    """A firing, a slot call, or signals beside both.
+
+    Attributes:
+      began: when it begins.
+      when: when it is over.
+      signals: what is triggered on the way.
+      fires: it is a firing.
+      sent: what leaves by the outputs then, by recorded port.
+      ends: the node ends with it.
+      last: what leaves was written by `end()`.
+      silent: the process function was not run.
+      waits: it is over later than it begins, if only in the same moment.
+      call: the number of the slot call that it is; 0: none.
+      told: `processed` has told of it.
+    """
+
+    began: float
+    when: float
+    signals: list[Record] = []
+    fires: bool = False
+    sent: dict[str, Token[Any]] = {}
+    ends: bool = False
+    last: bool = False
+    silent: bool = False
+    waits: bool = False
+    call: int = 0
+    told: bool = False
+
+
+class Track:
+    """What is to be played of one node: its steps."""
+
+    def __init__(self, file: File, ports: Mapping[str, Any], *, may_pickle: bool) -> None:
+        """Choose what is played.
+
+        Args:
+          file: the recording.
+          ports: paths of recorded ports, and the type of the port that sends what was recorded there.
+          may_pickle: whether pickled values are read.
+        """
+        self._file = file
+        self.began = file.began()
+        self.exact = file.metadata.get("hfg", {}).get("clock") == "virtual"
+        self._readers: dict[int, tuple[Any, TokenReader, Any]] = {}
+        self._markers = file.numbers_of(MARKERS)
+        self._events = file.numbers_of(EVENTS)
+        self._kinds: dict[str, str] = {}  # "output", "sent", "processed", "event" by port
+        self._node = ""
+        self.of_source = False
+        for number, channel in file.channels.items():
+            if channel.topic in ports:
+                schema = file.schemas.get(channel.schema_id)
+                hint = ports[channel.topic]
+                reader = TokenReader(schema.name if schema is not None else "", hint, may_pickle=may_pickle)
+                self._readers[number] = (channel, reader, hint)
+                self._kinds[channel.topic] = _kind(channel.metadata)
+                self._node = channel.metadata.get("node", "")
+                self.of_source = channel.metadata.get("source") == "true"
+        kinds = set(self._kinds.values())
+        self._closes = bool(kinds & {"output", _PROCESSED})  # what says that a firing is over is among the ports
+        self._has_outputs = "output" in kinds
+
+    def firings(self) -> Iterator[Step]:
+        """Go through the firings."""
+        return (step for step in self._steps() if step.fires)
+
+    def others(self) -> Iterator[Step]:
+        """Go through what else there was: slot calls, and signals beside them."""
+        if not {"event"} & set(self._kinds.values()):
+            return iter(())
+        return (step for step in self._steps() if not step.fires)
+
+    def _steps(self) -> Iterator[Step]:
+        signals: list[Record] = []  # of the firing that is under way
+        sent: dict[str, Token[Any]] = {}  # what is known of its outputs by events alone
+        step: Step | None = None  # the one that is being read
+        before = self.began
+        for record in self._records():
+            kind = "end" if not record.port else self._kinds[record.port]
+            if step is not None and self._goes_on(step, kind, record, amid=bool(signals)):
+                continue
+            if step is not None:
+                yield step
+                before, step = step.when, None
+            told = record.told
+            if kind == "sent":
+                sent[record.port] = record.token
+            elif kind == "event" and (told.get("call") or told.get("beside") or not self._closes):
+                step = Step(record.when, record.when, [record], call=told.get("call", 0))
+            elif kind == "event":
+                signals.append(record)
+            else:
+                step = self._firing(kind, record, before, signals, sent)
+                signals, sent = [], {}
+        if step is not None:
+            yield step
+        for record in signals:  # the recording was over before the firing was
+            yield Step(record.when, record.when, [record])
+
+    def _goes_on(self, step: Step, kind: str, record: Record, *, amid: bool) -> bool:
+        """Whether a record belongs to the step that is being read, which has it by that."""
+        if kind == "end":
+            step.ends = step.ends or step.last
+            return step.ends
+        if kind == "sent":  # the outputs of a firing leave before that is told
+            if not step.fires or not self._has_outputs or step.told or amid:
+                return False
+            step.sent[record.port] = record.token
+            return True
+        if kind == "event":
+            if not step.call or record.told.get("call") != step.call:
+                return False
+            step.signals.append(record)
+            return True
+        if kind == _PROCESSED and step.sent and self._has_outputs and not (amid or step.last or step.ends or step.told):
+            step.told = True
+            return True
+        if kind != "output" or not step.fires or amid or step.told:
+            return False
+        if record.token.value is END and (step.ends or step.last):
+            if record.told.get("waited"):
+                step.when, step.waits = record.when, True
+            step.ends = True
+            return True
+        if record.port in step.sent or record.when != step.when or step.ends:
+            return False
+        step.sent[record.port] = record.token
+        return True
+
+    def _firing(
+        self, kind: str, record: Record, before: float, signals: list[Record], sent: dict[str, Token[Any]]
+    ) -> Step:
+        """Begin the step of a firing that is over with this record."""
+        token, told = record.token, record.told
+        when = record.when
+        if kind == "end":
+            return Step(before if before < when else when, when, signals, True, sent, ends=True, waits=before < when)
+        ends = token.value is END
+        if kind == "output" and not ends:
+            sent[record.port] = token
+        told_of = kind == _PROCESSED
+        began = when
+        if self.of_source:
+            began = min(told.get("began", token.stamp), when)
+        waits = (began < when and not ends) or bool(told.get("waited"))
+        return Step(
+            began,
+            when if waits or not ends or not self.of_source else began,
+            signals,
+            True,
+            sent,
+            ends=ends,
+            last=bool(told.get("last")),
+            silent=bool(told.get("silent")),
+            told=told_of,
+            waits=waits,
+        )
+
+    def _records(self) -> Iterator[Record]:
+        wanted = frozenset(self._readers) | self._markers
+        if _PROCESSED in self._kinds.values():  # nobody may have taken the END either
+            wanted |= self._events
+        node = self._node
+        for number, ns, data in self._file.messages(wanted):
+            message = msgspec.json.decode(data)
+            if number in self._events:
+                if message.get("type") == "NodeEnded" and message["node"] == node:
+                    yield Record("", float(message["time"]), _END, {})
+                continue
+            if number in self._markers:
+                if message["port"] in self._kinds:
+                    marker = END if message["marker"] == "END" else NO_MESSAGE
+                    token: Token[Any] = Token(marker, message.get("activity", 0), message["stamp"])
+                    yield Record(message["port"], self._when(ns, message), token, message)
+                continue
+            channel, reader, hint = self._readers[number]
+            try:
+                token = reader.token(message)
+            except (CannotKeep, KeyError, TypeError, ValueError, AttributeError) as error:
+                raise UsageError(
+                    f'a value of "{channel.topic}" in {self._file.path} cannot be read as {describe(hint)}: {error}'
+                ) from None
+            is_event = channel.metadata.get("kind") == "event"
+            if not accepts(token.value, hint) and not (token.value is None and is_event):
+                raise UsageError(
+                    f'"{channel.topic}" in {self._file.path} has the value {token.value!r:.80}, which is no '
+                    f"{describe(hint)}, as the port now says: record again, or map it to another port"
+                )
+            yield Record(channel.topic, self._when(ns, message), token, message)
+
+    def _when(self, ns: int, message: dict[str, Any]) -> float:
+        if not self.exact:
+            return ns / 1e9
+        passed = message.get("time")
+        return float(message["stamp"] if passed is None else passed)
+
+
+_END: Token[Any] = Token(END)
+
+
+def _kind(about: Mapping[str, str]) -> str:
+    if about.get("kind") != "event":
+        return "output"
+    port = about.get("port", "")
+    if about.get("source") == "true":
+        if port == _PROCESSED:
+            return _PROCESSED
+        if sent_of(port) is not None:
+            return "sent"
+    return "event"
+
+
+def recorded_ports(file: File) -> dict[str, Any]:
+    """The channels of ports, by path."""
+    return {one.topic: one for one in file.channels.values() if one.topic not in (MARKERS, EVENTS)}
