@@ -139,6 +139,7 @@ class ExactProducer:
         self._put = kept.first - 1  # what was sent to all, but for those out of step
         self._released = kept.first - 1
         self._limit = 0
+        self._admitted = False
         self._serial = 0
         self._peers: dict[str, Peer] = {}
         self._closed = False
@@ -239,6 +240,7 @@ class ExactProducer:
             last = self._next - 1
             done = last if after is None else min(max(after, last - len(self._kept)), last)
             peer = self._peers[consumer] = Peer(consumer, done, self._probe_s)
+            self._admitted = True  # once all are, what an outbox kept may turn out to be wanted by none
         if incarnation is not None:
             peer.expected = incarnation
             if peer.incarnation != incarnation:
@@ -362,6 +364,9 @@ class ExactProducer:
         """
         if self._closed or self._stream == 0:
             return []
+        if self._admitted:
+            self._admitted = False
+            self._free()
         out: list[Outgoing] = []
         ready = [peer for peer in self._peers.values() if peer.in_step]
         for peer in ready:

@@ -36,8 +36,9 @@ class Ledger:
     def __init__(self) -> None:
         self.incarnation = 0
         self.entries: list[Position] = []
-        self.start: Position | None = None  # where this consumer joined: it gets nothing up to here
+        self.starts: dict[int, int] = {}  # where this consumer joined, by stream: it gets nothing up to there
         self.repeats = False  # without memory between lives
+        self.is_late = False  # it has joined a relay
 
     def write(self, incarnation: int, token: Delivery) -> bool:
         """Record a token; an old life is refused, as by a lock."""
@@ -48,13 +49,14 @@ class Ledger:
         if self.entries:
             last = self.entries[-1]
             follows = position == (last.stream, last.sequence + 1)
-            begins = position.stream > last.stream and position.sequence == 1
-            again = self.repeats and position <= last
+            is_first = self.repeats or position.sequence == 1 + self.starts.get(position.stream, 0)
+            begins = position.stream > last.stream and is_first
+            furthest = max(self.entries)
+            again = self.repeats and position <= (furthest.stream, furthest.sequence + 1)
             assert follows or begins or again, f"after {last} came {position} (L2)"
-        elif self.start is not None and position.stream == self.start.stream:
-            assert position.sequence == self.start.sequence + 1, f"joined after {self.start} and got {position}"
         else:
-            assert position.sequence == 1 or self.repeats, f"the first was {position} (L2)"
+            start = self.starts.get(position.stream, 0)
+            assert position.sequence == start + 1 or self.repeats, f"after {start} came {position} (L2)"
         self.entries.append(position)
         return True
 
@@ -305,6 +307,12 @@ class World:
     def programs(self) -> list[Sink | Relay | Head]:
         return [*self.heads, *self.relays, *self.sinks]
 
+    def lives(self, name: str) -> list[Sink | Relay | Head]:
+        """All that are alive of the program of a name, the newest last."""
+        if name == "head":
+            return [*self.heads]
+        return [*self.relays] if name == "relay" else [one for one in self.sinks if one.name == name]
+
     def leave(self, name: str) -> None:
         """A consumer takes no part any more, by a change of the graph."""
         self.joined.discard(name)
@@ -323,12 +331,12 @@ class World:
         for one in self._last_hop():
             one.admit(name)
         if self.settings.relay:
-            ledger.repeats = True  # where it begins is between the relay and whoever feeds it
+            ledger.repeats = ledger.is_late = True  # where it begins is between the relay's lives and who feeds it
         elif self.outbox is not None:
-            ledger.start = Position(self.outbox.stream, self.outbox.first + len(self.outbox.tokens) - 1)
-            self.outbox.joined[name] = ledger.start.sequence
-        elif self.head is not None and self.head.epoch == self.newest["head"]:
-            ledger.start = self.head.end.position
+            last = self.outbox.first + len(self.outbox.tokens) - 1
+            ledger.starts[self.outbox.stream] = self.outbox.joined[name] = last
+        else:
+            ledger.starts = dict(head.end.position for head in self.heads)
         self.start_sink(name)
 
     def _last_hop(self) -> list[ExactProducer]:
@@ -402,8 +410,7 @@ class World:
             stream = self.head.end.position.stream
             for name in self.joined:
                 done = [one.sequence for one in self.ledgers[name].entries if one.stream == stream]
-                start = self.ledgers[name].start
-                base = start.sequence if start is not None and start.stream == stream else 0
+                base = self.ledgers[name].starts.get(stream, 0)
                 ahead = self.sent.get(stream, 0) - (done[-1] if done else base)
                 assert ahead <= settings.window, f"{ahead} tokens are ahead of {name} (L1)"
 
@@ -447,17 +454,19 @@ class World:
     def is_all_done(self) -> bool:
         """Whether the newest producer has nothing left."""
         head = self.head
-        return head is not None and head.end.unfinished == 0 and not any(one.end.unfinished for one in self.sinks)
+        producers = [one.end for one in self.heads[-1:]] + [one.out for one in self.relays[-1:]]
+        left = sum(one.unfinished for one in producers) + sum(one.end.unfinished for one in self.sinks)
+        return head is not None and left == 0
 
     def _check_complete(self, ledger: Ledger) -> None:
         head = self.head
         assert head is not None
         stream, last = head.end.position
         got = {one.sequence for one in ledger.entries if one.stream == stream}
-        base = ledger.start.sequence if ledger.start is not None and ledger.start.stream == stream else 0
+        base = ledger.starts.get(stream, 0)
         if not ledger.repeats:
             assert got == set(range(base + 1, last + 1)), f"of {last} tokens of stream {stream} came {sorted(got)}"
-        elif ledger.start is None and last and ledger.entries:
+        elif last > base and ledger.entries and not ledger.is_late:
             assert last in got
 
     def check_rest(self) -> None:
@@ -482,26 +491,34 @@ ACTIONS = 100
 def act(world: World, action: int, which: int) -> None:
     """Do one thing, chosen by two numbers, so that a history is a list of them."""
     programs = world.programs()
-    if action < 30:
+    if action < 25:
         world.deliver(0)
     elif action < 35:
+        for _ in range(len(world.flying)):
+            world.deliver(0)
+    elif action < 39:
         world.deliver(which)
-    elif action < 38:
+    elif action < 42:
         world.lose(which)
-    elif action < 41:
+    elif action < 45:
         world.repeat(which)
-    elif action < 43:
+    elif action < 46 or (world.cut and action < 54):
         world.cut = not world.cut
-    elif action < 48:
+    elif action < 54:
         world.now += (0.01, 0.1, 1.0)[which % 3]
-    elif action < 50 and programs:
+    elif action < 55 and programs:
         world.kill(programs[which % len(programs)])
-    elif action < 53:
-        revive(world, which)
-    elif action < 54 and world.settings.consumers > 1:
+    elif action < 61:
+        revive(world, which, only_dead=action > 55)
+    elif action < 62 and world.settings.consumers > 1:
         join_or_leave(world, which)
-    elif programs:
+    elif action < 80 and programs:
         programs[which % len(programs)].step(which // 7 % 4)
+    elif programs:
+        program = programs[which % len(programs)]
+        for _ in range(1 + which // 7 % 3):
+            for what in range(4):
+                program.step(what)
 
 
 def join_or_leave(world: World, which: int) -> None:
@@ -513,10 +530,15 @@ def join_or_leave(world: World, which: int) -> None:
         world.leave(name)
 
 
-def revive(world: World, which: int) -> None:
-    """Start a new life of somebody, whether the old one is dead or not."""
+def revive(world: World, which: int, *, only_dead: bool = False) -> None:
+    """Start a new life of somebody, whether the old one is dead or not; if it is not, that one is a zombie from now on.
+
+    Of three lives of one program the oldest dies, else most of the world were zombies.
+    """
     names = [*world.names, "head", "relay"]
     name = names[which % len(names)]
+    if only_dead and world.lives(name):
+        return
     if name == "head":
         world.start_head()
     elif name == "relay":
@@ -524,6 +546,8 @@ def revive(world: World, which: int) -> None:
             world.start_relay()
     elif name in world.joined:
         world.start_sink(name)
+    for program in world.lives(name)[:-2]:
+        world.kill(program)
 
 
 def random_settings(chance: random.Random) -> Settings:
@@ -544,10 +568,12 @@ def random_settings(chance: random.Random) -> Settings:
     )
 
 
-def live(seed: int, steps: int = 300) -> World:
+def live(seed: int, steps: int = 800) -> World:
     """Make a world and let it live by chance; then be kind to it."""
     chance = random.Random(seed)
     world = World(random_settings(chance))
+    if chance.random() < 0.7:
+        world.work()
     for _ in range(chance.randrange(steps)):
         act(world, chance.randrange(ACTIONS), chance.randrange(10_000))
         world.check()
