@@ -9,6 +9,7 @@
     ├── UsageError            a call at the wrong moment (a port outside a run, a second run, ...)
     │   └── NotRunning        the run that the call needs has not begun or is over
     ├── EncodingError         a value that is no data, or data that is no value of the type it should be
+    ├── SharedMemoryError     shared memory that is full, gone, not announced or not to be had here
     ├── FileError             a graph file without a graph, a graph that no file can say; `problems` holds all of it
     ├── TargetError           a TARGET of the command line that cannot be found or imported
     ├── RunError              a run that did not end well
@@ -60,6 +61,7 @@ __all__ = [
     "QueueLimit",
     "QueueOverflow",
     "RunError",
+    "SharedMemoryError",
     "Stalled",
     "TargetError",
     "TeardownError",
@@ -147,6 +149,10 @@ class NotRunning(UsageError):
 
 class EncodingError(HfgError, ValueError):
     """A value that cannot be stored as plain data, or data that is no value of the type it should be."""
+
+
+class SharedMemoryError(HfgError):
+    """Shared memory cannot be made or opened; arrays can still be copied."""
 
 
 class TargetError(HfgError):

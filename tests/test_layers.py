@@ -33,6 +33,7 @@ FLOORS = {
     "hfg.trace": 0,
     "hfg.starting": 0,
     "hfg.ports": 1,
+    "hfg.sharedmemory": 1,
     "hfg.transport": 1,
     "hfg.declaration": 2,
     "hfg.description": 2,

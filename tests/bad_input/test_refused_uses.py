@@ -23,6 +23,7 @@ import hfg
 from hfg import commands
 from hfg.cli import show
 from hfg.encoding import TokenCodec, decode, encode
+from hfg.sharedmemory import Reader, Ring, segment_name, sweep
 from hfg.testing import diagrams, explore, fire, reference_run
 from hfg.trace import TraceEvent
 from tests.cli.conftest import STEPS, Command, command
@@ -470,6 +471,19 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: TokenCodec(int, what='a value for "b.value"').decode(b"\x80\x04", b""),
         'a value for "b.value" was refused on arrival: Expected `array`, got `object`',
     ),
+    "open shared memory of strangers": (
+        lambda: Reader("hfg-a-b-1-c", 1, lambda name: False),
+        "shared memory 'hfg-a-b-1-c' was not announced on this host, so it is not op",
+    ),
+    "a ring of too many slots": (
+        lambda: Ring("hfg-a-b-1-c", 1000, 1),
+        "a ring has 1 to 252 slots of at least one byte",
+    ),
+    "a name that is a path": (
+        lambda: segment_name("lab", "../arm", 1, "image"),
+        '"../arm" cannot be part of the name of shared memory: use up to 48 letters, digits',
+    ),
+    "sweep everything": (lambda: sweep("/"), "'/' is no prefix of names of shared memory of hfg, which begin with"),
     "set a wrong type": (
         running(lambda run, g: run.set(g["count"].ports.parameters["limit"], "x")),
         "parameter \"count.limit\" must be of type int, got 'x'",

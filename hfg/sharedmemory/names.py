@@ -1,0 +1,179 @@
+"""What segments are called, how they are opened, and how those are found whose producer is dead. Stands on errors.
+
+Segments are files in /dev/shm and no more: the standard library's `SharedMemory` has a process of its own that removes
+segments when a process ends that has only read them, and forgets them when all are killed. A producer holds a lock on
+its segment for as long as it lives; the kernel lets go of it, whatever has ended the process. So whoever can lock a
+segment knows that nobody needs it any more.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import re
+import stat
+import sys
+from pathlib import Path
+from typing import Final
+
+from hfg.errors import SharedMemoryError
+
+if sys.platform == "linux":
+    import fcntl
+
+__all__ = ["create", "open_existing", "remove", "segment_name", "segment_prefix", "sweep", "unavailable"]
+
+_FOLDER: Final = Path("/dev/shm")
+_PART: Final = re.compile(r"[A-Za-z0-9_]{1,48}")
+_NAME: Final = re.compile(r"hfg(-[A-Za-z0-9_]{1,48}){4}(\.[0-9]{1,9})?")
+_LARGEST: Final = 2**36
+
+
+def unavailable() -> str | None:
+    """Say why there is no shared memory here, or None if there is."""
+    if sys.platform != "linux":
+        return f"shared memory between processes needs Linux, and this is {sys.platform}: arrays are copied"
+    if not os.access(_FOLDER, os.W_OK):
+        return f"shared memory needs {_FOLDER}, which cannot be written to here: arrays are copied"
+    return None
+
+
+def segment_prefix(realm: str, agent: str, incarnation: int) -> str:
+    """Give how the names of all segments begin that processes of an agent's incarnation make.
+
+    Raises:
+      SharedMemoryError: a part of it has other characters than letters, digits and "_".
+    """
+    return "-".join(["hfg", *(_part(one) for one in (realm, agent, str(incarnation)))]) + "-"
+
+
+def segment_name(realm: str, agent: str, incarnation: int, output: str) -> str:
+    """Give the name of the segment of one output.
+
+    Raises:
+      SharedMemoryError: a part of it has other characters than letters, digits and "_".
+
+    Example:
+      >>> segment_name("robots", "arm", 3, "camera_image")
+      'hfg-robots-arm-3-camera_image'
+    """
+    return segment_prefix(realm, agent, incarnation) + _part(output)
+
+
+def _part(text: str) -> str:
+    if not _PART.fullmatch(text):
+        raise SharedMemoryError(
+            f'"{text:.60}" cannot be part of the name of shared memory: use up to 48 letters, digits and "_"'
+        )
+    return text
+
+
+def _path(name: str) -> Path:
+    if not _NAME.fullmatch(name):
+        raise SharedMemoryError(f"{name!r:.120} is no name of shared memory of hfg, so it is not opened")
+    return _FOLDER / name
+
+
+def create(name: str, size: int) -> int:
+    """Make a segment of zeros that nobody else has, and lock it; give its descriptor.
+
+    Raises:
+      SharedMemoryError: there is one of that name, or no room.
+    """
+    path, why = _path(name), unavailable()
+    if why is not None:
+        raise SharedMemoryError(why)
+    room = os.statvfs(_FOLDER).f_bavail * os.statvfs(_FOLDER).f_frsize
+    if size > min(room, _LARGEST):
+        raise _full(name, size, room)
+    while True:
+        try:
+            file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        except FileExistsError:
+            raise SharedMemoryError(
+                f'there is shared memory named "{name}" already: each output of each incarnation needs its own name; '
+                "sweep what was left behind"
+            ) from None
+        fcntl.flock(file, fcntl.LOCK_EX)  # only who sweeps could hold it, and not for long
+        if os.fstat(file).st_nlink:
+            break
+        os.close(file)  # somebody swept it between the two lines above
+    try:
+        os.posix_fallocate(file, 0, size)  # else a write would kill the process when there is no room
+    except OSError as error:
+        os.close(file)
+        remove(name)
+        if error.errno == errno.ENOSPC:
+            raise _full(name, size, room) from None
+        raise
+    return file
+
+
+def _full(name: str, size: int, room: int) -> SharedMemoryError:
+    return SharedMemoryError(
+        f'shared memory is full: "{name}" needs {size / 1e6:.1f} MB and {_FOLDER} has {room / 1e6:.1f} MB left; use '
+        "fewer or smaller slots, or enlarge it (docker run --shm-size=1g)"
+    )
+
+
+def open_existing(name: str, *, writable: bool) -> tuple[int, int]:
+    """Open a segment of this user's; give its descriptor and size.
+
+    Raises:
+      SharedMemoryError: there is none, or it is another's.
+    """
+    flags = (os.O_RDWR if writable else os.O_RDONLY) | os.O_CLOEXEC | os.O_NOFOLLOW
+    try:
+        file = os.open(_path(name), flags)
+    except OSError as error:
+        reason = os.strerror(error.errno or 0)
+        raise SharedMemoryError(f'shared memory "{name}" cannot be opened ({reason}): its producer has gone') from None
+    found = os.fstat(file)
+    if not stat.S_ISREG(found.st_mode) or found.st_uid != os.geteuid():
+        os.close(file)
+        raise SharedMemoryError(f'shared memory "{name}" belongs to somebody else, so it is not opened')
+    return file, found.st_size
+
+
+def remove(name: str) -> None:
+    """Remove a segment's name; who has mapped it keeps it."""
+    with contextlib.suppress(FileNotFoundError):
+        _path(name).unlink()
+
+
+def sweep(prefix: str = "hfg-") -> list[str]:
+    """Remove the segments whose names begin so and whose producers are dead, however these ended; give the names.
+
+    Args:
+      prefix: what `segment_prefix` gives, or the beginning of it.
+
+    Raises:
+      SharedMemoryError: the prefix is not one of hfg's.
+    """
+    if not prefix.startswith("hfg-"):
+        raise SharedMemoryError(
+            f'{prefix!r:.60} is no prefix of names of shared memory of hfg, which begin with "hfg-"'
+        )
+    if unavailable() is not None:
+        return []
+    names = sorted(one.name for one in _FOLDER.iterdir() if one.name.startswith(prefix) and _NAME.fullmatch(one.name))
+    alive = {name for name in names if "." not in name and _has_producer(name)}
+    swept = [name for name in names if name.partition(".")[0] not in alive]
+    for name in swept:
+        remove(name)
+    return swept
+
+
+def _has_producer(name: str) -> bool:
+    try:
+        file, _ = open_existing(name, writable=False)
+    except SharedMemoryError:
+        return True  # gone meanwhile, or another user's: not ours to remove
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False
