@@ -7,7 +7,7 @@ edges. What this finds nothing for keeps its place with its data. Stands on `doc
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from hfg.files.apex.document import ApexConnection, ApexFile, ApexGraph, ApexNode, ApexParameter
@@ -182,7 +182,7 @@ class _Converting:
             told.differs(rule.differs)
         for one, value in rule.set.items():
             made.parameters[one] = value.format(name=name) if isinstance(value, str) else value
-        made.parameters |= self.sizes(rule, level.ports[node.uuid])
+        made.parameters |= self.sizes(rule, level.ports[node.uuid]) | _shown_sizes(rule, node.parameters)
         lost = {}
         for one, said in node.parameters.items():
             if one in _OF_PORTS or said.kind in _NO_VALUE or said.value is None:
@@ -208,6 +208,8 @@ class _Converting:
 
     def parameter(self, rule: TypeRule, name: str, said: ApexParameter, made: NodeDocument, told: Converted) -> bool:
         """Set a parameter; False if what it says is lost."""
+        if rule.output_of(name) is not None:
+            return True  # what came last; it comes again
         goes = rule.parameter(name)
         if goes is None:
             if name in rule.same and rule.same[name] == said.value:
@@ -380,9 +382,12 @@ class _Converting:
             if ports.doubtful.get(kind):
                 told.differs(f'"{name}" is taken for "{found}", as in files from before automatic ports had numbers')
             return f"{ours}.{found}"
-        return f"{ours}.{self.of_parameter(ports, number)}"
+        return f"{ours}.{self.of_parameter(ports, number, begins)}"
 
-    def of_parameter(self, ports: Ports, name: str) -> str:
+    def of_parameter(self, ports: Ports, name: str, begins: bool) -> str:
+        output = ports.rule.output_of(name)
+        if begins and output is not None:
+            return output
         goes = ports.rule.parameter(name)
         if goes is None or goes.how not in ("same", "float"):
             raise Missing(f'the parameter "{name}" of {ports.rule.type} is no port here')
@@ -435,6 +440,16 @@ def _set(parameters: dict[str, Any], goes: ParameterRule, said: ApexParameter) -
         case "first" | "second":
             pair = parameters.setdefault(goes.to, [1, 1])
             pair[goes.how == "second"] = int(value)
+
+
+def _shown_sizes(rule: TypeRule, names: Iterable[str]) -> dict[str, int]:
+    """How many outputs there are of a kind of which the file has a parameter each."""
+    outputs = [output for name in names if (output := rule.output_of(name)) is not None and output.endswith("]")]
+    found: dict[str, int] = {}
+    for output in outputs:
+        vector, _, number = output.removesuffix("]").partition("[")
+        found[vector] = max(found.get(vector, 0), int(number) + 1)
+    return found
 
 
 def _relayed(inner: _Level, kind: str) -> Iterator[int]:

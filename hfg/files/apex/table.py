@@ -39,6 +39,7 @@ class TypeRule(msgspec.Struct, forbid_unknown_fields=True):
       inputs: the names of its ports in the order of their numbers; so the next three.
       triggers: its trigger parameters in the order of their declaration, and the slots they are here.
       parameters: by their names there, where they go.
+      shown: parameters that show what has come, and the outputs that they are here; {} stands for any number.
       same: parameters without a counterpart, and the value with which that makes no difference.
       set: parameters that are only here; "{name}" is the node's name.
       differs: why the node does not do the same in all cases.
@@ -51,6 +52,7 @@ class TypeRule(msgspec.Struct, forbid_unknown_fields=True):
     events: list[str] = []
     triggers: dict[str, str] = {}
     parameters: dict[str, str | ParameterRule] = {}
+    shown: dict[str, str] = {}
     same: dict[str, Any] = {}
     set: dict[str, Any] = {}
     differs: str = ""
@@ -59,6 +61,15 @@ class TypeRule(msgspec.Struct, forbid_unknown_fields=True):
         """Say where a parameter goes."""
         found = self.parameters.get(name)
         return ParameterRule(found) if isinstance(found, str) else found
+
+    def output_of(self, name: str) -> str | None:
+        """Say which output a parameter is that shows what has come."""
+        for pattern, output in self.shown.items():
+            before, _, behind = pattern.partition("{}")
+            number = name.removeprefix(before).removesuffix(behind) if "{}" in pattern else ""
+            if name == f"{before}{number}{behind}" and number.isdecimal() is ("{}" in pattern):
+                return output.format(number)
+        return None
 
 
 @cache
