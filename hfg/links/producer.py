@@ -336,11 +336,10 @@ class ExactProducer:
         """Forget what is done by all, and see how far the output is free."""
         last = self._next - 1
         peers = self._peers.values()
-        done = min((peer.done for peer in peers), default=last)
-        released = min((max(peer.accepted, peer.done) for peer in peers), default=last) if self._eager else done
-        self._released = (
-            max(self._released, min(released, last)) if not self._inherits else max(self._released, released)
-        )
+        done = released = min([peer.done for peer in peers], default=last)
+        if self._eager:
+            released = min([max(peer.accepted, peer.done) for peer in peers], default=last)
+        self._released = max(self._released, released)  # ahead of what was sent, if a relay comes to it again
         first = self._next - len(self._kept)
         if done >= last:
             self._kept.clear()
