@@ -16,6 +16,7 @@ import msgspec
 
 from hfg.errors import UsageError
 from hfg.links.frames import (
+    LONGEST_NAME,
     OtherVersion,
     Outgoing,
     Probe,
@@ -96,6 +97,8 @@ class ExactConsumer:
     ) -> None:
         if incarnation < 1 or capacity < 1:
             raise UsageError(f"a link needs incarnation >= 1 and capacity >= 1, got {incarnation}, {capacity}")
+        if not 0 < len(name) <= LONGEST_NAME:
+            raise UsageError(f"a consumer's name has 1 to {LONGEST_NAME} characters, got {len(name)}")
         self.name = name
         self.incarnation = incarnation
         self.counts = ConsumerCounts()

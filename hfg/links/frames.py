@@ -16,6 +16,7 @@ from hfg.transport import Buffer, EncodedToken
 
 __all__ = [
     "LONGEST_METADATA",
+    "LONGEST_NAME",
     "MOST_TOKENS",
     "VERSION",
     "FromConsumer",
@@ -38,12 +39,13 @@ MOST_TOKENS: Final = 1024
 """Tokens of one datagram."""
 LONGEST_METADATA: Final = 4096
 """Bytes of what is small about a token."""
+LONGEST_NAME: Final = 512
+"""Characters of a consumer's name."""
 _LARGEST: Final = 2**62  # so that sums of two stay in 64 bits, whoever reads them
-_LONGEST_NAME: Final = 512
 _TAG: Final = VERSION * 16  # the lower four bits say what it is
 
 Number: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=_LARGEST)]
-Name: TypeAlias = Annotated[str, msgspec.Meta(max_length=_LONGEST_NAME)]
+Name: TypeAlias = Annotated[str, msgspec.Meta(max_length=LONGEST_NAME)]
 Metadata: TypeAlias = Annotated[bytes, msgspec.Meta(max_length=LONGEST_METADATA)]
 
 

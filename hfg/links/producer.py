@@ -19,6 +19,7 @@ import msgspec
 from hfg.errors import MessageTooLarge, UsageError
 from hfg.links.frames import (
     LONGEST_METADATA,
+    LONGEST_NAME,
     OtherVersion,
     Outgoing,
     Probe,
@@ -237,6 +238,8 @@ class ExactProducer:
         """
         peer = self._peers.get(consumer)
         if peer is None:
+            if not 0 < len(consumer) <= LONGEST_NAME:
+                raise UsageError(f"a consumer's name has 1 to {LONGEST_NAME} characters, got {len(consumer)}")
             last = self._next - 1
             done = last if after is None else min(max(after, last - len(self._kept)), last)
             peer = self._peers[consumer] = Peer(consumer, done, self._probe_s)

@@ -19,7 +19,7 @@ from hfg.links.bounded import BoundedConsumer, BoundedProducer
 from hfg.links.consumer import ExactConsumer
 from hfg.links.frames import Outgoing
 from hfg.links.producer import ExactProducer
-from hfg.transport import Closing, Delivery, EncodedToken, Message, Position, Publisher, Session, Traffic
+from hfg.transport import Buffer, Closing, Delivery, EncodedToken, Message, Position, Publisher, Session, Traffic
 
 __all__ = ["BoundedReceiver", "BoundedSender", "LinkReceiver", "LinkSender"]
 
@@ -37,6 +37,15 @@ def _to_one(name: str, consumer: str) -> str:
 
 def _back(name: str) -> str:
     return f"{name}/back"
+
+
+def _put(publisher: Publisher, header: bytes, payload: Buffer) -> bool:
+    """Put it; False if the session has been closed before its links, or under them."""
+    try:
+        publisher.put(header, payload)
+    except TransportError:
+        return False
+    return True
 
 
 class _Batch:
@@ -102,6 +111,8 @@ class LinkSender:
 
     def send_nowait(self, token: EncodedToken, position: Position | None = None) -> int:
         """Take the next token; see `OutgoingLink`."""
+        if self._closed:
+            raise TransportError(f'link "{self.name}" is closed')
         machine = self.machine
         number = machine.send(token, position)
         if not machine.free:
@@ -158,9 +169,9 @@ class LinkSender:
 
     def admit(self, consumer: str, incarnation: int | None = None, *, after: int | None = None) -> None:
         """Let a consumer take part; see `ExactProducer.admit`."""
+        self.machine.admit(consumer, incarnation, after=after)
         if consumer not in self._one:
             self._one[consumer] = self._session.publisher(_to_one(self.name, consumer), Traffic.TOKENS)
-        self.machine.admit(consumer, incarnation, after=after)
         self._batch.ask()
 
     def dismiss(self, consumer: str) -> None:
@@ -186,14 +197,7 @@ class LinkSender:
             return
         self._flush()
         self._put(self.machine.close(over=over))
-        self._closed = True
-        if self._timer is not None:
-            self._timer.cancel()
-        self._subscription.close()
-        for publisher in (self._all, *self._one.values()):
-            publisher.close()
-        while self._waiting:
-            self._wake()
+        self._stop()
 
     def _receive(self, messages: list[Message]) -> None:
         receive = self.machine.receive
@@ -237,8 +241,20 @@ class LinkSender:
     def _put(self, out: list[Outgoing]) -> None:
         for to, header, payload in out:
             publisher = self._all if to is None else self._one.get(to)
-            if publisher is not None:
-                publisher.put(header, payload)
+            if publisher is not None and not _put(publisher, header, payload):
+                self._stop()
+                return
+
+    def _stop(self) -> None:
+        """Nothing goes in or out any more."""
+        self._closed = True
+        if self._timer is not None:
+            self._timer.cancel()
+        self._subscription.close()
+        for publisher in (self._all, *self._one.values()):
+            publisher.close()
+        while self._waiting:
+            self._wake()
 
 
 class _Receiver:
@@ -389,7 +405,7 @@ class LinkReceiver(_Receiver):
     def _flush(self) -> None:
         if not self._closed:
             for _, header, payload in self.machine.flush():
-                self._back.put(header, payload)
+                _put(self._back, header, payload)
 
 
 class BoundedSender:
@@ -433,7 +449,7 @@ class BoundedSender:
     def _flush(self) -> None:
         if not self._closed:
             for _, header, payload in self.machine.flush():
-                self._publisher.put(header, payload)
+                _put(self._publisher, header, payload)
 
 
 class BoundedReceiver(_Receiver):

@@ -459,6 +459,14 @@ def test_numbers_that_cannot_be_are_refused(make: Any) -> None:
         make()
 
 
+def test_a_name_that_no_frame_can_say_is_refused() -> None:
+    for name in ("", "a" * 513):
+        with pytest.raises(UsageError, match="a consumer's name has 1 to 512 characters"):
+            ExactProducer(1).admit(name)
+        with pytest.raises(UsageError, match="a consumer's name has 1 to 512 characters"):
+            ExactConsumer(name, 1)
+
+
 def test_more_cannot_be_done_than_was_taken() -> None:
     producer, consumer = pair()
     producer.send(token("x"))

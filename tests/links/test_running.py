@@ -245,6 +245,30 @@ def test_a_link_that_is_closed_lets_nobody_wait() -> None:
     virtually(scenario)
 
 
+def test_a_session_that_ends_under_its_links_ends_them(caplog: pytest.LogCaptureFixture) -> None:
+    async def scenario(one: MemorySession, other: MemorySession) -> None:
+        sender, receiver = ends(one, other, window=1)
+        bounded = BoundedSender(one, "bounded", epoch=1)
+        bounded.send_nowait((b"", b"x"))
+        await sender.send((b"", b"x"))
+        waiting = asyncio.create_task(sender.send((b"", b"y")))
+        await asyncio.sleep(0.01)
+        one.die()
+        other.die()
+        with pytest.raises(TransportError, match='link "link" is closed'):
+            await waiting
+        with pytest.raises(TransportError, match='link "link" is closed'):
+            sender.send_nowait((b"", b"z"))
+        await receiver.take()
+        receiver.done()
+        await sender.close()
+        await receiver.close()
+        await bounded.close()
+
+    virtually(scenario)
+    assert not caplog.records
+
+
 def test_a_receiver_that_waits_is_awakened_by_its_end() -> None:
     async def scenario(one: MemorySession, other: MemorySession) -> None:
         _, receiver = ends(one, other)

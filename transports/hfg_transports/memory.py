@@ -74,7 +74,7 @@ class Network:
         lease_s: float = 1.0,
         largest_message: int = 2**26,
     ) -> None:
-        self.faults = faults or Faults()
+        self.faults = faults or _NONE
         self.lost = 0
         self.overrun = 0
         self.largest_message = largest_message
