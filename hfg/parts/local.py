@@ -87,8 +87,9 @@ class LocalParts:
         for worker in main.engine.core.readers:
             outside.collect(main.engine, worker, main.outputs.setdefault(worker.port_name, []))
         try:
-            for part in self.parts.values():
-                await part.composition.lifetime.start()
+            went_well = [await part.composition.lifetime.set_up() for part in self.parts.values()]
+            for part in self.parts.values() if all(went_well) else ():
+                part.composition.lifetime.begin()
             for part in self.parts.values():
                 await part.engine.ending.wait()
         finally:
@@ -117,15 +118,15 @@ class _Link:
         bare = [(token.value, token.activity, token.stamp) for token in tokens]
         self._loop.call_soon(self._target.receive, self._edge.label, bare)
 
-    def speaks(self, speaking: bool) -> None:
+    def speaks(self, speaking: bool, total: int) -> None:
         """See `Outgoing`."""
-        self._loop.call_soon(self._target.speak, self._edge.label, speaking)
+        self._loop.call_soon(self._target.speak, self._edge.label, speaking, total)
 
-    def hears(self, hearing: Hearing) -> None:
+    def hears(self, hearing: Hearing, total: int) -> None:
         """See `Incoming`."""
-        self._loop.call_soon(self._source.hear, self._edge.label, hearing)
+        self._loop.call_soon(self._source.hear, self._edge.label, hearing, total)
 
-    def taken(self, count: int) -> None:
+    def taken(self, total: int) -> None:
         """See `Incoming`."""
         if self._edge.guarantee == "exact":
-            self._loop.call_soon(self._source.be_taken, self._edge.label, count)
+            self._loop.call_soon(self._source.be_taken, self._edge.label, total)

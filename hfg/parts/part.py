@@ -33,18 +33,18 @@ class Outgoing(Protocol):
     def send(self, tokens: list[Token[Any]]) -> None:
         """Take tokens, oldest first, no more than there is room for."""
 
-    def speaks(self, speaking: bool) -> None:
-        """Say, behind what was sent, whether the producer is enabled from now on."""
+    def speaks(self, speaking: bool, total: int) -> None:
+        """Say that the producer is enabled from now on, or not, behind so many tokens."""
 
 
 class Incoming(Protocol):
     """The link before an edge that comes into it."""
 
-    def taken(self, count: int) -> None:
-        """So many more tokens were taken, and what came of them in this part is done."""
+    def taken(self, total: int) -> None:
+        """So many tokens were taken until now, and what came of them in this part is done."""
 
-    def hears(self, hearing: Hearing) -> None:
-        """What the consumer does with tokens from now on; what it has taken until then was told before."""
+    def hears(self, hearing: Hearing, total: int) -> None:
+        """What the consumer does with tokens from now on, when it has taken so many."""
 
 
 class Part:
@@ -91,6 +91,7 @@ class Part:
         self._incoming: dict[str, Incoming] = {}
         self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
         self._speaking = dict.fromkeys(self.outlets, True)
+        self._said: list[tuple[str, bool, int]] = []
         self._leaving = False
         engine.agreement = self._nothing_moves
         engine.callbacks.pumped.append(self._pumped)
@@ -114,23 +115,37 @@ class Part:
             inlet.arrive(value, activity, stamp)
         self._is_at_rest = False
         inlet.lay()
+        if self._said:
+            self._listen()
         self.engine.kick()
 
-    def be_taken(self, label: str, count: int) -> None:
-        """So many more tokens that have left were taken."""
+    def be_taken(self, label: str, total: int) -> None:
+        """So many of the tokens that have left were taken until now."""
         self._is_at_rest = False
-        self.outlets[label].be_taken(count)
+        self.outlets[label].be_taken(total)
         self.send()
 
-    def speak(self, label: str, speaking: bool) -> None:
-        """The producer of an edge that comes in was disabled or enabled."""
+    def speak(self, label: str, speaking: bool, total: int) -> None:
+        """The producer of an edge that comes in was disabled or enabled, behind so many tokens."""
         self._is_at_rest = False
-        self.inlets[label].speak(speaking)
-        self.inlets[label].lay()
+        self._said.append((label, speaking, total))
+        self._listen()
 
-    def hear(self, label: str, hearing: Hearing) -> None:
-        """The consumer of an edge that leaves does otherwise with tokens from now on."""
+    def _listen(self) -> None:
+        """What was said behind tokens holds when those are here."""
+        waiting = []
+        for label, speaking, total in self._said:
+            if self.inlets[label].received < total:
+                waiting.append((label, speaking, total))
+                continue
+            self.inlets[label].speak(speaking)
+            self.inlets[label].lay()
+        self._said = waiting
+
+    def hear(self, label: str, hearing: Hearing, total: int) -> None:
+        """The consumer of an edge that leaves does otherwise with tokens, from when it has taken so many."""
         self._is_at_rest = False
+        self.outlets[label].be_taken(total)
         self.outlets[label].hear(hearing)
         self.send()
 
@@ -144,14 +159,14 @@ class Part:
             link = self._outgoing[label]
             if outlet.speaking != self._speaking[label]:
                 self._speaking[label] = outlet.speaking
-                link.speaks(outlet.speaking)
+                link.speaks(outlet.speaking, outlet.sent)
             if outlet.has_more:
                 tokens = outlet.leave(link.room())
                 if tokens:
                     link.send(tokens)
 
-    def _moved(self, inlet: Inlet, count: int) -> None:
-        self._incoming[inlet.label].taken(count)
+    def _moved(self, inlet: Inlet) -> None:
+        self._incoming[inlet.label].taken(inlet.taken)
 
     def _wake(self) -> None:
         """Something lies before an outlet: it leaves when the engine is done with what it does now."""
@@ -171,7 +186,7 @@ class Part:
             hearing = inlet.hearing
             if hearing != self._hearing[label]:
                 self._hearing[label] = hearing
-                self._incoming[label].hears(hearing)
+                self._incoming[label].hears(hearing, inlet.taken)
             inlet.lay()
         self.send()
 

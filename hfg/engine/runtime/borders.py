@@ -92,9 +92,12 @@ class Outlet:
         """Whether something lies here that has not left."""
         return bool(self._edge.untaken > self._waiting)
 
-    def be_taken(self, count: int) -> None:
-        """So many more were taken by the consumer: their places are free (F5, F8)."""
-        self.taken += count
+    def be_taken(self, total: int) -> None:
+        """So many in all were taken by the consumer: their places are free (F5, F8)."""
+        count = total - self.taken
+        if count <= 0:
+            return
+        self.taken = total
         self._waiting = min(self._waiting, self._edge.untaken)  # what a disabled producer took back is gone (F10)
         for _ in range(min(count, self._waiting)):
             self._waiting -= 1
@@ -133,13 +136,13 @@ class Inlet:
       speaking: whether their producer is enabled, as far as is known here.
     """
 
-    def __init__(self, engine: Engine, worker: Worker, moved: Callable[[Inlet, int], None]) -> None:
+    def __init__(self, engine: Engine, worker: Worker, moved: Callable[[Inlet], None]) -> None:
         """Stand there.
 
         Args:
           engine: of the part.
           worker: stands for the source of the edge.
-          moved: called when `taken` has grown, with by how much.
+          moved: called when `taken` has grown.
         """
         self._engine = engine
         self._worker = worker
@@ -210,10 +213,9 @@ class Inlet:
         self._engine.soon(self.lay)
 
     def _count(self, taken: int) -> None:
-        more = taken - self.taken
-        if more > 0:
+        if taken > self.taken:
             self.taken = taken
-            self._moved(self, more)
+            self._moved(self)
 
     @property
     def hearing(self) -> Hearing:

@@ -62,13 +62,21 @@ class Lifetime:
 
     async def start(self) -> None:
         """Set up all nodes, trigger `start`, then let the sources go (A10)."""
+        if await self.set_up():
+            self.begin()
+
+    async def set_up(self) -> bool:
+        """Set up all nodes; whether all went well. Else the run is over."""
         engine = self._engine
-        core = engine.core
         engine.begin()
         self._lost = LostTasks.notice(engine.loop, self._asking)
-        self._watch = watchdog.watch(core, engine.settings.block_warning_s, virtual=engine.virtual)
-        if not await self._set_up_all(core):
-            return
+        self._watch = watchdog.watch(engine.core, engine.settings.block_warning_s, virtual=engine.virtual)
+        return await self._set_up_all(engine.core)
+
+    def begin(self) -> None:
+        """All are set up: trigger `start`, then let the sources go."""
+        engine = self._engine
+        core = engine.core
         if engine.settings.until_s is not None:
             engine.loop.call_at(engine.loop.time() + engine.settings.until_s, self._until)
         engine.moving_since = engine.now()
