@@ -1,0 +1,198 @@
+"""What the parts of a run tell each other beside tokens, in order and without loss; and how.
+
+    Whole -> part     Open, Begin, Question, Finish, Call, Close
+    Part  -> whole    Opened, Rest, Answer, Ended, Result, Closed
+    Part  -> part     Speaks, Hears
+
+All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, TypeAlias
+
+import msgspec
+
+from hfg.engine.observing.report import EdgeReport, NodeReport
+from hfg.parts.agreement import Answer, Question, Rest
+
+__all__ = [
+    "Begin",
+    "Call",
+    "Close",
+    "Closed",
+    "Ended",
+    "Failed",
+    "Finish",
+    "Hears",
+    "Message",
+    "Open",
+    "Opened",
+    "Result",
+    "Speaks",
+    "pack",
+    "unpack",
+]
+
+
+class Failed(msgspec.Struct, frozen=True):
+    """What went wrong in a part, as far as it can be told elsewhere.
+
+    Attributes:
+      kind: the class of the error in `hfg.errors`.
+      text: its sentence.
+      path: of the node, if one failed; "" else.
+      what: where in its life it failed.
+      trace: the user's frames, as text.
+    """
+
+    kind: str
+    text: str
+    path: str = ""
+    what: str = ""
+    trace: str = ""
+
+
+class Open(msgspec.Struct, frozen=True, tag=True):
+    """Make the part and set it up.
+
+    Attributes:
+      graph: the text of a graph file: the whole graph, of which it makes its part.
+      options: of the run, as `hfg.run` takes them.
+      incarnations: which life of each part this is for.
+      allow: packages whose node types may be imported.
+    """
+
+    graph: str
+    options: dict[str, Any]
+    incarnations: dict[str, int]
+    allow: list[str]
+
+
+class Opened(msgspec.Struct, frozen=True, tag=True):
+    """All nodes of the part are set up, or not."""
+
+    part: str
+    failed: Failed | None = None
+
+
+class Begin(msgspec.Struct, frozen=True, tag=True):
+    """All parts are set up: go."""
+
+
+class Ask(msgspec.Struct, frozen=True, tag=True):
+    """Something that follows from quiet."""
+
+    question: Question
+
+
+class Told(msgspec.Struct, frozen=True, tag=True):
+    """What a part has answered to it."""
+
+    answer: Answer
+
+
+class Rests(msgspec.Struct, frozen=True, tag=True):
+    """Nothing moves in a part."""
+
+    rest: Rest
+
+
+class Finish(msgspec.Struct, frozen=True, tag=True):
+    """The run is over."""
+
+    outcome: str
+
+
+class Ended(msgspec.Struct, frozen=True, tag=True):
+    """The run is over in a part."""
+
+    part: str
+    outcome: str
+    failed: Failed | None = None
+
+
+class Call(msgspec.Struct, frozen=True, tag=True):
+    """Do something with the part that somebody outside has asked for.
+
+    Attributes:
+      number: of the call.
+      verb: which of the methods that `worker` has for it.
+      arguments: by name.
+    """
+
+    number: int
+    verb: str
+    arguments: dict[str, Any]
+
+
+class Result(msgspec.Struct, frozen=True, tag=True):
+    """What came of it."""
+
+    number: int
+    value: Any = None
+    failed: Failed | None = None
+
+
+class Close(msgspec.Struct, frozen=True, tag=True):
+    """Tear down, report, and go."""
+
+
+class Closed(msgspec.Struct, frozen=True, tag=True):
+    """The part is torn down.
+
+    Attributes:
+      part: its name.
+      nodes: what its nodes have done, by path.
+      edges: what was on its edges, by label; those to other parts have a half on each side.
+      errors: failures that did not end the run.
+      lost_activity: see `Report`.
+      failed: what its teardown failed with.
+    """
+
+    part: str
+    nodes: dict[str, NodeReport]
+    edges: dict[str, EdgeReport]
+    errors: list[str]
+    lost_activity: int
+    failed: Failed | None = None
+
+
+class Speaks(msgspec.Struct, frozen=True, tag=True):
+    """The producer of an edge is enabled from now on, or not, behind so many tokens."""
+
+    label: str
+    speaking: bool
+    total: int
+
+
+class Hears(msgspec.Struct, frozen=True, tag=True):
+    """What the consumer of an edge does with tokens from now on, having taken so many."""
+
+    label: str
+    hearing: str
+    total: int
+
+
+Message: TypeAlias = (
+    Open
+    | Opened
+    | Begin
+    | Ask
+    | Told
+    | Rests
+    | Finish
+    | Ended
+    | Call
+    | Result
+    | Close
+    | Closed
+    | Speaks
+    | Hears
+)
+
+pack: Final = msgspec.msgpack.Encoder().encode
+"""Make bytes of a message."""
+
+unpack: Final = msgspec.msgpack.Decoder(Message).decode
+"""Make a message of bytes; raises `msgspec.DecodeError` for what is none."""
