@@ -5,9 +5,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from hfg.engine import Run
+from hfg.engine.face.composition import Composition
+from hfg.graph import Graph
+from hfg.graph.flat import FlatGraph
+
+if TYPE_CHECKING:
+    from hfg.parts.distribution import Distribution
 
 __all__: list[str] = []
 
@@ -19,4 +26,12 @@ def _record(*arguments: Any, **options: Any) -> Any:
     return record(*arguments, **options)
 
 
+def _distribute(graph: Graph, flat: FlatGraph, options: Mapping[str, Any], virtual: bool) -> Distribution:
+    """Stand behind `Composition.distribute`; who has no processes imports nothing of what they need."""
+    from hfg.parts.distribution import distribute
+
+    return distribute(graph, flat, options, virtual=virtual)
+
+
+Composition.distribute = staticmethod(_distribute)
 Run._recorder = staticmethod(_record)

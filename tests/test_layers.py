@@ -70,6 +70,7 @@ SAME_FLOOR_PAIRS = {
     ("hfg.testing", "hfg"),
     ("hfg.nodes", "hfg.recording"),  # a family of it is made there
     ("hfg.files", "hfg.catalogue"),  # which packages a graph file may name
+    ("hfg.parts", "hfg.files"),  # a graph goes to another process as the text of a file
 }
 # The wings of a floor, in the same way: a module imports what lies in its own wing or in a lower one.
 WINGS = {

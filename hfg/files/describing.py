@@ -51,12 +51,13 @@ _PLAIN_NODE: Final = NodeOptions()
 _OF_BUILT: Final = ("enabled", "group")  # what may be said about a node that a type has built
 
 
-def describe(graph: Graph, beside: Path | None = None) -> Document:
+def describe(graph: Graph, beside: Path | None = None, *, same_program: bool = False) -> Document:
     """Make a document of a whole graph.
 
     Args:
       graph: that is told.
       beside: the file that it is written to: included files are named from its folder.
+      same_program: it is for another process of the same program, which has its types too.
 
     Raises:
       FileError: something cannot be said; `problems` holds every finding.
@@ -68,15 +69,16 @@ def describe(graph: Graph, beside: Path | None = None) -> Document:
             f'{level.title} is saved with the whole graph: save graph "{level.whole.root.name}", or describe the '
             "subgraph in a file of its own"
         )
-    telling = _Telling(level, beside)
+    telling = _Telling(level, beside, same_program)
     document = telling.document()
     telling.findings.reject(f'graph "{graph.name}" cannot be said in a file')
     return document
 
 
 class _Telling:
-    def __init__(self, root: Level, beside: Path | None) -> None:
+    def __init__(self, root: Level, beside: Path | None, same_program: bool) -> None:
         self.root = root
+        self.same_program = same_program
         self.beside = None if beside is None else beside.resolve()
         self.findings = Findings()
         self.gates = {gate.target: gate for level in root.walk() for gate in level.gates}
@@ -154,7 +156,7 @@ class _Telling:
                 node.place.path,
                 f"its type {node._type.qualname} cannot be found by name; define it at the top of a module",
             )
-        elif reference.startswith(("__main__:", "hfg_target_")):
+        elif reference.startswith(("__main__:", "hfg_target_")) and not self.same_program:
             self.wrong(
                 node.place.path,
                 f"its type {node._type.qualname} is in the program itself, where no other program finds it; move it to "

@@ -17,7 +17,7 @@ from hfg.encoding import TokenCodec
 from hfg.engine.runtime.borders import Hearing
 from hfg.errors import EncodingError, RunError, TransportError
 from hfg.graph.flat import CutEdge
-from hfg.links import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
+from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
 from hfg.parts.messages import Hears, Message, Speaks, pack, unpack
 from hfg.parts.part import Part
 from hfg.token import Token
@@ -62,9 +62,7 @@ class Channel:
         one, other = name_of(here), name_of(there)
         self._receive = receive
         self._waiting: list[Message] = []
-        self._out = LinkSender(
-            session, f"{run}/{one}/{other}", epoch=lives[0], window=_WINDOW, released=self._send
-        )
+        self._out = LinkSender(session, f"{run}/{one}/{other}", epoch=lives[0], window=_WINDOW, released=self._send)
         self._out.admit(other, lives[1])
         self._in = LinkReceiver(
             session, f"{run}/{other}/{one}", consumer=one, incarnation=lives[0], arrived=self._arrived
@@ -184,7 +182,9 @@ class _Outgoing:
             for token in tokens:
                 self._sender.send_nowait(self._codec.encode(token))
         except (EncodingError, TransportError) as error:
-            problem = RunError(f'edge "{self._edge.label}" cannot carry a value to {name_of(self._edge.target)}: {error}')
+            problem = RunError(
+                f'edge "{self._edge.label}" cannot carry a value to {name_of(self._edge.target)}: {error}'
+            )
             problem.__cause__ = error
             self._part.finish("failed", problem)
 

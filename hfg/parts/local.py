@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 from hfg.engine.face import outside
+from hfg.engine.face.composition import Composition
 from hfg.engine.observing.report import Report
 from hfg.engine.runtime.borders import Hearing
 from hfg.engine.runtime.settings import Settings
@@ -51,8 +52,8 @@ class LocalParts:
         self._ended: tuple[str, HfgError | None] | None = None
         for name in self.cutting.parts:
             again: Cutting = cut(flatten(build()))
-            edges = list(again.edges_of(name))
-            part = self.parts[name] = Part(name, again.parts[name], make_settings(name), edges, rests=self._rest)
+            composition = Composition(again.parts[name], make_settings(name))
+            part = self.parts[name] = Part(name, composition, again.edges_of(name), rests=self._rest)
             part.engine.callbacks.finished.append(partial(self._part_ended, part))
         for edge in self.cutting.edges:
             self._link(edge)

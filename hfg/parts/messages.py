@@ -175,20 +175,7 @@ class Hears(msgspec.Struct, frozen=True, tag=True):
 
 
 Message: TypeAlias = (
-    Open
-    | Opened
-    | Begin
-    | Ask
-    | Told
-    | Rests
-    | Finish
-    | Ended
-    | Call
-    | Result
-    | Close
-    | Closed
-    | Speaks
-    | Hears
+    Open | Opened | Begin | Ask | Told | Rests | Finish | Ended | Call | Result | Close | Closed | Speaks | Hears
 )
 
 pack: Final = msgspec.msgpack.Encoder().encode

@@ -7,16 +7,15 @@ processes. Stands on the engine and `agreement`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from hfg.engine.face.composition import Composition
 from hfg.engine.rules import quiet
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
-from hfg.engine.runtime.settings import Settings
 from hfg.errors import EngineInternalError, HfgError
-from hfg.graph.flat import CutEdge, FlatGraph
+from hfg.graph.flat import CutEdge
 from hfg.parts.agreement import Answer, Question, Rest
 from hfg.ports.edges import EventEdge
 from hfg.token import Token
@@ -58,9 +57,8 @@ class Part:
     def __init__(
         self,
         name: str,
-        flat: FlatGraph,
-        settings: Settings,
-        edges: list[CutEdge],
+        composition: Composition,
+        edges: Iterable[CutEdge],
         *,
         rests: Callable[[Rest], None],
     ) -> None:
@@ -68,13 +66,12 @@ class Part:
 
         Args:
           name: of its group.
-          flat: what is in it.
-          settings: of the run.
+          composition: its engine, not begun yet, and what stands on that.
           edges: those between it and other parts.
           rests: told when nothing moves in it any more.
         """
         self.name = name
-        self.composition = Composition(flat, settings)
+        self.composition = composition
         self._rests = rests
         self._numbered = 0
         self._is_at_rest = False

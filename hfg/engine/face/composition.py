@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Protocol
 
 from hfg.engine.editing.edits import Edits
 from hfg.engine.editing.pausing import Pausing
@@ -14,10 +15,43 @@ from hfg.engine.observing.taps import Taps
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.lifetime import Lifetime
 from hfg.engine.runtime.settings import Settings
-from hfg.errors import RunError
+from hfg.errors import HfgError, RunError
+from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
 
-__all__ = ["Composition"]
+__all__ = ["Composition", "Others"]
+
+
+class Others(Protocol):
+    """The other parts of a graph that is cut for processes (rule L1); made above, where processes are known.
+
+    Attributes:
+      flat: what is left for this one.
+    """
+
+    flat: FlatGraph
+
+    def take(self, composition: Composition) -> None:
+        """Here is the engine of the main part."""
+
+    async def open(self) -> None:
+        """Begin the other parts and set them up.
+
+        Raises:
+          HfgError: one of them cannot be.
+        """
+
+    def begin(self) -> None:
+        """All are set up: let them go."""
+
+    async def close(self) -> None:
+        """Tear them down; nothing is left of them."""
+
+    def failure(self) -> HfgError | None:
+        """Give what their teardown has failed with."""
+
+    def whole(self, report: Report) -> Report:
+        """Put the report of the main part and theirs together."""
 
 
 class Composition:
@@ -29,10 +63,13 @@ class Composition:
       outputs: what came out of the graph's own outputs, where nobody reads them.
     """
 
-    def __init__(self, flat: FlatGraph, settings: Settings) -> None:
+    distribute: ClassVar[Callable[[Graph, FlatGraph, Mapping[str, Any], bool], Others]]  # see `hfg.composing`
+
+    def __init__(self, flat: FlatGraph, settings: Settings, others: Others | None = None) -> None:
+        self.others = others
         self.engine = engine = Engine(flat, settings)
         self.consumers = Consumers(engine)
-        self.lifetime = Lifetime(engine, last=self.consumers.end)
+        self.lifetime = Lifetime(engine, last=self._last)
         self.taps = Taps(engine)
         self.pausing = Pausing(engine, self.consumers)
         self.edits = Edits(engine, self.lifetime)
@@ -42,6 +79,32 @@ class Composition:
         self._done: asyncio.Future[None] | None = None
         if settings.trace is not None:
             self.consumers.add(settings.trace)
+        if others is not None:
+            others.take(self)
+
+    async def start(self) -> None:
+        """Set up all nodes, in whatever process, and let them go (A10)."""
+        others, lifetime = self.others, self.lifetime
+        if others is None:
+            await lifetime.start()
+        elif await lifetime.set_up():
+            try:
+                await others.open()
+            except HfgError as error:
+                self.engine.finish("failed", error)
+            if self.engine.ended_how is None:
+                others.begin()
+                lifetime.begin()
+
+    async def _last(self) -> None:
+        """When all else is over."""
+        others = self.others
+        if others is not None:
+            await others.close()
+            failure = others.failure()
+            if failure is not None and self.engine.error is None:
+                self.engine.ended_how = ("failed", failure)
+        await self.consumers.end()
 
     @property
     def measuring(self) -> Measuring:
@@ -100,7 +163,7 @@ class Composition:
         """See `Run.report`."""
         engine = self.engine
         nodes = node_reports(engine.core)
-        return Report(
+        report = Report(
             outcome=engine.outcome,
             duration_s=engine.elapsed(),
             firings=sum(node.firings for node in nodes.values()),
@@ -110,3 +173,4 @@ class Composition:
             errors=[str(error) for error in engine.core.errors],
             lost_activity=engine.core.lost_activity,
         )
+        return report if self.others is None else self.others.whole(report)

@@ -95,7 +95,11 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
             _GRAPH.warning('"%s": %s: %s; %s', problem.path, problem.what, problem.why, problem.remedy)
     if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
         _refuse_endless(flat)
-    parts = Composition(flat, settings)
+    others = None
+    if any(group.process for group in flat.groups.values()):
+        said = {name: getattr(settings, name) for name in ("debug", "policy", "seed", "fast", "block_warning_s")}
+        others = Composition.distribute(graph, flat, said, isinstance(loop, VirtualTimeLoop))
+    parts = Composition(flat if others is None else others.flat, settings, others)
     run = Run(graph, parts)
     level.whole.begin_run(run)
     return run, parts
@@ -162,7 +166,7 @@ async def _run_to_end(
                         _need_begin(answer)
                 if settings.allow_idle:
                     engine.hold()
-                await lifetime.start()
+                await parts.start()
                 await engine.ending.wait()
             finally:
                 await lifetime.close()
@@ -300,7 +304,7 @@ async def _running(graph: Graph, clock: Clock | None, options: RunOptions) -> As
     try:
         parts.stay_open()
         async with watched(run, settings.watch):
-            await parts.lifetime.start()
+            await parts.start()
             if engine.error is None:
                 guard.begin(graph.name)
                 yield run

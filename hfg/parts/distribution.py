@@ -1,0 +1,409 @@
+"""A run whose graph is cut: the main part here, the others wherever a launcher has begun them (rules L1 to L3, R5).
+
+It begins the others, sets them up together with its own, lets all go at one moment, sees to it that they agree on what
+follows from quiet, and ends them with the run. Stands on `worker`'s side of the conversation, `channels`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import uuid
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Protocol
+
+import msgspec
+
+from hfg.encoding import wire_problem
+from hfg.engine.face.composition import Composition
+from hfg.engine.observing.report import EdgeReport, Report
+from hfg.errors import CheckFailed, HfgError, RunError
+from hfg.graph import Graph
+from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph, cut
+from hfg.logs import Log
+from hfg.parts.agreement import Agreement, Question, Rest
+from hfg.parts.channels import Carrier, Channel, name_of
+from hfg.parts.failing import as_error
+from hfg.parts.messages import (
+    Ask,
+    Begin,
+    Close,
+    Closed,
+    Ended,
+    Failed,
+    Finish,
+    Hears,
+    Message,
+    Open,
+    Opened,
+    Rests,
+    Speaks,
+    Told,
+)
+from hfg.parts.part import Part
+from hfg.problem import Problem
+from hfg.transport import Session
+
+__all__ = ["Distribution", "Launched", "Launcher", "check_types", "distribute"]
+
+_LOGGER = Log("hfg.parts")
+_FIRST_LIFE = 1
+_LEAVING_S = 7.0  # how long the others may take to tear down; one node may take five (X3)
+
+
+class Launched(Protocol):
+    """One other part, wherever it runs."""
+
+    async def wait(self) -> str:
+        """Wait until it is gone; give a sentence about how, as in 'process 1234 was killed by SIGKILL'."""
+
+    async def end(self) -> None:
+        """See to it that it is gone, whatever it does."""
+
+
+class Launcher(Protocol):
+    """Begins the other parts, and gives the session over which they are spoken to."""
+
+    async def open(self) -> Session:
+        """Give the session of the main part."""
+
+    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Launched:
+        """Begin a part, which then serves (see `worker`).
+
+        Args:
+          run: by which name all parts know the run.
+          part: its name.
+          host: where; "" is here.
+          lives: which life this is of it, and which of the main part.
+
+        Raises:
+          HfgError: it cannot be begun; nothing is left of it.
+        """
+
+    async def close(self) -> None:
+        """End the session, and whatever else was begun."""
+
+
+def check_types(cutting: Cutting) -> list[Problem]:
+    """Find edges between parts whose values cannot cross (rule L4)."""
+    found = []
+    for edge in cutting.edges:
+        reason = wire_problem(edge.hint)
+        if reason is not None:
+            found.append(
+                Problem(
+                    path=edge.edge.source.port.path,
+                    severity="error",
+                    what=f'its values cannot cross to {name_of(edge.target)} over "{edge.label}": {reason}',
+                    why="between processes values are data of a declared type (rule L4)",
+                    remedy="declare the type of the port, or let both nodes run in one group",
+                    check="process-border",
+                )
+            )
+    return found
+
+
+class Distribution:
+    """The whole of a run that is cut.
+
+    Attributes:
+      flat: the main part, to be run here.
+    """
+
+    def __init__(self, cutting: Cutting, text: str, options: Mapping[str, Any], launcher: Launcher) -> None:
+        """Prepare it; nothing has begun yet.
+
+        Args:
+          cutting: of the graph.
+          text: the graph, as a file would have it.
+          options: of the run, for the other parts.
+          launcher: begins these.
+
+        Raises:
+          CheckFailed: it cannot be cut so.
+        """
+        problems = cutting.findings + check_types(cutting)
+        if problems:
+            raise CheckFailed(problems)
+        self.flat: FlatGraph = cutting.parts[MAIN]
+        self._cutting = cutting
+        self._text = text
+        self._options = dict(options)
+        self._launcher = launcher
+        self._run = f"hfg/{uuid.uuid4().hex[:12]}"
+        self._lives = dict.fromkeys(cutting.parts, _FIRST_LIFE)
+        self._agreement = Agreement(cutting.parts, self._ask)
+        self._others = {name: _Other(name) for name in cutting.parts if name != MAIN}
+        self._part: Part
+        self._carrier: Carrier | None = None
+        self._is_open = False
+
+    # --- the beginning ----------------------------------------------------------------------------------------------
+
+    def take(self, composition: Composition) -> None:
+        """Here is the engine of the main part."""
+        self._loop = asyncio.get_running_loop()
+        self._part = Part(MAIN, composition, self._cutting.edges_of(MAIN), rests=self._rests)
+        composition.engine.callbacks.finished.append(self._ended_here)
+
+    async def open(self) -> None:
+        """Begin the other parts and set them up.
+
+        Raises:
+          HfgError: one of them cannot be, or its setup has failed. `close` is to be called all the same.
+        """
+        self._is_open = True
+        session = await self._launcher.open()
+        edges = list(self._cutting.edges_of(MAIN))
+        for name, other in self._others.items():
+            other.begin(Channel(session, self._run, MAIN, name, (_FIRST_LIFE, _FIRST_LIFE), partial(self._hear, other)))
+        self._carrier = Carrier(self._part, session, self._run, self._lives, edges, self._say)
+        message = Open(self._text, self._options, self._lives, _known_packages())
+        for name, other in self._others.items():
+            host = self._cutting.parts[name].groups[name].host
+            other.launched = await self._launcher.launch(self._run, name, host, (_FIRST_LIFE, _FIRST_LIFE))
+            other.watch(partial(self._gone, other))
+            self._say(name, message)
+        for other in self._others.values():
+            await other.opened
+
+    def begin(self) -> None:
+        """All are set up: let them go, behind which the main part goes."""
+        for name in self._others:
+            self._say(name, Begin())
+
+    # --- what is said -----------------------------------------------------------------------------------------------
+
+    def _say(self, part: str, message: Message) -> None:
+        self._others[part].say(message)
+
+    def _hear(self, other: _Other, message: Message) -> None:
+        match message:
+            case Opened():
+                other.answer(None if message.failed is None else self._error(message.failed, other))
+            case Rests():
+                self._agreement.rest(message.rest)
+            case Told():
+                self._agreement.hear(message.answer)
+            case Speaks():
+                self._part.speak(message.label, message.speaking, message.total)
+            case Hears():
+                self._part.hear(message.label, message.hearing, message.total)  # type: ignore[arg-type]
+            case Ended():
+                self._ended_there(other, message)
+            case Closed():
+                other.close(message)
+            case _:
+                _LOGGER.warning('%s has said "%s", which is not for here', name_of(other.name), type(message).__name__)
+
+    def _rests(self, rest: Rest) -> None:
+        self._loop.call_soon(self._agreement.rest, rest)
+
+    def _ask(self, part: str, question: Question) -> None:
+        if part == MAIN:
+            self._loop.call_soon(lambda: self._agreement.hear(self._part.answer(question)))
+        else:
+            self._say(part, Ask(question))
+
+    # --- the end ----------------------------------------------------------------------------------------------------
+
+    def _error(self, failed: Failed, other: _Other) -> HfgError:
+        return as_error(failed, f"the process of group {other.name!r}")
+
+    def _ended_here(self) -> None:
+        """The main part is over: so are all."""
+        for name, other in self._others.items():
+            if other.is_there:
+                self._say(name, Finish(self._part.engine.outcome))
+
+    def _ended_there(self, other: _Other, message: Ended) -> None:
+        """Another part is over, for a reason of its own, or because it was told: so are all."""
+        error = None if message.failed is None else self._error(message.failed, other)
+        self._part.finish(message.outcome, error)
+
+    def _gone(self, other: _Other, how: str) -> None:
+        """A process has ended that was not told to."""
+        error = RunError(f'the process of group "{other.name}" is gone: {how}')
+        other.answer(error)
+        self._part.finish("failed", error)
+
+    async def close(self) -> None:
+        """Let the other parts tear down, take their reports, and see to it that nothing is left of them."""
+        if not self._is_open:
+            return
+        self._is_open = False
+        there = [other for other in self._others.values() if other.is_there]
+        for other in there:
+            other.leaves()
+            self._say(other.name, Close())
+        if there:
+            await asyncio.wait({other.closed for other in there}, timeout=_LEAVING_S)
+        for other in self._others.values():
+            await other.end()
+        if self._carrier is not None:
+            await self._carrier.close()
+        await self._launcher.close()
+
+    def failure(self) -> HfgError | None:
+        """Give what the teardown of another part has failed with, if one did."""
+        for other in self._others.values():
+            if other.report is not None and other.report.failed is not None:
+                return self._error(other.report.failed, other)
+        return None
+
+    def whole(self, report: Report) -> Report:
+        """Put the report of the main part and those of the others together."""
+        nodes = dict(report.nodes)
+        edges = dict(report.edges)
+        errors = list(report.errors)
+        lost = report.lost_activity
+        halves: dict[str, dict[str, EdgeReport]] = {MAIN: report.edges}
+        for other in self._others.values():
+            if other.report is None:
+                errors.append(f'the process of group "{other.name}" has not reported')
+                continue
+            nodes |= other.report.nodes
+            edges |= other.report.edges
+            halves[other.name] = other.report.edges
+            errors += other.report.errors
+            lost += other.report.lost_activity
+        for edge in self._cutting.edges:
+            edges[edge.label] = _joined(edge, halves)
+        order = [node.path for node in _all_nodes(self._cutting)]
+        return msgspec.structs.replace(
+            report,
+            firings=sum(node.firings for node in nodes.values()),
+            nodes={path: nodes[path] for path in order if path in nodes} | nodes,
+            edges=edges,
+            errors=errors,
+            lost_activity=lost,
+        )
+
+
+def distribute(graph: Graph, flat: FlatGraph, options: Mapping[str, Any], *, virtual: bool) -> Distribution:
+    """Prepare the run of a graph that has groups with processes.
+
+    In virtual time its parts share the loop, for the clocks of processes are real.
+
+    Raises:
+      CheckFailed: it cannot be cut so.
+      FileError: it cannot be told to another process.
+      TransportError: there is nothing to speak to one with.
+    """
+    from hfg.files import text_of
+    from hfg.files.describing import describe
+    from hfg.parts.launching import LoopLauncher, ProcessLauncher
+
+    cutting = cut(flat)
+    if len(cutting.parts) == 1:  # groups without nodes
+        return Distribution(cutting, "", options, LoopLauncher())
+    text = text_of(describe(graph, same_program=True))
+    return Distribution(cutting, text, options, LoopLauncher() if virtual else ProcessLauncher())
+
+
+def _known_packages() -> list[str]:
+    """What this program has imported, its other processes may."""
+    return sorted({name.partition(".")[0] for name in sys.modules})
+
+
+def _all_nodes(cutting: Cutting) -> list[Any]:
+    return [node for flat in cutting.parts.values() for node in flat.nodes]
+
+
+def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeReport]]) -> EdgeReport:
+    """What an edge has carried, of which each side knows a half."""
+    nothing = EdgeReport(sent=0, dropped=0, drained=0, untaken=0, grown=0)
+    source = halves.get(edge.source, {}).get(edge.label, nothing)
+    target = halves.get(edge.target, {}).get(edge.label, nothing)
+    return EdgeReport(
+        sent=source.sent,
+        dropped=source.dropped + target.dropped,
+        drained=source.drained + target.drained,
+        untaken=source.untaken if edge.guarantee == "exact" else target.untaken,
+        grown=source.grown,
+    )
+
+
+class _Other:
+    """Another part, as the main one sees it.
+
+    Attributes:
+      name: of its group.
+      launched: what runs it.
+      opened: done when it is set up.
+      closed: done when it has reported, or is gone.
+      report: what it has said at the end.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.launched: Launched | None = None
+        self.opened: asyncio.Future[None]
+        self.closed: asyncio.Future[None]
+        self.report: Closed | None = None
+        self._channel: Channel
+        self._watching: asyncio.Task[None] | None = None
+        self._leaves = False
+        self._gone = False
+
+    def begin(self, channel: Channel) -> None:
+        """By this it is spoken to."""
+        loop = asyncio.get_running_loop()
+        self._channel = channel
+        self.opened = loop.create_future()
+        self.closed = loop.create_future()
+
+    def watch(self, gone: Callable[[str], None]) -> None:
+        """Be told when it is gone without having been asked to leave."""
+        launched = self.launched
+        assert launched is not None
+
+        async def watch() -> None:
+            how = await launched.wait()
+            self._gone = True
+            if not self.closed.done():
+                self.closed.set_result(None)
+            if not self._leaves:
+                gone(how)
+
+        self._watching = asyncio.create_task(watch(), name=f"hfg process of {self.name}")
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it was begun, and is not gone."""
+        return self.launched is not None and not self._gone
+
+    def say(self, message: Message) -> None:
+        """Say something to it."""
+        self._channel.send(message)
+
+    def answer(self, error: HfgError | None) -> None:
+        """It is set up, or will not be."""
+        if not self.opened.done():
+            if error is None:
+                self.opened.set_result(None)
+            else:
+                self.opened.set_exception(error)
+                self.opened.exception()  # it may be that nobody waits for it any more
+
+    def leaves(self) -> None:
+        """It is told to leave: from here on it may be gone."""
+        self._leaves = True
+
+    def close(self, report: Closed) -> None:
+        """It has reported, and leaves."""
+        self.report = report
+        if not self.closed.done():
+            self.closed.set_result(None)
+
+    async def end(self) -> None:
+        """See to it that nothing is left of it."""
+        self._leaves = True
+        if self.launched is not None:
+            await self.launched.end()
+        if self._watching is not None:
+            self._watching.cancel()
+            await asyncio.wait({self._watching})
+        if self.launched is not None or hasattr(self, "_channel"):
+            await self._channel.close()

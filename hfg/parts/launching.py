@@ -1,0 +1,232 @@
+"""Where the other parts of a run are begun: in processes of this host, or, in virtual time, on the same loop.
+
+A process gets what it needs to know on its standard input, which stays open: where that ends, whoever began it is gone,
+and it goes too. Stands on `worker` and `transports`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import shutil
+import signal
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from hfg.errors import TransportError, UsageError, in_words
+from hfg.graph import Graph
+from hfg.parts.messages import Open
+from hfg.parts.transports import transport
+from hfg.parts.worker import Worker
+from hfg.transport import Session
+
+__all__ = ["Begun", "LoopLauncher", "ProcessLauncher", "build_graph"]
+
+_ENDS_S: Final = 2.0  # how long a process may take to go by itself, once it was told
+
+
+class Begun(msgspec.Struct, frozen=True):
+    """What a process is told on its standard input, as one line of JSON.
+
+    Attributes:
+      run: by which name all parts know the run.
+      part: the name of the part that it is to serve.
+      lives: which life this is of it, and which of the main part.
+      transport: the name of the transport, and how to open a session.
+      settings: of the session.
+      main: the file of the program, for node types that are in it; "" if there is none.
+      targets: other files that hfg itself has imported, by the name of the module.
+      path: where modules are found.
+    """
+
+    run: str
+    part: str
+    lives: tuple[int, int]
+    transport: str
+    settings: dict[str, Any]
+    main: str
+    targets: dict[str, str]
+    path: list[str]
+
+
+def build_graph(message: Open, *, beside: Path | None = None) -> Graph:
+    """Make the graph of the text that came.
+
+    Raises:
+      FileError: it describes none, or names what is not here.
+    """
+    from hfg.files import building
+    from hfg.files.findings import Findings
+    from hfg.files.reading import read_bytes
+
+    findings = Findings()
+    read = read_bytes(message.graph.encode(), "the graph that was sent", findings)
+    findings.reject("the graph that was sent cannot be read")
+    assert read is not None
+    place = (beside or Path.cwd()) / "graph.hfg.yaml"
+    return building.build(read.document, place, message.allow)
+
+
+# --- on the same loop ---
+
+
+class LoopLauncher:
+    """Begins parts on the running loop, over the transport in memory: in virtual time, and to look at."""
+
+    def __init__(self, **settings: Any) -> None:
+        """Begin nothing yet.
+
+        Args:
+          **settings: of the transport "memory".
+        """
+        self._transport = transport("memory")
+        self._settings = settings or {"network": f"hfg {id(self)}"}
+        self._session: Session | None = None
+
+    async def open(self) -> Session:
+        """See `Launcher`."""
+        self._session = await self._transport.open(**self._settings)
+        return self._session
+
+    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> _Task:
+        """See `Launcher`."""
+        session = await self._transport.open(**self._settings)
+        return _Task(session, Worker(session, run, part, lives, build_graph), part)
+
+    async def close(self) -> None:
+        """See `Launcher`."""
+        if self._session is not None:
+            await self._session.close()
+
+
+class _Task:
+    """A part on the same loop."""
+
+    def __init__(self, session: Session, worker: Worker, part: str) -> None:
+        self._session = session
+        self._task = asyncio.create_task(worker.serve(), name=f"hfg part {part}")
+
+    async def wait(self) -> str:
+        """See `Launched`."""
+        await asyncio.wait({self._task})
+        if self._task.cancelled():
+            return "its task was cancelled"
+        error = self._task.exception()
+        return "its task is over" if error is None else f"its task failed: {in_words(error)}"
+
+    async def end(self) -> None:
+        """See `Launched`."""
+        self._task.cancel()
+        await asyncio.wait({self._task})
+        await self._session.close()
+
+
+# --- in processes ---
+
+
+class ProcessLauncher:
+    """Begins parts as processes of this host."""
+
+    def __init__(self) -> None:
+        """Begin nothing yet."""
+        self._transport = transport("zenoh")
+        self._folder: Path | None = None
+        self._session: Session | None = None
+
+    async def open(self) -> Session:
+        """See `Launcher`: nobody but this user reaches the socket at which the parts meet."""
+        self._folder = Path(tempfile.mkdtemp(prefix="hfg-"))
+        self._session = await self._transport.open(**self._settings)
+        return self._session
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        assert self._folder is not None
+        return {"realm": self._folder.name, "meet": [f"unixsock-stream/{self._folder}/meet"]}
+
+    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> _Process:
+        """See `Launcher`."""
+        if host:
+            raise UsageError(
+                f'group "{part}" is for host "{host}", and nobody here knows its agent: run "hfg agent" there and '
+                "`hfg deploy` the graph"
+            )
+        begun = Begun(run, part, lives, "zenoh", self._settings, _main_program(), _targets(), sys.path)
+        return await _Process.begin(part, begun)
+
+    async def close(self) -> None:
+        """See `Launcher`."""
+        if self._session is not None:
+            await self._session.close()
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _main_program() -> str:
+    """Give the file of the program, whose node types may be in the graph; not that of a command, which has none."""
+    main = sys.modules.get("__main__")
+    if main is None or getattr(main, "__spec__", None) is not None:
+        return ""
+    file = getattr(main, "__file__", None)
+    return "" if file is None else str(Path(file).resolve())
+
+
+def _targets() -> dict[str, str]:
+    """Give the files that the command line has imported, under names of its own."""
+    found = {name: module for name, module in list(sys.modules.items()) if name.startswith("hfg_target_")}
+    return {name: module.__file__ for name, module in found.items() if module.__file__ is not None}
+
+
+class _Process:
+    """A part in a process of its own."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self.process = process
+        self._ended = asyncio.ensure_future(process.wait())
+
+    @classmethod
+    async def begin(cls, part: str, begun: Begun) -> _Process:
+        """Begin it; its output goes where that of this process goes.
+
+        Raises:
+          TransportError: it cannot be begun.
+        """
+        try:
+            process = await asyncio.create_subprocess_exec(
+                sys.executable, "-m", "hfg.parts.process", part, stdin=asyncio.subprocess.PIPE
+            )
+        except OSError as error:
+            raise TransportError(f'no process can be begun for group "{part}": {error}') from error
+        assert process.stdin is not None
+        with contextlib.suppress(ConnectionError):  # it is gone already, which is told by whoever waits for it
+            process.stdin.write(msgspec.json.encode(begun) + b"\n")
+            await process.stdin.drain()
+        return cls(process)
+
+    async def wait(self) -> str:
+        """See `Launched`."""
+        code = await asyncio.shield(self._ended)
+        if code < 0:
+            with contextlib.suppress(ValueError):
+                return f"process {self.process.pid} was ended by {signal.Signals(-code).name}"
+        return f"process {self.process.pid} has ended with code {code}"
+
+    async def end(self) -> None:
+        """See `Launched`: it goes by itself, or is made to."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        for how in (None, self.process.terminate, self.process.kill):
+            if how is not None and not self._ended.done():
+                with contextlib.suppress(ProcessLookupError):
+                    how()
+            try:
+                async with asyncio.timeout(_ENDS_S):
+                    await asyncio.shield(self._ended)
+                return
+            except TimeoutError:
+                continue
+        await self._ended

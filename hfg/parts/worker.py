@@ -1,0 +1,187 @@
+"""The part of a run that somebody else began: it makes its graph of what it is sent, and does as it is told.
+
+Stands on `channels` and the files of graphs; knows no processes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from hfg.engine.face.composition import Composition
+from hfg.engine.observing.report import edge_reports, node_reports
+from hfg.engine.runtime.settings import Settings
+from hfg.errors import EngineInternalError, HfgError
+from hfg.graph import Graph
+from hfg.graph.flat import MAIN, cut, flatten
+from hfg.logs import Log
+from hfg.parts.agreement import Rest
+from hfg.parts.channels import Carrier, Channel, name_of
+from hfg.parts.failing import as_failed
+from hfg.parts.messages import (
+    Ask,
+    Begin,
+    Close,
+    Closed,
+    Ended,
+    Finish,
+    Hears,
+    Message,
+    Open,
+    Opened,
+    Rests,
+    Speaks,
+    Told,
+)
+from hfg.parts.part import Part
+from hfg.transport import Session
+
+__all__ = ["Worker"]
+
+_LOGGER = Log("hfg.parts")
+_PARTING_S = 2.0  # how long the last words may take
+
+
+class Worker:
+    """Serves one part of a run.
+
+    Args:
+      session: of the transport.
+      run: by which name all parts know the run.
+      name: of the part.
+      lives: which life this is of it, and which of the main part.
+      build: makes the graph of what comes.
+    """
+
+    def __init__(
+        self, session: Session, run: str, name: str, lives: tuple[int, int], build: Callable[[Open], Graph]
+    ) -> None:
+        self._session = session
+        self._run = run
+        self._name = name
+        self._life = lives[0]
+        self._build = build
+        self._inbox: asyncio.Queue[Message] = asyncio.Queue()
+        self._channels = {MAIN: Channel(session, run, name, MAIN, lives, self._inbox.put_nowait)}
+        self._part: Part | None = None
+        self._carrier: Carrier | None = None
+        self._is_closed = False
+
+    async def serve(self) -> None:
+        """Do as the main part says, until that says that it is over."""
+        try:
+            while True:
+                message = await self._inbox.get()
+                if isinstance(message, Open):
+                    await self._open(message)
+                elif isinstance(message, Close):
+                    await self._close()
+                    return
+                elif self._part is not None:
+                    self._obey(self._part, message)
+        finally:
+            if self._part is not None and not self._is_closed:  # nobody is there any more who would say so
+                self._part.finish("cancelled", None)
+                await self._part.composition.lifetime.close()
+            await self._leave()
+
+    def _say(self, part: str, message: Message) -> None:
+        self._channels[part].send(message)
+
+    # --- the beginning ----------------------------------------------------------------------------------------------
+
+    async def _open(self, message: Open) -> None:
+        try:
+            self._part = part = self._make(message)
+            went_well = await part.composition.lifetime.set_up()
+        except HfgError as error:
+            self._say(MAIN, Opened(self._name, as_failed(error)))
+            return
+        except Exception as error:
+            problem = EngineInternalError(f"{type(error).__name__}: {error}; please report this")
+            problem.__cause__ = error
+            self._say(MAIN, Opened(self._name, as_failed(problem)))
+            return
+        self._say(MAIN, Opened(self._name, None if went_well else as_failed(part.engine.error)))
+
+    def _make(self, message: Open) -> Part:
+        graph = self._build(message)
+        cutting = cut(flatten(graph))
+        if self._name not in cutting.parts:
+            raise EngineInternalError(f'graph "{graph.name}" has no part "{self._name}" here')
+        edges = list(cutting.edges_of(self._name))
+        composition = Composition(cutting.parts[self._name], Settings(**message.options))
+        part = Part(self._name, composition, edges, rests=self._rests)
+        part.engine.callbacks.finished.append(partial(self._ended, part))
+        lives = message.incarnations
+        neighbours = {edge.source for edge in edges} | {edge.target for edge in edges}
+        for other in neighbours - {self._name, MAIN}:
+            self._channels[other] = Channel(
+                self._session,
+                self._run,
+                self._name,
+                other,
+                (self._life, lives[other]),
+                partial(self._obey, part),
+            )
+        self._carrier = Carrier(part, self._session, self._run, lives, edges, self._say)
+        return part
+
+    # --- what is said -----------------------------------------------------------------------------------------------
+
+    def _obey(self, part: Part, message: Message) -> None:
+        match message:
+            case Begin():
+                part.composition.lifetime.begin()
+            case Ask():
+                self._say(MAIN, Told(part.answer(message.question)))
+            case Speaks():
+                part.speak(message.label, message.speaking, message.total)
+            case Hears():
+                part.hear(message.label, message.hearing, message.total)  # type: ignore[arg-type]  # checked there
+            case Finish():
+                part.finish(message.outcome, None)
+            case _:
+                _LOGGER.warning('%s was told "%s", which it does not know', name_of(self._name), type(message).__name__)
+
+    def _rests(self, rest: Rest) -> None:
+        self._say(MAIN, Rests(rest))
+
+    def _ended(self, part: Part) -> None:
+        self._say(MAIN, Ended(self._name, part.engine.outcome, as_failed(part.engine.error)))
+
+    # --- the end ----------------------------------------------------------------------------------------------------
+
+    async def _close(self) -> None:
+        part = self._part
+        self._is_closed = True
+        if part is None:
+            return
+        try:
+            await part.composition.lifetime.close()
+        finally:
+            engine = part.engine
+            failed = as_failed(engine.error) if engine.outcome == "failed" else None
+            self._say(MAIN, closed(self._name, engine, failed))
+
+    async def _leave(self) -> None:
+        await self._channels[MAIN].flush(_PARTING_S)
+        if self._carrier is not None:
+            await self._carrier.close()
+        for channel in self._channels.values():
+            await channel.close()
+
+
+def closed(name: str, engine: Any, failed: Any) -> Closed:
+    """Say what a part has done, now that it is torn down."""
+    core = engine.core
+    return Closed(
+        name,
+        node_reports(core),
+        edge_reports(core),
+        [str(error) for error in core.errors],
+        core.lost_activity,
+        failed,
+    )
