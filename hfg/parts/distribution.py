@@ -15,10 +15,9 @@ from typing import Any, Protocol
 
 import msgspec
 
-from hfg.encoding import wire_problem
 from hfg.engine.face.composition import Composition
 from hfg.engine.observing.report import EdgeReport, Report
-from hfg.errors import CheckFailed, HfgError, RunError
+from hfg.errors import HfgError, RunError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph, cut
 from hfg.logs import Log
@@ -42,10 +41,9 @@ from hfg.parts.messages import (
     Told,
 )
 from hfg.parts.part import Part
-from hfg.problem import Problem
 from hfg.transport import Session
 
-__all__ = ["Distribution", "Launched", "Launcher", "check_types", "distribute"]
+__all__ = ["Distribution", "Launched", "Launcher", "distribute"]
 
 _LOGGER = Log("hfg.parts")
 _FIRST_LIFE = 1
@@ -85,25 +83,6 @@ class Launcher(Protocol):
         """End the session, and whatever else was begun."""
 
 
-def check_types(cutting: Cutting) -> list[Problem]:
-    """Find edges between parts whose values cannot cross (rule L4)."""
-    found = []
-    for edge in cutting.edges:
-        reason = wire_problem(edge.hint)
-        if reason is not None:
-            found.append(
-                Problem(
-                    path=edge.edge.source.port.path,
-                    severity="error",
-                    what=f'its values cannot cross to {name_of(edge.target)} over "{edge.label}": {reason}',
-                    why="between processes values are data of a declared type (rule L4)",
-                    remedy="declare the type of the port, or let both nodes run in one group",
-                    check="process-border",
-                )
-            )
-    return found
-
-
 class Distribution:
     """The whole of a run that is cut.
 
@@ -119,13 +98,7 @@ class Distribution:
           text: the graph, as a file would have it.
           options: of the run, for the other parts.
           launcher: begins these.
-
-        Raises:
-          CheckFailed: it cannot be cut so.
         """
-        problems = cutting.findings + check_types(cutting)
-        if problems:
-            raise CheckFailed(problems)
         self.flat: FlatGraph = cutting.parts[MAIN]
         self._cutting = cutting
         self._text = text
@@ -287,7 +260,6 @@ def distribute(graph: Graph, flat: FlatGraph, options: Mapping[str, Any], *, vir
     In virtual time its parts share the loop, for the clocks of processes are real.
 
     Raises:
-      CheckFailed: it cannot be cut so.
       FileError: it cannot be told to another process.
       TransportError: there is nothing to speak to one with.
     """

@@ -31,6 +31,7 @@ from hfg.graph.checks.nodes import (
     unknown_groups,
     unused_scheduling,
 )
+from hfg.graph.checks.processes import process_borders
 from hfg.graph.flat.flattening import FlatGraph, flatten
 from hfg.problem import SEVERITIES, Problem
 
@@ -60,7 +61,7 @@ _OF_EACH_LEVEL: Final[list[Check]] = [
     endless_sources,
     unfed_slots,
 ]
-_OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions, changed_inputs]
+_OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions, changed_inputs, process_borders]
 
 
 def also(check: Check) -> Check:
