@@ -156,7 +156,14 @@ class _Cutter:
 
     def _wrong(self, path: str, what: str, why: str, remedy: str) -> None:
         self.findings.append(
-            Problem(path=path, severity="error", what=what, why=why, remedy=remedy, check="process-border")
+            Problem(
+                path=path,
+                severity="error",
+                what=what,
+                why=why,
+                remedy=remedy,
+                check="process-border",
+            )
         )
 
     def _wrong_scope(self, scope: Scope, what: str) -> None:
