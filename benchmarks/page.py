@@ -101,8 +101,8 @@ def goals(records: Records) -> str:
     return f"{table(['ours / theirs', 'median', 'lowest to highest', 'at most'], rows)}\n\n{caption(records)}"
 
 
-def day(records: Records) -> str:
-    """A day of virtual time."""
+def seconds(records: Records) -> str:
+    """Cases in seconds: a day of virtual time, graph files."""
     return f"{table(['', 's'], [[name, cell(record)] for name, record in records.items()])}\n\n{caption(records)}"
 
 
@@ -135,7 +135,8 @@ TABLES: dict[str, tuple[str, Callable[[Records], str]]] = {
     "shape": ("bench_shape", shape),
     "threads": ("bench_threads", threads),
     "goals": ("bench_goals", goals),
-    "day": ("bench_virtual_day", day),
+    "day": ("bench_virtual_day", seconds),
+    "files": ("bench_files", seconds),
     "profile": ("profile_hop", profile),
 }
 """What may stand in `<!-- NAME -->`: the suite it needs, and who writes it."""

@@ -156,15 +156,20 @@ class Writer:
         begins = self.bytes_written
         at = begins + len(chunk)
         indexes, written = {}, []
-        for channel in np.flatnonzero(np.bincount(channels)).tolist():
-            mine = channels == channel
-            pairs = np.empty((np.count_nonzero(mine), 2), "<u8")
-            pairs[:, 0], pairs[:, 1] = times[mine], offsets[mine]
-            record = _record(_MESSAGE_INDEX, struct.pack("<HI", channel, pairs.nbytes), pairs.tobytes())
+        by_channel = np.argsort(channels, kind="stable")
+        pairs = np.empty((len(channels), 2), "<u8")
+        pairs[:, 0], pairs[:, 1] = times[by_channel], offsets[by_channel]
+        first_of = 0
+        for channel, count in enumerate(np.bincount(channels).tolist()):
+            if not count:
+                continue
+            mine = pairs[first_of : first_of + count]
+            first_of += count
+            record = _record(_MESSAGE_INDEX, struct.pack("<HI", channel, mine.nbytes), mine.tobytes())
             indexes[channel] = at
             at += len(record)
             written.append(record)
-            self._counts[channel] += len(pairs)
+            self._counts[channel] += count
         self._write(chunk + b"".join(written))
         self._stream.flush()
         length = sum(map(len, written))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import threading
 import time
+from array import array
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
@@ -165,9 +166,8 @@ class RecordingWriter:
 
     def _plain_columns(self, places: Sequence[Any], tokens: Sequence[Any], whens: Sequence[float]) -> Any:
         """Where all are finite numbers, tokens are what is encoded; None: somewhere there is something else."""
-        if None in places or any([place.keep is not None for place in places]):  # noqa: C419 - faster
-            return None
-        if {*map(type, tokens)} != _PLAIN:
+        counts = Counter(places)
+        if None in counts or any(place.keep is not None for place in counts) or {*map(type, tokens)} != _PLAIN:
             return None
         values = [token.value for token in tokens]
         if not _NUMBERS.issuperset(map(type, values)):
@@ -179,7 +179,7 @@ class RecordingWriter:
         except OverflowError:
             return None
         channels = [place.channel for place in places]
-        for place, count in Counter(places).items():
+        for place, count in counts.items():
             place.values += count
         return tokens, channels, [token.sequence for token in tokens], stamps
 
@@ -238,8 +238,8 @@ def open_new(path: Path, *, force: bool) -> BinaryIO:
 
 
 def _nanoseconds(seconds: Sequence[float]) -> npt.NDArray[np.uint64]:
-    found: npt.NDArray[np.uint64] = (np.maximum(np.array(seconds), 0.0) * 1e9).astype(np.uint64)
-    return found
+    found = np.frombuffer(array("d", seconds))
+    return (np.maximum(found, 0.0) * 1e9).astype(np.uint64)
 
 
 def _text(value: Any) -> Any:

@@ -135,7 +135,44 @@ def test_a_recorded_port_feeds_any_other_that_is_named(tmp_path: Path) -> None:
     playing = play_into(graph, tmp_path / "run.mcap", ports={"double.out": "screen.value"})
     seen = run(graph)
     assert playing.played == {"double.out": "screen.value"}
-    assert seen.values("playback_0.out")[:3] == [0, 2, 4] or [0, 2, 4] in [seen.values(e)[:3] for e in seen.edges()]
+    assert seen.values("playback_0.out -> screen.value") == [0, 2, 4, hfg.END]
+
+
+@pytest.mark.rule("X3", "R5")
+def test_a_player_that_is_stopped_has_sent_what_was_due_and_leaves_the_file_closed(tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    run(build(count=20), file)
+    graph = hfg.Graph()
+    player = graph.add(Playback(file=file, port="double.out"), name="player")
+    screen = graph.add(show(), name="screen")
+    graph.connect(player.out, screen.ports.inputs["value"])
+    seen = Recorder()
+    report = hfg.run(graph, clock="virtual", trace=seen, until_s=0.055)
+    assert report.outcome == "until"
+    assert seen.values("player.out -> screen.value") == [0, 2, 4, 6, 8, 10]
+    assert player._recording._stream.closed
+    again = build(count=20)
+    play_into(again, file)
+    again.connect(again.add(Stopper(), name="stopper").enough, again.stop)
+    again.connect(again["double.out"], again["stopper.count"])
+    second = Recorder()
+    hfg.run(again, clock="virtual", trace=second)
+    assert second.values("camera.out") == [0, 1, 2]
+    assert again["camera"]._recording._stream.closed
+
+
+class Stopper(hfg.Node):
+    """Has enough after a few."""
+
+    enough = hfg.Event()
+    seen = hfg.State(0)
+
+    @hfg.slot
+    def count(self, value: int) -> None:
+        """Take one."""
+        self.seen += 1
+        if self.seen == 3:
+            self.enough.trigger()
 
 
 def test_what_led_only_to_played_nodes_rests(tmp_path: Path) -> None:

@@ -280,12 +280,15 @@ class Recorder(Listener):
         keep = place.keep
 
         def put(token: Token[Any]) -> None:
-            if self._full:
-                place.left_out += 1
-                return
             extend((place, token, monotonic() + epoch if real else now()))
             if len(items) > self._mark:
                 self._crowded()
+
+        def put_if_there_is_room(token: Token[Any]) -> None:
+            if self._full:
+                place.left_out += 1
+            else:
+                put(token)
 
         def keep_and_put(token: Token[Any]) -> None:
             if self._full:
@@ -306,7 +309,9 @@ class Recorder(Listener):
             if len(items) > self._mark or self._bytes_put - self._thread.bytes_taken > MOST_BYTES:
                 self._crowded()
 
-        return put if keep is None else keep_and_put
+        if keep is not None:
+            return keep_and_put
+        return put if self._lossless else put_if_there_is_room
 
     # --- where the thread is behind -----------------------------------------------------------------------------------
 
