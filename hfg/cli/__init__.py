@@ -9,6 +9,7 @@
     convert     hfg convert TARGET  write it as a graph file
     nodes       hfg nodes [MODULE]  which node types there are
     new         hfg new node NAME   begin a file; templates: what it says
+    keys        hfg keys new DIR    certificates to try links between hosts with; certificates: makes them
     execute     a run with everything around it
     live        the table while a graph runs    table     what it says    terminal  where it is drawn
     sockets     how one process looks at a run in another

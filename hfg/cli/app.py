@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hfg.cli import check, convert, draw, info, new, nodes, play, record, run, show, tap, top
+from hfg.cli import check, convert, draw, info, keys, new, nodes, play, record, run, show, tap, top
 from hfg.cli.interrupt import Interrupt
 from hfg.errors import FileError, HfgError, TargetError
 
@@ -40,6 +40,7 @@ app.command("play")(play.play)
 app.command("info")(info.info)
 app.command("top")(top.top)
 app.add_typer(new.new, name="new")
+app.add_typer(keys.keys, name="keys")
 
 
 @app.callback(invoke_without_command=True)

@@ -1,0 +1,70 @@
+"""`hfg keys new DIR` and `hfg keys add DIR NAME`: certificates to try links between hosts. Stands on certificates."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hfg.cli.certificates import AUTHORITY, Kind, make_authority, make_certificate
+
+__all__ = ["keys"]
+
+keys = typer.Typer(help="Make certificates for agents, workers and viewers, signed by an authority for tests.")
+
+_NEXT = """{folder} holds authority, agent, worker and viewer, each with a .pem and a .key. Settings of an agent say:
+
+listen = ["tls/{host}:7447"]
+
+[tls]
+authority = "{authority}.pem"
+certificate = "{folder}/agent.pem"
+key = "{folder}/agent.key"
+
+[access]
+write = ["agent", "worker"]
+read = ["viewer"]
+
+Whoever can read {authority}.key can be anybody: it is for tests, and belongs on one computer.
+"""
+
+Folder = Annotated[Path, typer.Argument(help="where the authority and the certificates lie")]
+Hosts = Annotated[
+    list[str] | None,
+    typer.Option("--host", help="a name or address by which the agent is reached; several times for several"),
+]
+Days = Annotated[int, typer.Option(help="how long they are valid", min=1, max=3650)]
+
+
+@keys.command("new")
+def _new(folder: Folder, host: Hosts = None, days: Days = 365) -> int:
+    """Make an authority, and a certificate each for an agent, a worker and a viewer."""
+    make_authority(folder, days=days)
+    for name in ("agent", "worker", "viewer"):
+        make_certificate(folder, name, name, hosts=_hosts(host), days=days)
+    sys.stdout.write(
+        _NEXT.format(folder=folder.as_posix(), authority=(folder / AUTHORITY).as_posix(), host=_hosts(host)[0])
+    )
+    return 0
+
+
+@keys.command("add")
+def _add(
+    folder: Folder,
+    name: Annotated[str, typer.Argument(help="by which [access] knows it")],
+    kind: Annotated[Kind, typer.Option(help="what it is for")] = "agent",
+    host: Hosts = None,
+    days: Days = 365,
+) -> int:
+    """Make one more certificate by the authority that is there, as for the agent of another host."""
+    make_certificate(folder, name, kind, hosts=_hosts(host), days=days)
+    sys.stdout.write(f"{folder / name}.pem and {folder / name}.key are there\n")
+    return 0
+
+
+def _hosts(said: list[str] | None) -> list[str]:
+    """By default this computer, by all its names."""
+    return said or list(dict.fromkeys(("localhost", socket.gethostname(), "127.0.0.1", "::1")))

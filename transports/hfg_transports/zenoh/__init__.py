@@ -1,0 +1,35 @@
+"""Zenoh as a transport of hfg: datagrams, presence and questions between processes and hosts.
+
+    settings    the settings file: realm, addresses, certificates, who may do what; every finding with its line
+    config      what Zenoh is told for them
+    opening     opens Zenoh's session, and says in a sentence why it cannot
+    diagnosing  finds out what Zenoh does not tell: why an address cannot be reached
+    binding     the one module that imports Zenoh: its version, and what is marked unstable in it
+    names       keys and names of hfg as Zenoh's key expressions
+    inbox       from Zenoh's threads to the event loop, one wake-up per burst
+    sending     puts; long ones from a thread of their own
+    presence    announcements and watches over liveliness tokens
+    asking      questions and answers
+    versions    who else is in the realm, and whether it speaks the same
+    ending      closes what a program that ends has left open
+    transport   the contract of `hfg.transport`, composed of these
+
+Importing it needs no Zenoh; opening a session does: pip install 'hfg[zenoh]'.
+"""
+
+from hfg_transports.zenoh.opening import open_session
+from hfg_transports.zenoh.settings import Access, Mode, Settings, SettingsProblem, Tls, read_settings
+from hfg_transports.zenoh.transport import ZenohSession, ZenohTransport, transport
+
+__all__ = [
+    "Access",
+    "Mode",
+    "Settings",
+    "SettingsProblem",
+    "Tls",
+    "ZenohSession",
+    "ZenohTransport",
+    "open_session",
+    "read_settings",
+    "transport",
+]

@@ -1,0 +1,98 @@
+"""Opens Zenoh's session for the settings; whatever keeps it from that is one sentence with a remedy.
+
+Blocks until a client has found its agent, so it is called in a thread. Stands on settings, config, diagnosing, binding.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from typing import TYPE_CHECKING, Final
+
+from hfg.errors import TransportError
+from hfg_transports.zenoh import binding
+from hfg_transports.zenoh.config import configuration, listens, targets
+from hfg_transports.zenoh.diagnosing import files_that_do_not_fit, why_unreachable
+from hfg_transports.zenoh.settings import Mode, Settings, problems_of
+
+if TYPE_CHECKING:
+    import zenoh
+
+__all__ = ["WAIT_S", "open_session"]
+
+WAIT_S: Final = 10.0
+"""How long an agent is waited for."""
+
+_LOOK_S: Final = 0.02
+
+
+def open_session(settings: Settings | None = None, mode: Mode = "peer", *, wait_s: float = WAIT_S) -> zenoh.Session:
+    """Open a session.
+
+    Args:
+      settings: the network; by default this computer alone.
+      mode: "router" is what an agent is; a "peer" has connections to all others, and needs no agent; a "client" speaks
+        with everybody through an agent, which sees to what it may do. With certificates peers are clients.
+      wait_s: how long a client, or a peer that is told where to connect, waits for somebody to be there.
+
+    Raises:
+      TransportError: it cannot be opened: Zenoh is not installed or of another version, the settings are wrong, an
+        address is taken, a certificate does not fit, or nobody is there.
+    """
+    settings = settings or Settings()
+    library = binding.load()
+    if mode not in ("router", "peer", "client"):
+        raise TransportError(f'there is no mode "{mode}"; take router, peer or client')
+    if problems := problems_of(settings):
+        raise TransportError("; ".join(str(problem) for problem in problems[:3]))
+    if settings.tls is not None and (reason := files_that_do_not_fit(settings.tls)) is not None:
+        raise TransportError(f"{reason.what}; {reason.remedy}")
+    config = library.Config()
+    for key, value in configuration(settings, mode, wait_s=wait_s).items():
+        config.insert_json5(key, json.dumps(value))
+    try:
+        session: zenoh.Session = library.open(config)
+    except library.ZError as error:
+        raise TransportError(_sentence(str(error), settings, mode)) from error
+    if mode == "peer" and settings.connect and settings.tls is None:
+        _wait_for_somebody(session, settings, wait_s)
+    return session
+
+
+def _wait_for_somebody(session: zenoh.Session, settings: Settings, wait_s: float) -> None:
+    """Peers connect in the background and for ever; at the start they are told when nobody is there."""
+    until = time.monotonic() + wait_s
+    while not (session.info.routers_zid() or session.info.peers_zid()):
+        if time.monotonic() > until:
+            session.close()
+            raise TransportError(_unreachable(settings, "peer"))
+        time.sleep(_LOOK_S)
+
+
+def _sentence(said: str, settings: Settings, mode: Mode) -> str:
+    """Say what Zenoh means; its own words end in the place in its source."""
+    said = re.sub(r"\s*\bat /\S+\.rs:\d+\.?", "", said).strip(" .")
+    if "Unable to connect" in said:
+        return _unreachable(settings, mode)
+    listening = " or ".join(f'"{address}"' for address in listens(settings, mode))
+    if "already in use" in said:
+        named = re.search(r"(?:tcp|tls)/\S+?(?=[:\s]*\[)|(?<=on )\S+:\d+", said)
+        address = f'"{named[0]}"' if named else listening
+        return f"{address} is taken by another program; is an hfg agent running already? else listen at another port"
+    if "Cannot assign requested address" in said or "os error 99" in said:
+        return f"this computer has no address {listening}; correct listen"
+    if "Permission denied" in said:
+        return f"this program may not listen at {listening}; take a port above 1023"
+    if "failed to lookup" in said or "Name or service not known" in said:
+        return f"there is no host as in {listening}; correct listen"
+    return f"Zenoh cannot open a session: {said}; correct the settings"
+
+
+def _unreachable(settings: Settings, mode: Mode) -> str:
+    """Say why, for each address."""
+    parts = []
+    for address in targets(settings, mode):
+        reason = why_unreachable(address, settings.tls)
+        parts.append(f'cannot connect to "{address}": {reason.what}; {reason.remedy}')
+    return " / ".join(parts)
