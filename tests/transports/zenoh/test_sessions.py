@@ -39,12 +39,9 @@ async def test_programs_meet_in_any_order_and_go_on_meeting_when_the_first_has_g
 ) -> None:
     """The first has the address at which they meet; when it goes, the next who comes has it, and the others find it."""
     first, second, third = await open_one(**here), await open_one(**here), await open_one(**here)
+    everybody = {first.name, second.name, third.name}
     for one in (first, second, third):
-        await until(
-            lambda one=one: (
-                {peer.peer for peer in one.connections()} == {first.name, second.name, third.name} - {one.name}
-            )
-        )
+        await until(partial(connected, one, everybody - {one.name}))
     await first.close()
     await until(partial(connected, second, {third.name}))
     fourth = await open_one(**here)
