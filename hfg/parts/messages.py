@@ -17,6 +17,7 @@ from hfg.engine.observing.report import EdgeReport, NodeReport
 from hfg.parts.agreement import Answer, Question, Rest
 
 __all__ = [
+    "Ask",
     "Begin",
     "Call",
     "Close",
@@ -28,8 +29,10 @@ __all__ = [
     "Message",
     "Open",
     "Opened",
+    "Rests",
     "Result",
     "Speaks",
+    "Told",
     "pack",
     "unpack",
 ]

@@ -164,7 +164,7 @@ class Worker:
         finally:
             engine = part.engine
             failed = as_failed(engine.error) if engine.outcome == "failed" else None
-            self._say(MAIN, closed(self._name, engine, failed))
+            self._say(MAIN, _closed(self._name, engine, failed))
 
     async def _leave(self) -> None:
         await self._channels[MAIN].flush(_PARTING_S)
@@ -174,7 +174,7 @@ class Worker:
             await channel.close()
 
 
-def closed(name: str, engine: Any, failed: Any) -> Closed:
+def _closed(name: str, engine: Any, failed: Any) -> Closed:
     """Say what a part has done, now that it is torn down."""
     core = engine.core
     return Closed(

@@ -70,7 +70,7 @@ def cut(flat: FlatGraph) -> Cutting:
     return _Cutter(flat).cutting()
 
 
-def part_of(group: GroupSpec | None) -> str:
+def _part_of(group: GroupSpec | None) -> str:
     """Give the part in which the nodes of a group run."""
     return group.name if group is not None and group.process else MAIN
 
@@ -110,10 +110,10 @@ class _Cutter:
     # --- who is where ---
 
     def _part(self, groups: Mapping[str, GroupSpec], node: FlatNode) -> str:
-        home = part_of(groups.get(node.options.group or "loop"))
+        home = _part_of(groups.get(node.options.group or "loop"))
         for inner in node.iteration.walk() if node.iteration is not None else ():
             for one in inner.nodes:
-                if part_of(groups.get(one.options.group or "loop")) != home:
+                if _part_of(groups.get(one.options.group or "loop")) != home:
                     self._wrong(
                         one.path,
                         f'it runs in group "{one.options.group}", inside of "{node.path}", which iterates elsewhere',
@@ -128,7 +128,7 @@ class _Cutter:
         if len(homes) == 1:
             return homes.pop()
         if not homes:
-            return part_of(self.flat.groups.get(scope.options.group or "loop"))
+            return _part_of(self.flat.groups.get(scope.options.group or "loop"))
         if scope.options.active_for_s is not None:
             self._wrong_scope(scope, "it has active_for_s")
         return None
