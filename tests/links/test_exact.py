@@ -492,6 +492,21 @@ def test_a_datagram_that_is_still_on_its_way_is_not_sent_again() -> None:
 
 
 @pytest.mark.rule("L2")
+def test_a_repetition_is_answered_at_once_since_its_word_may_be_lost() -> None:
+    producer, consumer = pair()
+    producer.send(token("x"))
+    out = producer.flush(0.0)
+    deliver(out, consumer)
+    values(consumer)
+    consumer.done()
+    consumer.flush()  # lost
+    deliver(out, consumer)
+    deliver(consumer.flush(), producer)
+    assert producer.unfinished == 0
+    assert consumer.counts.repeated == 1
+
+
+@pytest.mark.rule("L2")
 def test_what_a_zombie_adds_to_a_stream_that_its_heir_carries_on_is_refused() -> None:
     zombie, consumer = pair()
     zombie.send(token("x"))
