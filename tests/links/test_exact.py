@@ -440,6 +440,8 @@ def test_a_consumer_is_told_when_the_link_is_over() -> None:
     assert consumer.closed
     assert producer.counts.given_up == 1
     assert producer.close() == []
+    assert producer.flush(100.0) == []
+    assert producer.due is None
     with pytest.raises(UsageError, match="the link is closed"):
         producer.send(token("y"))
 
