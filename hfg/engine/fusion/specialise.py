@@ -35,8 +35,10 @@ def specialise(worker: Worker) -> None:
 def _step_of(worker: Worker) -> Step:
     if worker.within is not None:  # its border looks behind each step whether that was the last (G4)
         return iterating.step
+    if worker.node is None and worker.process is not None:  # it takes what comes out, or lays down what comes in
+        return worker.process
     if worker.is_boundary_output:
-        return worker.process if worker.process is not None else _leave_lying
+        return _leave_lying
     if lives_by_its_slots(worker):
         return calls_step(worker)
     if not is_plain_and_fed(worker):

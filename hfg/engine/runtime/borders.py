@@ -156,6 +156,13 @@ class Inlet:
         self.received = 0
         self.taken = 0
 
+        def step(worker: Worker) -> None:
+            worker.dequeued()
+            self.lay()
+
+        worker.run_by(step)
+        worker.changed()
+
     def arrive(self, value: object, activity: int, stamp: float) -> None:
         """A token has come over the link."""
         self.received += 1
@@ -208,9 +215,12 @@ class Inlet:
             worker.outputs.when_complete(self._free)
 
     def _free(self) -> None:
-        """Amid a step of the engine: what follows is laid when that is over."""
+        """Amid a step of the engine: what follows is laid when that is over, in turn with what else can move."""
         self._waits = False
-        self._engine.soon(self.lay)
+        if self._worker.group.threaded:
+            self._engine.soon(self.lay)
+        else:
+            self._worker.enqueue()
 
     def _count(self, taken: int) -> None:
         if taken > self.taken:
