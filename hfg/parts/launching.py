@@ -38,6 +38,7 @@ class Begun(msgspec.Struct, frozen=True):
       lives: which life this is of it, and which of the main part.
       transport: the name of the transport, and how to open a session.
       settings: of the session.
+      argv: what the program was called with; its main file may read that when it is imported.
       main: the file of the program, for node types that are in it; "" if there is none.
       targets: other files that hfg itself has imported, by the name of the module.
       path: where modules are found.
@@ -48,6 +49,7 @@ class Begun(msgspec.Struct, frozen=True):
     lives: tuple[int, int]
     transport: str
     settings: dict[str, Any]
+    argv: list[str]
     main: str
     targets: dict[str, str]
     path: list[str]
@@ -155,7 +157,7 @@ class ProcessLauncher:
                 f'group "{part}" is for host "{host}", and nobody here knows its agent: run "hfg agent" there and '
                 "`hfg deploy` the graph"
             )
-        begun = Begun(run, part, lives, "zenoh", self._settings, _main_program(), _targets(), sys.path)
+        begun = Begun(run, part, lives, "zenoh", self._settings, sys.argv, _main_program(), _targets(), sys.path)
         return await _Process.begin(part, begun)
 
     async def close(self) -> None:

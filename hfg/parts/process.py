@@ -42,6 +42,7 @@ def main() -> None:
     except msgspec.DecodeError:
         raise SystemExit("hfg.parts.process serves a part of a run and is begun by that; use hfg run") from None
     sys.path[:] = begun.path
+    sys.argv[:] = begun.argv
     if begun.main:
         _be_like(begun.main)
     for name, file in begun.targets.items():
