@@ -7,10 +7,12 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
+from reactivex import operators
 
 import hfg
 from hfg import END
 from hfg.testing import recorder, replay
+from hfg.testing.nodes import Doubter
 from hfg.trace import ActivityChanged, ActivityLost, NodeEnded, TokenDrained, TokenDropped, TokenSent, TraceEvent
 from tests.semantics.nodes import (
     Both,
@@ -125,6 +127,38 @@ def test_a_drained_modifier_acts_but_not_before_the_nodes_own_end_was_sent() -> 
     assert modifiers(trace, "late_end.out -> keep.value") == [0]
     changes = [(event.active, event.time) for event in of_kind(trace, ActivityChanged) if event.node == "late_end"]
     assert changes == [(True, 4)]
+
+
+@pytest.mark.rule("F12", "A5", "A9", "P9")
+@pytest.mark.parametrize("operated", [False, True])
+def test_what_was_drained_until_the_end_acts_before_that_end_is_told_of(operated: bool) -> None:
+    """END takes the activity, what was drained brings it back; both are told behind, and then the events complete."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        none, late, send = graph.add(numbers(count=0)), graph.add(slow_numbers(count=2)), graph.add(SecondActive())
+        node, sink, gone, come = graph.add(LateEnd()), graph.add(Keep()), graph.add(Doubter()), graph.add(Doubter())
+        graph.start.activates(node.activate)
+        graph.connect(none.out, node.value)
+        graph.connect(late.out, send.value)
+        graph.connect(send.out, node.more, active=True)
+        graph.connect(node.out, sink.value, active=True)
+        graph.connect(late.out, graph.add(Keep()).value)
+        through = [operators.skip(0)] if operated else []
+        graph.connect(node.deactivated, gone.hear, through=through, active=not operated)
+        graph.connect(node.activated, come.hear, through=through)
+        return graph
+
+    trace = traced(build())
+    at = trace.index(next(event for event in of_kind(trace, NodeEnded) if event.node == "late_end"))
+    behind = [
+        event.active if isinstance(event, ActivityChanged) else event.token.activity
+        for event in trace[at:]
+        if (isinstance(event, ActivityChanged) and event.node == "late_end")
+        or (isinstance(event, TokenSent) and event.edge.startswith("late_end."))
+    ]
+    assert behind == ([True, 0, 0] if operated else [True, 1, False, 0, 0])
+    replay(build, trace)
 
 
 class SecondActive(hfg.Node):

@@ -8,7 +8,8 @@ import pytest
 
 import hfg
 from hfg.testing import Divergence, Recorder, recorder, replay
-from hfg.testing.nodes import Relay, Script, Tally, double, script, sink, some
+from hfg.testing.nodes import Doubter, Relay, Script, Tally, ascript, double, script, sink, some
+from hfg.testing.operators import through
 from hfg.token import Token
 from hfg.trace import (
     ActivityChanged,
@@ -159,3 +160,44 @@ def test_a_graph_itself_will_do(trace: Recorder) -> None:
     graph.connect(graph.add(script()).out, graph.add(sink()).value)
     hfg.run(graph, clock="virtual", trace=seen)
     replay(graph, seen)
+
+
+@pytest.mark.rule("R6", "F11")
+@pytest.mark.parametrize("policy", ["fifo", "random"])
+def test_two_grids_that_meet_but_for_the_last_digit_are_accepted(policy: str) -> None:
+    """The third place of a grid of 70 Hz, and the second of one that begins at its second, are a nanosecond apart."""
+
+    def grids() -> hfg.Graph:
+        graph = hfg.Graph()
+        first = graph.add(script(values=(None, 0)), max_rate_hz=70.0)
+        second = graph.add(Script(count=2), max_rate_hz=70.0, enabled=False)
+        graph.connect(first.ports.events["out.sent"], second.enable)
+        graph.connect(first.out, graph.add(sink()).value)
+        return graph
+
+    seen = recorder()
+    hfg.run(grids(), clock="virtual", policy=policy, seed=1 if policy == "random" else None, trace=seen)
+    starts = {event.node: event.time for event in seen.of(FiringStarted)}
+    assert starts["sink"] - starts["script"] == 0
+    assert 0 < starts["script"] - [event.time for event in seen.of(FiringStarted) if event.node == "script_2"][1] < 2e-9
+    replay(grids, seen)
+
+
+@pytest.mark.rule("P9", "R5")
+def test_an_end_is_accepted_though_a_source_for_nobody_might_go_on_and_operators_have_nothing_to_give() -> None:
+    def left_over() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, tally, late = (
+            graph.add(ascript(values=())),
+            graph.add(Tally()),
+            graph.add(Script(count=2), max_rate_hz=9.0),
+        )
+        graph.connect(source.out, tally.value)
+        graph.connect(late.seen, source.ports.slots["reset"])
+        graph.connect(graph.start, graph.add(Doubter()).hear, through=[through("skip", 1)])
+        return graph
+
+    seen = recorder()
+    hfg.run(left_over(), clock="virtual", trace=seen)
+    assert seen.firings("ascript") == 1
+    replay(left_over, seen)

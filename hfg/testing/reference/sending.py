@@ -334,13 +334,13 @@ class Sending(State):
                 station.ended = True
                 self.observe(NodeEnded(self.now, station.path))
                 self.note_places()  # of those who wait for END, before anything else is sent (F9)
-                if not station.flights:
-                    self.flush_changes(station)  # what its END has changed is told before its events complete
-                    self.note_places()
-                self.complete_operators(station)
                 waiting, station.drained_modifiers = station.drained_modifiers, []
                 for modifier in waiting:
                     self.receive_activity(index, [modifier])
+                if not station.flights:
+                    self.flush_changes(station)  # what its end has changed is told before its events complete (F12)
+                    self.note_places()
+                self.complete_operators(station)
                 return True
         return False
 
