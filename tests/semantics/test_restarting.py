@@ -6,9 +6,13 @@ import asyncio
 from typing import Any, ClassVar
 
 import pytest
+import reactivex
 from reactivex import operators as ops
 
 import hfg
+from hfg import END
+from hfg.testing import recorder, replay
+from hfg.testing.nodes import Unsteady, script
 from tests.semantics.nodes import Ear, Keep, drive, numbers, run, value_of
 
 
@@ -218,3 +222,63 @@ class Starter(hfg.Node):
 
     def process(self, value: int) -> None:
         self.signal.trigger(value)
+
+
+class Stumbles(hfg.Node):
+    """Fails at every second value."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        if value % 2 == 0:
+            raise ValueError(f"cannot do {value}")
+        return value
+
+
+class Pairs(hfg.Node):
+    """Waits for a signal, as long as one may come."""
+
+    value = hfg.Input(int)
+    other = hfg.Input(int, optional=True)
+
+    def process(self, value: int, other: int | None) -> None:
+        pass
+
+
+@pytest.mark.rule("X1", "P9")
+def test_events_that_have_completed_do_not_begin_afresh_with_a_restart() -> None:
+    """The node waits for a signal that only the completion gives out; being restarted later it has ended no less."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, node, both = graph.add(numbers(count=4)), graph.add(Stumbles(), on_error="restart"), graph.add(Pairs())
+        graph.connect(source.out, node.value)
+        graph.connect(node.out, both.value)
+        graph.connect(node.ports.events["out.sent"], both.other, through=[ops.concat(reactivex.of(9))])
+        return graph
+
+    seen = recorder()
+    report = run(build(), trace=seen)
+    (label,) = [edge for edge in seen.edges() if edge.startswith("stumbles.out.sent")]
+    assert seen.values(label) == [1, 9, END]
+    assert (report.nodes["stumbles"].restarts, report.edges[label].dropped) == (2, 1)
+    replay(build, seen)
+
+
+@pytest.mark.rule("X1", "F14")
+@pytest.mark.parametrize("limit", [1, 5])
+def test_failures_amid_a_restart_belong_to_it(limit: int) -> None:
+    """Three firings fail at once: one restart, after the first of its pauses."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        node = graph.add(Unsteady(), concurrency=3, on_error="restart", restart_limit=limit, restart_backoff_s=0.5)
+        graph.connect(graph.add(script(values=(1, 1, 1))).out, node.value)
+        return graph
+
+    seen = recorder()
+    report = run(build(), trace=seen)
+    assert (report.nodes["unsteady"].restarts, len(report.errors)) == (1, 3)
+    assert report.duration_s == pytest.approx(0.503)
+    replay(build, seen)

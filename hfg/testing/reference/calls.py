@@ -173,20 +173,25 @@ class Calling(Firing):
             station.flights.remove(flight)
             self.observe(FiringEnded(self.now, station.path, flight.number, "abandoned"))
         self.restart(station)
+        if station.leaf.inside is None:
+            self.not_ended(station)
 
     def restart(self, station: Station) -> None:
-        """Teardown, setup, not ended; tokens and A(v) stay. In a back-off that is done when it is over (X1)."""
+        """Teardown and setup; tokens and A(v) stay. In a back-off that is done when it is over (X1)."""
         if station.leaf.inside is None and station.resting_until is None:
             self.tear_down(station)
             self.set_up(station)
 
-    def set_up(self, station: Station) -> None:
-        """Make the node as new: state, generator, not ended."""
-        station.iterator = None
-        station.ending = station.ended = station.given_up = station.stops_itself = False
-        station.unready = False
-        station.set_up = True
+    def not_ended(self, station: Station) -> None:
+        """It begins afresh, and so do its events (P9); a restart alone does not make it so (X1)."""
+        station.ending = station.ended = station.given_up = False
         self.renew_operators(station)
+
+    def set_up(self, station: Station) -> None:
+        """Make the node as new: state, generator."""
+        station.iterator = None
+        station.unready = station.stops_itself = False
+        station.set_up = True
         if station.leaf.inside is None:
             station.node._reset_states()
             hook = station.node._hook("setup")

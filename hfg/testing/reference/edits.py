@@ -241,6 +241,7 @@ class Editing(Calling):
         self.connect_one(station)
         if station.resting_until is None:  # else its back-off does it
             self.set_up(station)
+        self.not_ended(station)
 
     def _switch(self, changes: Sequence[Change]) -> None:
         """Enable and disable what there was before (F10), as it is in the end: nodes first, then subgraphs."""

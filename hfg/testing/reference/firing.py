@@ -419,8 +419,7 @@ class Firing(RunningCode):
         options = station.leaf.options
         what = f"firing {flight.number}"
         failure = error if isinstance(error, NodeError) else NodeError(station.path, what, error)
-        gives_up = options.on_error == "restart" and station.restarts >= options.restart_limit
-        policy = "stop" if gives_up else options.on_error
+        policy = self.policy_of(station)
         self.observe(ErrorRaised(self.now, station.path, what, str(failure), policy))
         if policy == "stop":
             station.flights.remove(flight)
@@ -431,13 +430,19 @@ class Firing(RunningCode):
             self.end_firing(flight, outcome, failure)
             self.disable(station.leaf.index)
             return
-        if options.on_error == "restart":
+        if policy == "restart" and not station.is_restarting:
             station.restarts += 1
             if station.is_concurrent:
                 station.afterwards = "rest"
             else:
                 self.rest(station)
         self.end_firing(flight, outcome, failure)
+
+    def policy_of(self, station: Station) -> str:
+        """What becomes of a failure; one amid a restart belongs to it, and does not count against the limit (F14)."""
+        options = station.leaf.options
+        limited = options.on_error == "restart" and not station.is_restarting
+        return "stop" if limited and station.restarts >= options.restart_limit else str(options.on_error)
 
     def may_try_again(self, flight: Flight, error: BaseException) -> bool:
         """Whether there is another attempt: of its function alone, and as long as none has sent a signal."""

@@ -191,6 +191,11 @@ class Station:
         return self.is_calling or bool(self.afterwards) or len(self.firings_under_way) >= self.concurrency
 
     @property
+    def is_restarting(self) -> bool:
+        """Whether a failure has it restarted, now or as soon as nothing of it goes on (X1)."""
+        return self.resting_until is not None or self.afterwards == "rest"
+
+    @property
     def type(self) -> Any:
         """What is known of its type."""
         return self.node._type
