@@ -300,39 +300,58 @@ class Replay:
         """The move that may lie behind an event: a step of its node, or one of those that follow from quiet."""
         moves = self.machine.moves()
         node = self._teller(event)
-        for move in moves:
-            if move.kind == "timer" and move.edge and move.edge == getattr(event, "edge", None):
-                return move
+        ringing = next((move for move in moves if self._rings(move, event)), None)
+        if ringing is not None:
+            return ringing
         steps = [move for move in moves if move.kind in ("go on", "time out") and move.node == node]
         if steps:
             return min(steps, key=lambda move: self._strangeness(move, event))
-        for move in moves:
-            if move.kind == "timer" and (move.node or self._source_of(move.edge)) == node:
-                return move
-            if move.kind == "call" and isinstance(event, TokenTaken) and move.edge == event.edge:
-                return move
-            if move.kind == "read" and isinstance(event, TokenTaken) and move.edge == event.edge:
-                return move
-            if move.kind == "feed" and isinstance(event, TokenSent) and self._comes_from(event, move.edge):
-                return move
-            if move.kind == "grow" and isinstance(event, QueueGrown) and move.edge == event.edge:
-                return move
-            if move.kind == "give up" and isinstance(event, TokenDrained):
-                return move
-            if move.kind == "complete" or (
-                move.kind == "end events" and isinstance(event, TokenSent) and event.token.value is END
-            ):
-                return move
-            if move.kind == "wait" and move.time <= event.time + _SAME_TIME:
-                return move
-            if move.kind == "finish" and isinstance(event, TokenDropped) and event.reason == "stopped":
-                return move
-        for move in moves:  # steps of which nothing was seen
-            if move.kind == "timer" and not (move.node and self.machine.times_out(self.machine.paths[move.node])):
-                return move
-            if move.kind == "go on" and isinstance(event, QueueGrown):  # a firing that is over waits for its turn (F14)
-                return move
-        return None
+        fitting = (move for move in moves if self._leads_to(move, event, node) or self._follows_from_quiet(move, event))
+        unseen = (move for move in moves if self._may_go_unseen(move, event))
+        return next(fitting, None) or next(unseen, None)
+
+    def _rings(self, move: Move, event: TraceEvent) -> bool:
+        """Whether it is the timer that the event tells of: of the operators of its edge, or of an activity (A12)."""
+        if move.kind != "timer":
+            return False
+        if move.edge:
+            return move.edge == getattr(event, "edge", None)
+        timeout = isinstance(event, EventTriggered) and event.event == f"{move.node}.timeout"
+        return timeout and self.machine.times_out(self.machine.paths[move.node])
+
+    def _leads_to(self, move: Move, event: TraceEvent, node: str | None) -> bool:
+        """Whether something that is due at the node, or at the edge that the event tells of, may lie behind it."""
+        match move.kind:
+            case "timer":
+                return (move.node or self._source_of(move.edge)) == node
+            case "call" | "read":
+                return isinstance(event, TokenTaken) and move.edge == event.edge
+            case "feed":
+                return isinstance(event, TokenSent) and self._comes_from(event, move.edge)
+        return False
+
+    def _follows_from_quiet(self, move: Move, event: TraceEvent) -> bool:
+        """Whether a step that follows from quiet alone may lie behind the event."""
+        match move.kind:
+            case "grow":
+                return isinstance(event, QueueGrown) and move.edge == event.edge
+            case "give up":
+                return isinstance(event, TokenDrained)
+            case "complete":
+                return True
+            case "end events":
+                return isinstance(event, TokenSent) and event.token.value is END
+            case "wait":
+                return move.time <= event.time + _SAME_TIME
+            case "finish":
+                return isinstance(event, TokenDropped) and event.reason == "stopped"
+        return False
+
+    def _may_go_unseen(self, move: Move, event: TraceEvent) -> bool:
+        """Whether it is a step of which nothing need be seen: a restart, or a firing that waits for its turn (F14)."""
+        if move.kind == "timer":
+            return not (move.node and self.machine.times_out(self.machine.paths[move.node]))
+        return move.kind == "go on" and isinstance(event, QueueGrown)
 
     def _strangeness(self, move: Move, event: TraceEvent) -> tuple[bool, bool, bool]:
         """Of several firings of one node (F14) the step of which is least likely to be behind the event.

@@ -201,3 +201,18 @@ def test_an_end_is_accepted_though_a_source_for_nobody_might_go_on_and_operators
     hfg.run(left_over(), clock="virtual", trace=seen)
     assert seen.firings("ascript") == 1
     replay(left_over, seen)
+
+
+@pytest.mark.rule("A12", "R6")
+@pytest.mark.parametrize("seed", range(10))
+def test_a_time_out_at_the_moment_at_which_a_firing_is_over_is_accepted_before_it_and_behind_it(seed: int) -> None:
+    def at_once() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, tally = graph.add(ascript(values=(1, 1), pause_s=0.01), active_for_s=0.02), graph.add(Tally())
+        graph.connect(source.ports.events["timeout"], tally.ports.slots["reset"])
+        graph.connect(graph.start, source.ports.slots["activate"])
+        return graph
+
+    seen = recorder()
+    hfg.run(at_once(), clock="virtual", policy="random", seed=seed, trace=seen)
+    replay(at_once, seen)
