@@ -65,6 +65,34 @@ def test_equal_deadlines_ring_in_the_order_in_which_they_were_set() -> None:
 
 
 @pytest.mark.rule("R6")
+def test_who_asks_again_at_a_moment_that_is_over_by_the_count_but_not_by_a_sum_of_floats_is_not_asked_for_ever() -> (
+    None
+):
+    """As the deadlines of anyio are: it looks whether they have come, and sets its timer again if not."""
+    asked: list[float] = []
+
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        await asyncio.sleep(5.143333333)
+        deadline, over = loop.time() + 5.0, loop.create_future()
+        assert deadline > round(deadline, 9)
+
+        def look() -> None:
+            asked.append(loop.time())
+            if loop.time() >= deadline or len(asked) > 9:
+                over.set_result(None)
+            else:
+                loop.call_at(deadline, look)
+
+        loop.call_at(deadline, look)
+        await over
+
+    with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+        runner.run(main())
+    assert asked == [10.143333333, 10.143333334]
+
+
+@pytest.mark.rule("R6")
 def test_virtual_time_counts_nanoseconds_so_that_sums_of_floats_make_no_noise() -> None:
     async def main() -> list[float]:
         loop = asyncio.get_running_loop()
