@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 
+import anyio
 import pytest
 
 from hfg.engine.executing.virtual import VirtualTimeLoop
@@ -107,6 +108,21 @@ def test_virtual_time_counts_nanoseconds_so_that_sums_of_floats_make_no_noise() 
 
 
 @pytest.mark.rule("R6")
+@pytest.mark.parametrize("begin", [0.0, 0.1, 0.028571429, 3e7])
+@pytest.mark.parametrize("limit", [0.2, 1 / 70, 1e-9, 3e-10, 1e-15])
+def test_who_waits_again_until_his_moment_has_come_does_not_wait_for_ever(begin: float, limit: float) -> None:
+    """As anyio's time limits do, whose deadline a clock of nanoseconds may never show."""
+
+    async def main() -> bool:
+        await asyncio.sleep(begin)
+        with anyio.move_on_after(limit) as scope:
+            await asyncio.Event().wait()
+        return scope.cancelled_caught
+
+    with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+        assert runner.run(main())
+
+
 def test_after_years_the_clock_still_moves() -> None:
     async def main() -> float:
         loop = asyncio.get_running_loop()

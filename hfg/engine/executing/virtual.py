@@ -144,10 +144,12 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         if self.get_debug():
             self._check_thread()  # type: ignore[attr-defined]
         moment = round(when, _DIGITS)
-        if moment <= self._virtual_now < when:
+        now = self._virtual_now
+        if moment <= now < when:
             # Who asks again for a moment that has come by our count, but not by sums of floats of its own, as anyio's
-            # scopes with a deadline do, would ask for ever: time is to go on by the smallest step.
-            moment = round(self._virtual_now + _RESOLUTION_S, _DIGITS)
+            # scopes with a deadline do, would ask for ever: time is to go on. What is due within the clock's resolution
+            # asyncio calls at once, so the smallest step is behind that.
+            moment = max(round(now + 2 * _RESOLUTION_S, _DIGITS), now + 2 * math.ulp(now), when)
         timer = _Timer(next(self._timer_numbers), moment, callback, args, self, context)
         heapq.heappush(self._scheduled, timer)  # type: ignore[attr-defined]
         timer._scheduled = True  # type: ignore[attr-defined]  # as asyncio's own `call_at`: counts it when cancelled
