@@ -300,8 +300,12 @@ class Lifetime:
         """Wait in it as long as a node may take for its teardown (X3); `hurry` moves the moment it is left at."""
         limit_s = self._limit_s
         self._engine.code.hold_no_longer_than(limit_s)
-        with anyio.move_on_after(limit_s) as self._patience:
+        with anyio.CancelScope(deadline=self._in(limit_s)) as self._patience:
             yield
+
+    def _in(self, seconds: float) -> float:
+        """So many seconds from now, to the nanosecond, as virtual time counts: else a time limit is over behind it."""
+        return round(self._engine.loop.time() + seconds, 9)
 
     @property
     def _limit_s(self) -> float:
@@ -326,7 +330,7 @@ class Lifetime:
         engine = self._engine
         self._leave_by = time.monotonic() + seconds
         engine.code.hold_no_longer_than(self._limit_s)
-        self._patience.deadline = min(self._patience.deadline, engine.loop.time() + self._limit_s)
+        self._patience.deadline = min(self._patience.deadline, self._in(self._limit_s))
 
     async def _until_back(self, under_way: Callable[[], bool]) -> None:
         code = self._engine.code
@@ -404,7 +408,7 @@ class Lifetime:
             limit = f"{time.monotonic() - begun:.1f}"
         engine.code.interrupt(worker)
         if not worker.group.threaded:  # what it still has to do when it is cancelled comes before the next teardown
-            with anyio.move_on_after(min(_LEAVING_S, self._limit_s)):
+            with anyio.CancelScope(deadline=self._in(min(_LEAVING_S, self._limit_s))):
                 await asyncio.wait({waiter})
         return NodeError(worker.path, "teardown()", f"it took longer than {limit} s and was given up")
 
