@@ -17,7 +17,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 
-__all__ = ["Agreement", "Answer", "Question", "Rest", "Step"]
+__all__ = ["Account", "Agreement", "Answer", "Question", "Rest", "Step"]
 
 Step: TypeAlias = Literal["rests", "fullest", "grow", "held", "give_up", "complete", "end", "stuck", "finish"]
 

@@ -1,7 +1,8 @@
 """Messages between the parts of a run, and tokens over the edges between them, on a session of a transport.
 
-A `Channel` is a pair of exact links for messages. `Carrier` connects a part with the links of its edges. Both know
-which life of each part is meant, so that nobody listens to one that has died. Stands on `hfg.links`, `part` and
+A `Channel` is a pair of exact links for messages, between one life of a part and one of another. `Carrier` connects a
+part with the links of its edges, which go on when the other end has died and begins anew: the older of two lives tells
+the younger where (`Joins`). Stands on `hfg.links`, `part` and
 `messages`.
 """
 
@@ -17,11 +18,13 @@ from hfg.encoding import TokenCodec
 from hfg.engine.runtime.borders import Hearing
 from hfg.errors import EncodingError, RunError, TransportError
 from hfg.graph.flat import CutEdge
+from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
-from hfg.parts.messages import Hears, Message, Speaks, pack, unpack
+from hfg.parts.inheriting import Arrived, Where
+from hfg.parts.messages import Hears, Joins, Message, Speaks, pack, unpack
 from hfg.parts.part import Part
 from hfg.token import Token
-from hfg.transport import Session
+from hfg.transport import Position, Session
 
 __all__ = ["Carrier", "Channel", "name_of"]
 
@@ -62,14 +65,17 @@ class Channel:
         one, other = name_of(here), name_of(there)
         self._receive = receive
         self._waiting: list[Message] = []
-        self._out = LinkSender(session, f"{run}/{one}/{other}", epoch=lives[0], window=_WINDOW, released=self._send)
+        self._is_closed = False
+        there_from_here = f"{run}/{one}/{other}/{lives[0]}.{lives[1]}"
+        here_from_there = f"{run}/{other}/{one}/{lives[1]}.{lives[0]}"
+        self._out = LinkSender(session, there_from_here, epoch=lives[0], window=_WINDOW, released=self._send)
         self._out.admit(other, lives[1])
-        self._in = LinkReceiver(
-            session, f"{run}/{other}/{one}", consumer=one, incarnation=lives[0], arrived=self._arrived
-        )
+        self._in = LinkReceiver(session, here_from_there, consumer=one, incarnation=lives[0], arrived=self._arrived)
 
     def send(self, message: Message) -> None:
-        """Say something; it arrives when the other is there."""
+        """Say something; it arrives when the other is there. Nothing is heard of it once this is closed."""
+        if self._is_closed:
+            return
         self._waiting.append(message)
         self._send()
 
@@ -99,6 +105,7 @@ class Channel:
 
     async def close(self) -> None:
         """End it."""
+        self._is_closed = True
         await self._out.close()
         await self._in.close()
 
@@ -114,6 +121,7 @@ class Carrier:
         lives: dict[str, int],
         edges: list[CutEdge],
         say: Callable[[str, Message], None],
+        inheriting: frozenset[str] = frozenset(),
     ) -> None:
         """Connect the part.
 
@@ -124,23 +132,40 @@ class Carrier:
           lives: which life of each part this is for.
           edges: those between it and others.
           say: brings a message to another part.
+          inheriting: the parts whose tokens inherit positions.
         """
-        self._links: list[Any] = []
+        self._links: dict[str, _Outgoing | _Incoming] = {}
         outgoing: dict[str, _Outgoing] = {}
         incoming: dict[str, _Incoming] = {}
         for edge in edges:
             key = f"{run}/edge/{edge.edge.index}"
-            link: _Outgoing | _Incoming
             if edge.source == part.name:
-                link = outgoing[edge.label] = _Outgoing(part, session, key, lives, edge, say)
+                self._links[edge.label] = outgoing[edge.label] = _Outgoing(part, session, key, lives, edge, say)
             else:
-                link = incoming[edge.label] = _Incoming(part, session, key, lives, edge, say)
-            self._links.append(link)
+                remembers = edge.source in inheriting
+                self._links[edge.label] = incoming[edge.label] = _Incoming(
+                    part, session, key, lives, edge, say, remembers
+                )
         part.connect(outgoing, incoming)
+        for other, life in lives.items():
+            if life > lives[part.name]:
+                self.admit(other, life)
+
+    def admit(self, other: str, life: int) -> None:
+        """Another part has died and begins anew, as that life."""
+        for link in self._links.values():
+            if link.other == other:
+                link.admit(life)
+
+    def join(self, message: Joins) -> None:
+        """An older life of another part says where an edge goes on."""
+        link = self._links.get(message.label)
+        if link is not None:
+            link.join(message)
 
     async def close(self) -> None:
         """End all links."""
-        for link in self._links:
+        for link in self._links.values():
             await link.close()
 
 
@@ -156,14 +181,23 @@ class _Outgoing:
         edge: CutEdge,
         say: Callable[[str, Message], None],
     ) -> None:
+        self.other = edge.target
         self._part = part
         self._edge = edge
         self._say = say
+        self._loop = asyncio.get_running_loop()
         self._codec = TokenCodec[Any](edge.hint, what=f'the value of "{edge.edge.source.port.path}"')
+        self._waits_to_join = lives[part.name] > lives[edge.target]
+        self._known: Where = (0, 0)  # the last that had come from former lives
         self._sender: LinkSender | BoundedSender
         if edge.guarantee == "exact":
             self._sender = sender = LinkSender(
-                session, key, epoch=lives[part.name], window=edge.window, released=self._released
+                session,
+                key,
+                epoch=lives[part.name],
+                window=edge.window,
+                released=self._released,
+                inherits=part.inherits,
             )
             sender.admit(name_of(edge.target), lives[edge.target])
         else:
@@ -172,29 +206,79 @@ class _Outgoing:
     def room(self) -> int:
         """See `Outgoing`."""
         sender = self._sender
+        if self._waits_to_join:
+            return 0
         if isinstance(sender, BoundedSender):
             return self._edge.window * 4
-        return self._edge.window - sender.machine.unfinished
+        room = self._edge.window - sender.machine.unfinished
+        return self._in_a_row(sender, room) if self._part.inherits and room > 0 else room
+
+    def _in_a_row(self, sender: LinkSender, most: int) -> int:
+        """How many can be sent before numbers jump: that they do when all before is done."""
+        positions = self._part.positions[self._edge.label]
+        if not positions or not sender.machine.takes(Position(*positions[0])):
+            return 0
+        count = 1
+        while count < min(most, len(positions)):
+            stream, number = positions[count - 1]
+            if positions[count] != (stream, number + 1):
+                break
+            count += 1
+        return count
 
     def send(self, tokens: list[Token[Any]]) -> None:
         """See `Outgoing`."""
+        sender, part, label = self._sender, self._part, self._edge.label
+        repeated = 0
         try:
             for token in tokens:
-                self._sender.send_nowait(self._codec.encode(token))
+                encoded = self._codec.encode(token)
+                if part.inherits and isinstance(sender, LinkSender):
+                    where = part.positions[label].popleft()
+                    repeated += where <= self._known
+                    sender.send_nowait(encoded, Position(*where))
+                else:
+                    sender.send_nowait(encoded)
         except (EncodingError, TransportError) as error:
-            problem = RunError(
-                f'edge "{self._edge.label}" cannot carry a value to {name_of(self._edge.target)}: {error}'
-            )
+            problem = RunError(f'edge "{label}" cannot carry a value to {name_of(self._edge.target)}: {error}')
             problem.__cause__ = error
-            self._part.finish("failed", problem)
+            part.finish("failed", problem)
+            return
+        outlet = part.outlets[label]
+        if repeated:
+            outlet.repeat(repeated)
+        if part.inherits and outlet.sent - self._unfinished > outlet.taken:
+            self._loop.call_soon(self._released)  # done before: nobody will say so again
+
+    @property
+    def _unfinished(self) -> int:
+        return self._sender.machine.unfinished if isinstance(self._sender, LinkSender) else 0
 
     def speaks(self, speaking: bool, total: int) -> None:
         """See `Outgoing`."""
         self._say(self._edge.target, Speaks(self._edge.label, speaking, total))
 
     def _released(self) -> None:
-        assert isinstance(self._sender, LinkSender)
-        self._part.be_taken(self._edge.label, self._sender.released)
+        label = self._edge.label
+        self._part.be_taken(label, self._part.outlets[label].sent - self._unfinished)
+
+    def admit(self, life: int) -> None:
+        """The consumer begins anew: it is sent what is not done, and told from where that is."""
+        label, sender = self._edge.label, self._sender
+        stream = number = 0
+        if isinstance(sender, LinkSender):
+            sender.admit(name_of(self._edge.target), life)
+            stream, number = sender.machine.position
+        done = self._part.outlets[label].sent - self._unfinished
+        self._say(self._edge.target, Joins(label, done, stream, number - self._unfinished))
+        self._waits_to_join = False
+        self._part.consumer_returns(label)
+
+    def join(self, message: Joins) -> None:
+        """The consumer says what it has of former lives."""
+        self._known = (message.stream, message.number)
+        self._waits_to_join = False
+        self._part.precede(self._edge.label, message.total, message.hearing)  # type: ignore[arg-type]  # checked there
 
     async def close(self) -> None:
         """End it."""
@@ -212,22 +296,31 @@ class _Incoming:
         lives: dict[str, int],
         edge: CutEdge,
         say: Callable[[str, Message], None],
+        remembers: bool,
     ) -> None:
+        self.other = edge.source
         self._part = part
         self._edge = edge
         self._say = say
         self._done = 0
+        self._remembers = remembers
         self._codec = TokenCodec[Any](edge.hint, what=f'the value of "{edge.edge.source.port.path}"')
         self._receiver: LinkReceiver | BoundedReceiver
         if edge.guarantee == "exact":
             self._receiver = LinkReceiver(
-                session, key, consumer=name_of(part.name), incarnation=lives[part.name], arrived=self._arrived
+                session,
+                key,
+                consumer=name_of(part.name),
+                incarnation=lives[part.name],
+                arrived=self._arrived,
+                capacity=edge.window,
+                producer=lives[edge.source],
             )
         else:
-            self._receiver = BoundedReceiver(session, key, arrived=self._arrived)
+            self._receiver = BoundedReceiver(session, key, arrived=self._arrived, producer=lives[edge.source])
 
     def _arrived(self) -> None:
-        tokens = []
+        tokens: list[Arrived] = []
         for delivery in self._receiver.machine.take_all():
             metadata, value = delivery.token
             try:
@@ -237,7 +330,8 @@ class _Incoming:
                 problem.__cause__ = error
                 self._part.finish("failed", problem)
                 return
-            tokens.append((token.value, token.activity, token.stamp))
+            where = (delivery.position.stream, delivery.position.sequence)
+            tokens.append(((token.value, token.activity, token.stamp), where))
         if tokens:
             self._part.receive(self._edge.label, tokens)
 
@@ -250,6 +344,22 @@ class _Incoming:
     def hears(self, hearing: Hearing, total: int) -> None:
         """See `Incoming`."""
         self._say(self._edge.source, Hears(self._edge.label, hearing, total))
+
+    def admit(self, life: int) -> None:
+        """The producer begins anew: what it has sent until now is told to it."""
+        label, machine = self._edge.label, self._receiver.machine
+        machine.believe(life)
+        stream = number = 0
+        if isinstance(machine, ExactConsumer):
+            stream, number = machine.accepted
+        inlet = self._part.inlets[label]
+        self._part.producer_returns(label, remembers=self._remembers)
+        self._say(self._edge.source, Joins(label, inlet.received, stream, number, inlet.hearing))
+
+    def join(self, message: Joins) -> None:
+        """The producer says what former lives have done."""
+        self._done += message.total
+        self._part.follow(self._edge.label, message.total, (message.stream, message.number))
 
     async def close(self) -> None:
         """End it."""

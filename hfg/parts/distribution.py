@@ -24,6 +24,8 @@ from hfg.logs import Log
 from hfg.parts.agreement import Agreement, Question, Rest
 from hfg.parts.channels import Carrier, Channel, name_of
 from hfg.parts.failing import as_error
+from hfg.parts.inheriting import inheriting
+from hfg.parts.lives import LIMIT, WITHIN_S, Deaths
 from hfg.parts.messages import (
     Ask,
     Begin,
@@ -33,20 +35,22 @@ from hfg.parts.messages import (
     Failed,
     Finish,
     Hears,
+    Joins,
     Message,
     Open,
     Opened,
+    Reborn,
     Rests,
     Speaks,
     Told,
 )
 from hfg.parts.part import Part
+from hfg.parts.worker import FIRST_LIFE
 from hfg.transport import Session
 
 __all__ = ["Distribution", "Launched", "Launcher", "distribute"]
 
 _LOGGER = Log("hfg.parts")
-_FIRST_LIFE = 1
 _LEAVING_S = 7.0  # how long the others may take to tear down; one node may take five (X3)
 
 
@@ -105,12 +109,14 @@ class Distribution:
         self._options = dict(options)
         self._launcher = launcher
         self._run = f"hfg/{uuid.uuid4().hex[:12]}"
-        self._lives = dict.fromkeys(cutting.parts, _FIRST_LIFE)
+        self._lives = dict.fromkeys(cutting.parts, FIRST_LIFE)
         self._agreement = Agreement(cutting.parts, self._ask)
         self._others = {name: _Other(name) for name in cutting.parts if name != MAIN}
         self._part: Part
         self._carrier: Carrier | None = None
         self._is_open = False
+        self._has_begun = False
+        self._newest = FIRST_LIFE  # of all parts together: so a stream that begins later is higher on any link
 
     # --- the beginning ----------------------------------------------------------------------------------------------
 
@@ -127,22 +133,35 @@ class Distribution:
           HfgError: one of them cannot be, or its setup has failed. `close` is to be called all the same.
         """
         self._is_open = True
-        session = await self._launcher.open()
+        self._session = session = await self._launcher.open()
         edges = list(self._cutting.edges_of(MAIN))
-        for name, other in self._others.items():
-            other.begin(Channel(session, self._run, MAIN, name, (_FIRST_LIFE, _FIRST_LIFE), partial(self._hear, other)))
-        self._carrier = Carrier(self._part, session, self._run, self._lives, edges, self._say)
-        message = Open(self._text, self._options, self._lives, _known_packages())
-        for name, other in self._others.items():
-            host = self._cutting.parts[name].groups[name].host
-            other.launched = await self._launcher.launch(self._run, name, host, (_FIRST_LIFE, _FIRST_LIFE))
-            other.watch(partial(self._gone, other))
-            self._say(name, message)
+        for other in self._others.values():
+            other.begin(self._channel_to(other))
+        self._carrier = Carrier(
+            self._part, session, self._run, self._lives, edges, self._say, inheriting(self._cutting)
+        )
+        for other in self._others.values():
+            await self._launch(other)
         for other in self._others.values():
             await other.opened
 
+    def _channel_to(self, other: _Other) -> Channel:
+        lives = (FIRST_LIFE, self._lives[other.name])
+        return Channel(self._session, self._run, MAIN, other.name, lives, partial(self._hear, other))
+
+    async def _launch(self, other: _Other) -> None:
+        """Begin the process of a part and have it set up its nodes; it says when that is done."""
+        name = other.name
+        lives = (self._lives[name], FIRST_LIFE)
+        host = self._cutting.parts[name].groups[name].host
+        other.launched = await self._launcher.launch(self._run, name, host, lives)
+        other.watch(partial(self._gone, other))
+        other.is_told = True
+        self._say(name, Open(self._text, self._options, dict(self._lives), _known_packages()))
+
     def begin(self) -> None:
         """All are set up: let them go, behind which the main part goes."""
+        self._has_begun = True
         for name in self._others:
             self._say(name, Begin())
 
@@ -163,6 +182,9 @@ class Distribution:
                 self._part.speak(message.label, message.speaking, message.total)
             case Hears():
                 self._part.hear(message.label, message.hearing, message.total)  # type: ignore[arg-type]
+            case Joins():
+                assert self._carrier is not None
+                self._carrier.join(message)
             case Ended():
                 self._ended_there(other, message)
             case Closed():
@@ -196,16 +218,55 @@ class Distribution:
         self._part.finish(message.outcome, error)
 
     def _gone(self, other: _Other, how: str) -> None:
-        """A process has ended that was not told to."""
-        error = RunError(f'the process of group "{other.name}" is gone: {how}')
-        other.answer(error)
-        self._part.finish("failed", error)
+        """A process has ended that was not told to: another takes its place."""
+        other.is_told = False
+        self._agreement.leave(other.name)
+        if not self._has_begun:
+            error = RunError(f'the process of group "{other.name}" is gone before the run has begun: {how}')
+            other.answer(error)
+            self._part.finish("failed", error)
+            return
+        pause_s = other.deaths.died(self._loop.time())
+        if pause_s is None:
+            often = f"it died {LIMIT + 1} times within {WITHIN_S:g} s and is not begun again"
+            self._part.finish(
+                "failed",
+                RunError(f'the process of group "{other.name}" is gone: {how}; {often}: see what it ended with'),
+            )
+            return
+        _LOGGER.warning('the process of group "%s" is gone: %s; another begins in %g s', other.name, how, pause_s)
+        other.returning = self._loop.create_task(self._bring_back(other, pause_s), name=f"hfg return of {other.name}")
+
+    async def _bring_back(self, other: _Other, pause_s: float) -> None:
+        """Begin another life of a part, while all others wait for it as they do for one that is slow (L3)."""
+        await asyncio.sleep(pause_s)
+        name = other.name
+        try:
+            await other.bury()
+            self._newest += 1
+            self._lives[name] = life = self._newest
+            other.begin(self._channel_to(other))
+            for one in self._others.values():
+                if one.is_told:
+                    self._say(one.name, Reborn(name, life))
+            await self._launch(other)
+            assert self._carrier is not None
+            self._carrier.admit(name, life)
+            await other.opened
+        except HfgError as error:
+            self._part.finish("failed", error)
+            return
+        self._say(name, Begin())
+        if self._part.engine.core.over:  # meanwhile, when nobody could tell it
+            self._say(name, Finish(self._part.engine.outcome))
 
     async def close(self) -> None:
         """Let the other parts tear down, take their reports, and see to it that nothing is left of them."""
         if not self._is_open:
             return
         self._is_open = False
+        for other in self._others.values():
+            await other.stay_away()
         there = [other for other in self._others.values() if other.is_there]
         for other in there:
             other.leaves()
@@ -236,6 +297,11 @@ class Distribution:
             if other.report is None:
                 errors.append(f'the process of group "{other.name}" has not reported')
                 continue
+            if other.deaths.count:
+                errors.append(
+                    f'the process of group "{other.name}" was begun again {other.deaths.count} times; what it counted '
+                    "before is not in the report"
+                )
             nodes |= other.report.nodes
             edges |= other.report.edges
             halves[other.name] = other.report.edges
@@ -306,6 +372,9 @@ class _Other:
       opened: done when it is set up.
       closed: done when it has reported, or is gone.
       report: what it has said at the end.
+      deaths: of its processes.
+      is_told: there is a process that hears what is said, and knows of other parts what was true when it began.
+      returning: what begins its next life.
     """
 
     def __init__(self, name: str) -> None:
@@ -314,6 +383,9 @@ class _Other:
         self.opened: asyncio.Future[None]
         self.closed: asyncio.Future[None]
         self.report: Closed | None = None
+        self.deaths = Deaths()
+        self.is_told = False
+        self.returning: asyncio.Task[None] | None = None
         self._channel: Channel
         self._watching: asyncio.Task[None] | None = None
         self._leaves = False
@@ -358,6 +430,20 @@ class _Other:
             else:
                 self.opened.set_exception(error)
                 self.opened.exception()  # it may be that nobody waits for it any more
+
+    async def bury(self) -> None:
+        """See to it that nothing is left of a life that is over."""
+        if self.launched is not None:
+            await self.launched.end()
+            self.launched = None
+        self._gone = False
+        await self._channel.close()
+
+    async def stay_away(self) -> None:
+        """Begin no other life."""
+        if self.returning is not None:
+            self.returning.cancel()
+            await asyncio.wait({self.returning})
 
     def leaves(self) -> None:
         """It is told to leave: from here on it may be gone."""

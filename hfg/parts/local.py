@@ -116,7 +116,7 @@ class _Link:
 
     def send(self, tokens: list[Token[Any]]) -> None:
         """See `Outgoing`."""
-        bare = [(token.value, token.activity, token.stamp) for token in tokens]
+        bare = [((token.value, token.activity, token.stamp), (0, 0)) for token in tokens]
         self._loop.call_soon(self._target.receive, self._edge.label, bare)
 
     def speaks(self, speaking: bool, total: int) -> None:

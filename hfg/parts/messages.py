@@ -1,8 +1,8 @@
 """What the parts of a run tell each other beside tokens, in order and without loss; and how.
 
-    Whole -> part     Open, Begin, Question, Finish, Call, Close
-    Part  -> whole    Opened, Rest, Answer, Ended, Result, Closed
-    Part  -> part     Speaks, Hears
+    Whole -> part     Open, Begin, Question, Reborn, Finish, Call, Close
+    Part  -> whole    Opened, Rest, Answer, Ended, Result, Logged, Closed
+    Part  -> part     Speaks, Hears, Joins
 
 All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
 """
@@ -26,9 +26,12 @@ __all__ = [
     "Failed",
     "Finish",
     "Hears",
+    "Joins",
+    "Logged",
     "Message",
     "Open",
     "Opened",
+    "Reborn",
     "Rests",
     "Result",
     "Speaks",
@@ -177,8 +180,70 @@ class Hears(msgspec.Struct, frozen=True, tag=True):
     total: int
 
 
+class Reborn(msgspec.Struct, frozen=True, tag=True):
+    """A part has died and begins anew: from now on this life of it is believed."""
+
+    part: str
+    life: int
+
+
+class Joins(msgspec.Struct, frozen=True, tag=True):
+    """Where a life of a part that has begun anew goes on with an edge, said by the older life at its other end.
+
+    Attributes:
+      label: of the edge.
+      total: how many tokens are done, said by the producer; how many have come, said by the consumer.
+      stream, number: the position of the last of them.
+      hearing: what the consumer does with tokens.
+    """
+
+    label: str
+    total: int
+    stream: int
+    number: int
+    hearing: str = "open"
+
+
+class Logged(msgspec.Struct, frozen=True, tag=True):
+    """A log record of a part, for the loggers of the main program.
+
+    Attributes:
+      logger: its name.
+      level: of the record.
+      text: the whole message, with the trace of an exception if there is one.
+      path: of the node that has logged; "" else.
+      created: when, in seconds since 1970.
+      file, line, function: where in the code.
+    """
+
+    logger: str
+    level: int
+    text: str
+    path: str
+    created: float
+    file: str
+    line: int
+    function: str
+
+
 Message: TypeAlias = (
-    Open | Opened | Begin | Ask | Told | Rests | Finish | Ended | Call | Result | Close | Closed | Speaks | Hears
+    Open
+    | Opened
+    | Begin
+    | Ask
+    | Told
+    | Rests
+    | Reborn
+    | Finish
+    | Ended
+    | Call
+    | Result
+    | Logged
+    | Close
+    | Closed
+    | Speaks
+    | Hears
+    | Joins
 )
 
 pack: Final = msgspec.msgpack.Encoder().encode

@@ -7,6 +7,7 @@ processes. Stands on the engine and `agreement`.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
@@ -16,7 +17,8 @@ from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph.flat import CutEdge
-from hfg.parts.agreement import Answer, Question, Rest
+from hfg.parts.agreement import Account, Answer, Question, Rest
+from hfg.parts.inheriting import Alignment, Arrived, Where
 from hfg.ports.edges import EventEdge
 from hfg.token import Token
 
@@ -52,6 +54,9 @@ class Part:
     Attributes:
       name: of its group.
       composition: its engine, and what stands on that.
+      inherits: whether what it sends inherits the positions of what comes in, and a token that came in is done when all
+        that came of it is; else it is done when it was taken.
+      positions: of what it will send next, by label of the edge, if it inherits them.
     """
 
     def __init__(
@@ -61,6 +66,8 @@ class Part:
         edges: Iterable[CutEdge],
         *,
         rests: Callable[[Rest], None],
+        inherits: bool = False,
+        returns: bool = False,
     ) -> None:
         """Make it; nothing is set up yet.
 
@@ -69,7 +76,10 @@ class Part:
           composition: its engine, not begun yet, and what stands on that.
           edges: those between it and other parts.
           rests: told when nothing moves in it any more.
+          inherits: see above.
+          returns: it has lived before.
         """
+        edges = list(edges)
         self.name = name
         self.composition = composition
         self._rests = rests
@@ -89,6 +99,13 @@ class Part:
         self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
         self._speaking = dict.fromkeys(self.outlets, True)
         self._said: list[tuple[str, bool, int]] = []
+        self.inherits = inherits
+        self.positions: dict[str, deque[Where]] = {label: deque() for label in self.outlets} if inherits else {}
+        coming = [edge.label for edge in edges if edge.target == name and _is_synchronous(edge)]
+        self._leading = coming[0] if coming else ""
+        self._origin = dict.fromkeys(self.inlets, 0)  # how many tokens came to former lives, or were skipped
+        self._alignment = Alignment(coming if returns else [])
+        self._last = [worker for worker in engine.core.by_path.values() if not any(worker.all_out_edges())]
         self._leaving = False
         engine.agreement = self._nothing_moves
         engine.callbacks.pumped.append(self._pumped)
@@ -105,19 +122,28 @@ class Part:
 
     # --- tokens -----------------------------------------------------------------------------------------------------
 
-    def receive(self, label: str, tokens: list[tuple[Any, int, float]]) -> None:
-        """Tokens have come over a link: value, modifier and stamp of each."""
-        inlet = self.inlets[label]
-        for value, activity, stamp in tokens:
-            inlet.arrive(value, activity, stamp)
+    def receive(self, label: str, tokens: list[Arrived]) -> None:
+        """Tokens have come over a link, or it was told where they go on."""
         self._is_at_rest = False
-        inlet.lay()
+        for one, (skipped, later) in self._alignment.arrive(label, tokens).items():
+            inlet = self.inlets[one]
+            if skipped:
+                inlet.skip(skipped)
+                self._origin[one] += skipped
+            for (value, activity, stamp), _ in later:
+                inlet.arrive(value, activity, stamp)
+            if self.inherits and one == self._leading:
+                for positions in self.positions.values():
+                    positions.extend([where for _, where in later])
+            inlet.lay()
         if self._said:
             self._listen()
         self.engine.kick()
 
     def be_taken(self, label: str, total: int) -> None:
         """So many of the tokens that have left were taken until now."""
+        if total <= self.outlets[label].taken:
+            return  # which was told in another way already, and moves nothing
         self._is_at_rest = False
         self.outlets[label].be_taken(total)
         self.send()
@@ -146,6 +172,47 @@ class Part:
         self.outlets[label].hear(hearing)
         self.send()
 
+    # --- other lives ------------------------------------------------------------------------------------------------
+
+    def follow(self, label: str, total: int, last: Where) -> None:
+        """This life takes the place of others, of whose tokens on an edge that comes in so many were done."""
+        self.inlets[label].rebase(total)
+        self._origin[label] += total
+        self._alignment.goes_on(label, last)
+        self.receive(label, [])
+
+    def precede(self, label: str, total: int, hearing: Hearing) -> None:
+        """This life takes the place of others, of whose tokens on an edge that leaves so many have come."""
+        self._is_at_rest = False
+        outlet = self.outlets[label]
+        outlet.rebase(total)
+        if hearing != outlet.hearing:
+            outlet.hear(hearing)
+        self.send()
+        self.engine.kick()
+
+    def consumer_returns(self, label: str) -> None:
+        """The consumer of an edge that leaves begins anew."""
+        self._is_at_rest = False
+        outlet = self.outlets[label]
+        if outlet.hearing != "open":
+            outlet.hear("open")
+        if not outlet.speaking:
+            self._outgoing[label].speaks(False, outlet.sent)
+        self.send()
+        self.engine.kick()
+
+    def producer_returns(self, label: str, *, remembers: bool) -> None:
+        """The producer of an edge that comes in begins anew; unless it remembers, nobody waits for what has come."""
+        self._is_at_rest = False
+        inlet = self.inlets[label]
+        if not remembers:
+            inlet.orphans = inlet.received
+        self._said = [said for said in self._said if said[0] != label]
+        if not inlet.speaking:
+            inlet.speak(True)
+        self.engine.kick()
+
     def room(self, label: str) -> None:
         """A link takes tokens again."""
         self._wake()
@@ -163,7 +230,21 @@ class Part:
                     link.send(tokens)
 
     def _moved(self, inlet: Inlet) -> None:
-        self._incoming[inlet.label].taken(inlet.taken)
+        if not self.inherits:
+            inlet.done = inlet.taken
+            self._incoming[inlet.label].taken(inlet.taken)
+
+    def _settle(self) -> None:
+        """Each token gives one everywhere: so many are done as have passed every end, and their firings are over."""
+        ends = [outlet.finished for outlet in self.outlets.values() if outlet.hearing == "open"]
+        if self._last:
+            self.engine.core.settle_counts()
+            ends += [worker.firings - (worker.busy == "firing") for worker in self._last]
+        for label, inlet in self.inlets.items():
+            done = min([inlet.taken, *(self._origin[label] + count for count in ends)])
+            if done > inlet.done:
+                inlet.done = done
+                self._incoming[label].taken(done)
 
     def _wake(self) -> None:
         """Something lies before an outlet: it leaves when the engine is done with what it does now."""
@@ -186,6 +267,8 @@ class Part:
                 self._incoming[label].hears(hearing, inlet.taken)
             inlet.lay()
         self.send()
+        if self.inherits:
+            self._settle()
 
     # --- quiet ------------------------------------------------------------------------------------------------------
 
@@ -199,7 +282,7 @@ class Part:
                 self.name,
                 self._numbered,
                 {label: (one.sent, one.taken, one.hearing, one.speaking) for label, one in self.outlets.items()},
-                {label: (one.received, one.taken, one.hearing, one.speaking) for label, one in self.inlets.items()},
+                {label: _account(one) for label, one in self.inlets.items()},
             )
         )
 
@@ -247,3 +330,11 @@ class Part:
     def finish(self, outcome: str, error: HfgError | None) -> None:
         """End the run of this part."""
         self.engine.finish(outcome, error)
+
+
+def _account(inlet: Inlet) -> Account:
+    return (inlet.received, max(inlet.done, inlet.orphans), inlet.hearing, inlet.speaking)
+
+
+def _is_synchronous(edge: CutEdge) -> bool:
+    return edge.guarantee == "exact" and not edge.edge.is_event_edge

@@ -20,6 +20,7 @@ from hfg.logs import Log
 from hfg.parts.agreement import Rest
 from hfg.parts.channels import Carrier, Channel, name_of
 from hfg.parts.failing import as_failed
+from hfg.parts.inheriting import inheriting
 from hfg.parts.messages import (
     Ask,
     Begin,
@@ -28,9 +29,11 @@ from hfg.parts.messages import (
     Ended,
     Finish,
     Hears,
+    Joins,
     Message,
     Open,
     Opened,
+    Reborn,
     Rests,
     Speaks,
     Told,
@@ -38,9 +41,10 @@ from hfg.parts.messages import (
 from hfg.parts.part import Part
 from hfg.transport import Session
 
-__all__ = ["Worker"]
+__all__ = ["FIRST_LIFE", "Worker"]
 
 _LOGGER = Log("hfg.parts")
+FIRST_LIFE = 1
 _PARTING_S = 2.0  # how long the last words may take
 
 
@@ -79,6 +83,9 @@ class Worker:
                 elif isinstance(message, Close):
                     await self._close()
                     return
+                elif isinstance(message, Reborn):
+                    if self._part is not None:
+                        await self._admit(self._part, message)
                 elif self._part is not None:
                     self._obey(self._part, message)
         finally:
@@ -113,21 +120,34 @@ class Worker:
             raise EngineInternalError(f'graph "{graph.name}" has no part "{self._name}" here')
         edges = list(cutting.edges_of(self._name))
         composition = Composition(cutting.parts[self._name], Settings(**message.options))
-        part = Part(self._name, composition, edges, rests=self._rests)
+        heirs = inheriting(cutting)
+        part = Part(
+            self._name,
+            composition,
+            edges,
+            rests=self._rests,
+            inherits=self._name in heirs,
+            returns=self._life > FIRST_LIFE,
+        )
         part.engine.callbacks.finished.append(partial(self._ended, part))
         lives = message.incarnations
         neighbours = {edge.source for edge in edges} | {edge.target for edge in edges}
         for other in neighbours - {self._name, MAIN}:
-            self._channels[other] = Channel(
-                self._session,
-                self._run,
-                self._name,
-                other,
-                (self._life, lives[other]),
-                partial(self._obey, part),
-            )
-        self._carrier = Carrier(part, self._session, self._run, lives, edges, self._say)
+            self._channels[other] = self._channel_to(part, other, lives[other])
+        self._carrier = Carrier(part, self._session, self._run, lives, edges, self._say, heirs)
         return part
+
+    def _channel_to(self, part: Part, other: str, life: int) -> Channel:
+        return Channel(self._session, self._run, self._name, other, (self._life, life), partial(self._obey, part))
+
+    async def _admit(self, part: Part, message: Reborn) -> None:
+        """A neighbour has died and begins anew; nobody hears any more what was said to the one that died."""
+        old = self._channels.get(message.part)
+        if old is None or self._carrier is None:
+            return
+        await old.close()
+        self._channels[message.part] = self._channel_to(part, message.part, message.life)
+        self._carrier.admit(message.part, message.life)
 
     # --- what is said -----------------------------------------------------------------------------------------------
 
@@ -141,6 +161,9 @@ class Worker:
                 part.speak(message.label, message.speaking, message.total)
             case Hears():
                 part.hear(message.label, message.hearing, message.total)  # type: ignore[arg-type]  # checked there
+            case Joins():
+                if self._carrier is not None:
+                    self._carrier.join(message)
             case Finish():
                 part.finish(message.outcome, None)
             case _:

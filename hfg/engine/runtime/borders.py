@@ -35,8 +35,9 @@ class Outlet:
 
     Attributes:
       label: of the edge.
-      sent: how many tokens have left.
+      sent: how many tokens have left, as its two ends count them: through all lives of both.
       taken: how many of them count as taken by the consumer.
+      left: how many have left in this life.
       hearing: what that does with them, as far as is known here.
     """
 
@@ -58,6 +59,7 @@ class Outlet:
         self.label: str = worker.port_name
         self.sent = 0
         self.taken = 0
+        self.left = 0
 
         def step(worker: Worker) -> None:
             worker.no_turn()
@@ -80,7 +82,23 @@ class Outlet:
         if self._keeps:
             self._waiting += len(tokens)
         self.sent += len(tokens)
+        self.left += len(tokens)
         return tokens
+
+    @property
+    def finished(self) -> int:
+        """How many of those that have left in this life count as taken."""
+        return self.left - self._waiting
+
+    def rebase(self, total: int) -> None:
+        """A former life has sent so many, and nobody waits for what becomes of them."""
+        self.sent += total
+        self.taken += total
+
+    def repeat(self, count: int) -> None:
+        """Of what has left, so many had been sent by a former life: they count once."""
+        self.sent -= count
+        self.taken -= count
 
     @property
     def speaking(self) -> bool:
@@ -131,8 +149,10 @@ class Inlet:
 
     Attributes:
       label: of the edge.
-      received: how many tokens have come.
+      received: how many tokens have come, as its two ends count them: through all lives of both.
       taken: how many of them their consumer has taken.
+      done: how many of them are done in the part, with all that came of them.
+      orphans: of how many the producer has died and left nobody who waits for them to be done.
       speaking: whether their producer is enabled, as far as is known here.
     """
 
@@ -155,6 +175,8 @@ class Inlet:
         self.label: str = worker.port_name
         self.received = 0
         self.taken = 0
+        self.done = 0
+        self.orphans = 0
 
         def step(worker: Worker) -> None:
             worker.dequeued()
@@ -162,6 +184,18 @@ class Inlet:
 
         worker.run_by(step)
         worker.changed()
+
+    def rebase(self, total: int) -> None:
+        """A former life has done so many."""
+        self.received += total
+        self.taken += total
+        self.done += total
+
+    def skip(self, count: int) -> None:
+        """So many have come that are not for this life: what belongs to them was done by a former one."""
+        self.received += count
+        for _ in range(count):
+            self._edge.count_dropped()
 
     def arrive(self, value: object, activity: int, stamp: float) -> None:
         """A token has come over the link."""

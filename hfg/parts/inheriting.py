@@ -1,0 +1,97 @@
+"""Parts of which nothing is lost when they die, and where a new life of a part goes on (rule L2, docs/links.md).
+
+A part in which each token gives exactly one on each edge that leaves it needs no ledger: what it sends inherits the
+positions of what it was sent, and a token counts as done when all that came of it is done. A new life of it is sent
+what was not done, sends what comes of that once more, and whoever has it already knows it by its position. Decides,
+never waits. Stands on graphs that are cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, TypeAlias
+
+from hfg.graph.flat import LINK, MAIN, Cutting, FlatGraph, FlatNode
+
+__all__ = ["Alignment", "Arrived", "Where", "inheriting"]
+
+Where: TypeAlias = tuple[int, int]
+"""The position of a token: stream and number."""
+
+Arrived: TypeAlias = tuple[tuple[Any, int, float], Where]
+"""A token that has come (value, modifier and stamp), and its position."""
+
+
+def inheriting(cutting: Cutting) -> frozenset[str]:
+    """Give the parts whose tokens inherit positions; all parts of a run come to the same answer.
+
+    A delay holds tokens back for good, so it would hold up who waits until they are done: with one in the graph none
+    does.
+    """
+    if any(edge.initial for flat in cutting.parts.values() for edge in flat.edges):
+        return frozenset()
+    return frozenset(name for name, flat in cutting.parts.items() if name != MAIN and _is_one_to_one(flat))
+
+
+def _is_one_to_one(flat: FlatGraph) -> bool:
+    """Whether each token that comes in is answered by one on each edge that leaves."""
+    fed = {edge.target.node for edge in flat.edges}
+    return (
+        not flat.gates
+        and any(edge.source.node == LINK for edge in flat.edges)
+        and all(edge.source.kind == "output" and edge.target.kind == "input" for edge in flat.edges)
+        and all(not edge.active and edge.source.node >= LINK for edge in flat.edges)
+        and all(edge.source.node >= 0 or edge.source.node == LINK for edge in flat.edges)
+        and all(node.index in fed and _answers_each(node) for node in flat.nodes)
+    )
+
+
+def _answers_each(node: FlatNode) -> bool:
+    options = node.options
+    return options.enabled and options.concurrency == 1 and options.on_error == "stop" and not options.active_for_s
+
+
+class Alignment:
+    """Where the edges into a new life of a part go on together.
+
+    What belongs together has the same number on all of them. What was done may be known to one producer and not yet to
+    another; so all go on behind the one that knows most, and what comes of less was done by a former life.
+    """
+
+    def __init__(self, labels: Iterable[str]) -> None:
+        """Begin knowing nothing.
+
+        Args:
+          labels: of the edges of data that come in and lose nothing.
+        """
+        self._next: dict[str, Where | None] = dict.fromkeys(labels)
+        self._held: dict[str, list[Arrived]] = {}
+        self._start: Where | None = (0, 0) if len(self._next) < 2 else None
+
+    def goes_on(self, label: str, last: Where) -> None:
+        """The producer says which token was the last that it knows to be done."""
+        if last[0] and label in self._next and self._next[label] is None:
+            self._next[label] = (last[0], last[1] + 1)
+
+    def arrive(self, label: str, tokens: list[Arrived]) -> dict[str, tuple[int, list[Arrived]]]:
+        """Take what has come, perhaps nothing; gives what is to be laid now: how many to skip, and the others."""
+        if label not in self._next:
+            return {label: (0, tokens)}
+        if self._start is not None:
+            return {label: self._without_done(tokens, self._start)}
+        if tokens and self._next[label] is None:
+            self._next[label] = tokens[0][1]
+        self._held.setdefault(label, []).extend(tokens)
+        known = [where for where in self._next.values() if where is not None]
+        if len(known) < len(self._next):
+            return {}
+        # Numbers of different streams have nothing in common: a source has begun anew, and what it had sent is lost.
+        start = self._start = max(known) if len({stream for stream, _ in known}) == 1 else (0, 0)
+        return {one: self._without_done(held, start) for one, held in self._held.items() if held}
+
+    @staticmethod
+    def _without_done(tokens: list[Arrived], start: Where) -> tuple[int, list[Arrived]]:
+        if not tokens or tokens[0][1] >= start:
+            return 0, tokens
+        later = [token for token in tokens if token[1] >= start]
+        return len(tokens) - len(later), later
