@@ -403,6 +403,28 @@ def _check_conditions(spec: ParameterSpec, parameters: Mapping[str, ParameterSpe
             raise DeclarationError(
                 f'{where}: parameter "{spec.name}" is shown if "{other.name}" is what that can never be: it {wrong}'
             )
+    ring = _ring_of_conditions(spec.name, parameters)
+    if ring:
+        names = " by ".join(f'"{name}"' for name in ring)
+        raise DeclarationError(
+            f"{where}: parameters are shown by each other, {names}, so that all could hide for ever; let one of them "
+            "be shown always"
+        )
+
+
+def _ring_of_conditions(name: str, parameters: Mapping[str, ParameterSpec]) -> tuple[str, ...]:
+    """Follow who is shown by whom from a parameter; give the way if it comes back to it."""
+    ways: list[tuple[str, ...]] = [(name,)]
+    seen: set[str] = set()
+    while ways:
+        way = ways.pop()
+        for condition in parameters[way[-1]].shown_if if way[-1] in parameters else ():
+            if condition.parameter == name:
+                return (*way, name)
+            if condition.parameter not in seen:
+                seen.add(condition.parameter)
+                ways.append((*way, condition.parameter))
+    return ()
 
 
 def install_ports(cls: type, kind: NodeType, base: type) -> None:

@@ -141,6 +141,21 @@ class NodeType:
             return spec.help
         return _documented(self.doc).get(name)
 
+    def is_shown(self, name: str, values: Mapping[str, Any]) -> bool:
+        """Say whether an editor shows a parameter, where they have these values.
+
+        What is asked of one that is hidden itself does not hold: nobody could see why.
+
+        Args:
+          name: of the parameter.
+          values: of the others; those that are not here have their defaults.
+        """
+        return all(
+            one.holds(values.get(one.parameter, self.parameters[one.parameter].default))
+            and self.is_shown(one.parameter, values)
+            for one in self.parameters[name].shown_if
+        )
+
     def spread(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Give values by input, where those of a vector may be a list under its name."""
         found: dict[str, Any] = {}

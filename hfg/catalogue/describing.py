@@ -112,6 +112,11 @@ class ParameterDescription(msgspec.Struct, frozen=True):
             said.append(f"one of {', '.join(map(repr, self.choices))}")
         return said
 
+    def facts(self) -> list[str]:
+        """Say what goes for it beside its meaning: limits, the unit, when it is shown."""
+        said = [*self.limits_in_words(), *([f"in {self.unit}"] if self.unit else [])]
+        return said + ([f"shown if {' and '.join(self.shown_if)}"] if self.shown_if else [])
+
 
 class ErrorDescription(msgspec.Struct, frozen=True):
     """What a firing may raise as part of its contract."""

@@ -143,7 +143,7 @@ def _port(port: PortDescription) -> tuple[str, str, str]:
 def _parameter(each: ParameterDescription) -> tuple[str, str, str]:
     if each.trigger:
         return each.name, "trigger", each.doc
-    facts = [*each.limits_in_words(), *([f"in {each.unit}"] if each.unit else [])]
+    facts = each.facts()
     facts += ["read-only"] if each.read_only else ["must be given"] if each.required else []
     default = "" if each.required else f" = {_default(each)}"
     said = " ".join(filter(None, [each.doc, f"({', '.join(facts)})" if facts else ""]))

@@ -224,7 +224,7 @@ def _typed(parameter: ParameterDescription) -> str:
 
 
 def _said(parameter: ParameterDescription) -> str:
-    facts = [*parameter.limits_in_words(), *([f"in {parameter.unit}"] if parameter.unit else [])]
+    facts = parameter.facts()
     return " ".join(filter(None, [parameter.doc, f"({', '.join(facts)})" if facts else ""]))
 
 

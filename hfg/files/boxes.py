@@ -14,17 +14,19 @@ from urllib.parse import quote, unquote
 
 import annotated_types
 
-from hfg.encoding import Find
-from hfg.errors import GraphError, HfgError
-from hfg.files.document import BoxDocument, Document, ParameterDocument
+from hfg.encoding import Find, encode
+from hfg.errors import EncodingError, GraphError, HfgError
+from hfg.files.document import BoxDocument, Document
 from hfg.files.values import decoded
 from hfg.graph.editing.enclosing import Enclosed
 from hfg.graph.editing.type_texts import type_of_text
 from hfg.graph.graph import Graph
 from hfg.graph.structure.subgraph import Subgraph
-from hfg.ports import Event, Input, Output, Parameter, slot
+from hfg.ports import Event, Input, Output, Parameter, ParameterSpec, slot
+from hfg.ports.conditions import Condition
+from hfg.ports.kinds import type_of_choices
 
-__all__ = ["LIMITS", "FileBox", "box_type", "file_box_type", "limits_in_words"]
+__all__ = ["LIMITS", "FileBox", "box_type", "conditions_in_words", "file_box_type", "limits_in_words"]
 
 Fill = Callable[[Any, Graph], None]
 """Takes a subgraph and the graph inside it."""
@@ -126,10 +128,10 @@ def _declarations(box: BoxDocument, said: Callable[[str, str, str], None], find:
                 yield name, declared(type_of_text(text, f'"{name}"'))
             except HfgError as error:
                 said(kind, name, str(error))
-    for name, parameter in box.parameters.items():
+    for name in box.parameters:
         try:
             _need_port_name(name, names)
-            yield name, _parameter(name, parameter, find)
+            yield name, _parameter(name, box, find)
         except HfgError as error:
             said("parameters", name, str(error))
 
@@ -142,14 +144,88 @@ def _need_port_name(name: str, names: set[str]) -> None:
     names.add(name)
 
 
-def _parameter(name: str, said: ParameterDocument, find: Find) -> Parameter[Any]:
+def _parameter(name: str, box: BoxDocument, find: Find) -> Parameter[Any]:
+    said = box.parameters[name]
     hint = type_of_text(said.type, f'"{name}"')
-    unknown = [word for word in said.limits if word not in LIMITS]
+    limits = _limits(said.limits)
+    choices: Any = None
+    if said.choices is not None:
+        choices = [decoded(one, type_of_choices(hint), find) for one in said.choices]
+    if said.labels:
+        if len(said.labels) != len(choices or ()) or len(set(said.labels)) < len(said.labels):
+            raise GraphError(
+                f"labels are what to call the choices; there are {len(choices or ())} choices and {len(said.labels)} "
+                "labels, so give each choice one of its own, or leave labels out"
+            )
+        choices = dict(zip(said.labels, choices, strict=True))
+    return Parameter(
+        decoded(said.default, hint, find),
+        *limits,
+        unit=said.unit,
+        choices=choices,
+        step=said.step,
+        group=said.group,
+        help=said.help,
+        shown_if=_conditions(name, box, find),
+        pattern=said.pattern,
+        directory=said.directory,
+        save=said.save,
+        type=hint,
+    )
+
+
+def _limits(said: Mapping[str, Any]) -> list[Any]:
+    unknown = [word for word in said if word not in LIMITS]
     if unknown:
-        raise GraphError(f'"{name}": "{unknown[0]}" is no limit; there are {", ".join(LIMITS)}')
-    limits = [LIMITS[word][0](value) for word, value in said.limits.items()]
-    choices = None if said.choices is None else [decoded(one, hint, find) for one in said.choices]
-    return Parameter(decoded(said.default, hint, find), *limits, unit=said.unit, choices=choices, type=hint)
+        raise GraphError(f'"{unknown[0]}" is no limit; there are {", ".join(LIMITS)}')
+    return [LIMITS[word][0](value) for word, value in said.items()]
+
+
+class _Together(annotated_types.GroupedMetadata):
+    """Several limits where one is asked for."""
+
+    def __init__(self, limits: list[Any]) -> None:
+        self.limits = limits
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.limits)
+
+
+def _conditions(name: str, box: BoxDocument, find: Find) -> Any:
+    """Read `shown_if`; what is none of its forms is for the declaration to refuse."""
+    said = box.parameters[name].shown_if
+    if not isinstance(said, dict):
+        return said
+    wanted: dict[str, Any] = {}
+    for other, one in said.items():
+        if isinstance(one, dict):
+            wanted[other] = _Together(_limits(one))
+        elif other in box.parameters:
+            hint = type_of_text(box.parameters[other].type, f'"{other}"')
+            several = one if isinstance(one, list) else [one]
+            wanted[other] = [decoded(value, hint, find) for value in several]
+        else:
+            wanted[other] = one
+    return wanted
+
+
+def conditions_in_words(conditions: tuple[Condition, ...], parameters: Mapping[str, ParameterSpec]) -> Any:
+    """Give conditions as a file has them, in the words of the declaration: a name, or by name what others must be.
+
+    Raises:
+      EncodingError: a value in them is no data.
+    """
+    found: dict[str, Any] = {}
+    for one in conditions:
+        if one.on:
+            return one.parameter
+        values = [encode(value, parameters[one.parameter].type) for value in one.values]
+        limits = limits_in_words(one.limits)
+        if limits is None:
+            raise EncodingError(f"a condition asks for {one.limits!r:.80}, which a file cannot say")
+        plain = values[0] if len(values) == 1 and not isinstance(values[0], dict | list) else values
+        found[one.parameter] = plain if values else limits
+    return found or None
 
 
 def limits_in_words(limits: tuple[Any, ...]) -> dict[str, Any] | None:

@@ -15,7 +15,7 @@ from typing import Any, Final
 from hfg.encoding import encode
 from hfg.errors import EncodingError, UsageError
 from hfg.files.allowed import project_of
-from hfg.files.boxes import FileBox, limits_in_words
+from hfg.files.boxes import FileBox, conditions_in_words, limits_in_words
 from hfg.files.document import (
     NODE_OPTIONS,
     BoxDocument,
@@ -40,7 +40,8 @@ from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.graph.structure.subgraph import Subgraph, inside, is_box
 from hfg.nodetype import Node
-from hfg.ports import InnerSource, InnerTarget, Port
+from hfg.ports import InnerSource, InnerTarget, ParameterSpec, Port
+from hfg.ports.kinds import choices_of, type_of_choices
 from hfg.ports.specs import REQUIRED
 from hfg.values import same
 
@@ -240,8 +241,9 @@ class _Telling:
     def declare(self, node: Subgraph, name: str, graph: BoxDocument) -> None:
         spec, path = node._type.parameters[name], f"{node.place.path}.{name}"
         limits = limits_in_words(spec.limits)
-        if limits is None or spec.trigger:
+        if limits is None or spec.trigger or spec.default is REQUIRED:
             what = "a trigger" if spec.trigger else f"its limits {spec.limits!r:.80}"
+            what = "a parameter without a default" if spec.default is REQUIRED else what
             self.wrong(
                 path,
                 f"{what} cannot be said in a file; define the subgraph {node._type.qualname} at the top of a module",
@@ -249,12 +251,27 @@ class _Telling:
             return
         try:
             default = encode(spec.default, spec.type)
-            choices = None if spec.choices is None else [encode(one, spec.type) for one in spec.choices]
+            choices, labels = _choices(spec)
+            shown_if = conditions_in_words(spec.shown_if, node._type.parameters)
         except EncodingError as error:
             self.wrong(path, f"{error}; take a type whose values are plain data")
             return
         text = self.type_text(spec.type, path)
-        graph.parameters[name] = ParameterDocument(text, default, spec.unit, choices, limits)
+        graph.parameters[name] = ParameterDocument(
+            type=text,
+            default=default,
+            unit=spec.unit,
+            choices=choices,
+            limits=limits,
+            labels=labels,
+            step=spec.step,
+            group=spec.group,
+            help=spec.help,
+            shown_if=shown_if,
+            pattern=spec.pattern,
+            directory=spec.directory,
+            save=spec.save,
+        )
 
     def file(self, node: FileBox) -> str:
         """Name the file of a subgraph from where this one is written."""
@@ -395,6 +412,16 @@ def _shape_of_level(level: Level, prefix: str) -> tuple[Any, ...]:
         [(near(gate.target.place.path), near(gate.by.place.path), gate.idle_rate_hz) for gate in level.gates],
         [(name, [_parameter_name(port) for port in ports]) for name, ports in level.promotions.by_name.items()],
     )
+
+
+def _choices(spec: ParameterSpec) -> tuple[list[Any] | None, list[str]]:
+    """What may be chosen, and how it is called; nothing where the type says it."""
+    known = choices_of(spec.type)
+    if spec.choices is None or (
+        known is not None and same((tuple(known.values()), tuple(known)), (spec.choices, spec.labels))
+    ):
+        return None, []
+    return [encode(one, type_of_choices(spec.type)) for one in spec.choices], list(spec.labels)
 
 
 def _parameter_name(port: Any) -> str:

@@ -119,6 +119,15 @@ class ParameterDocument(msgspec.Struct, omit_defaults=True):
       unit: for people.
       choices: the only allowed values.
       limits: by their names in annotated_types: gt, ge, lt, le, multiple_of, min_length, max_length.
+      labels: what to call the choices, one each.
+      step: by how much an editor moves the value.
+      group: what editors show it with.
+      help: what it means.
+      shown_if: the name of a parameter that must be on; or by name what others must be: a value, a list of them, or
+        limits.
+      pattern: which names of files fit.
+      directory: the path is that of a directory.
+      save: the path is one to write to.
     """
 
     type: str
@@ -126,6 +135,14 @@ class ParameterDocument(msgspec.Struct, omit_defaults=True):
     unit: str | None = None
     choices: list[Any] | None = None
     limits: dict[str, Any] = {}
+    labels: list[str] = []
+    step: float | None = None
+    group: str | None = None
+    help: str | None = None
+    shown_if: Any = None
+    pattern: str | None = None
+    directory: bool = False
+    save: bool = False
 
 
 class InsideDocument(msgspec.Struct, omit_defaults=True):

@@ -18,7 +18,15 @@ import numpy as np
 from hfg.types import Shape, bare_type
 from hfg.values import Colour, Span
 
-__all__ = ["ParameterKind", "choices_of", "kind_of_type", "shape_of", "type_of_default", "without_none"]
+__all__ = [
+    "ParameterKind",
+    "choices_of",
+    "kind_of_type",
+    "shape_of",
+    "type_of_choices",
+    "type_of_default",
+    "without_none",
+]
 
 ParameterKind: TypeAlias = Literal[
     "bool",
@@ -63,6 +71,13 @@ def choices_of(hint: Any) -> dict[str, Any] | None:
     if isinstance(hint, type) and issubclass(hint, enum.Enum):
         return {one.name or str(one): one for one in hint}
     return None
+
+
+def type_of_choices(hint: Any) -> Any:
+    """Give the type of what a parameter of this type chooses from: of a set or list, that of its members."""
+    bare = bare_type(without_none(hint))
+    members = typing.get_args(bare) if typing.get_origin(bare) in (*_SETS, list) else ()
+    return members[0] if members else hint
 
 
 def _label(value: Any) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import typing
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from fnmatch import fnmatch
 from typing import Any, Final
 
@@ -47,7 +47,7 @@ class ParameterSpec(msgspec.Struct, frozen=True):
       step: by how much an editor moves the value; no limit.
       group: what it is shown with, "filter" or "filter/details".
       help: what it means, where the declaration says so; else the docstring may (`NodeType.help_of`).
-      shown_if: it is shown where all of these hold; hidden or not, it has its value.
+      shown_if: it is shown where all of these hold (`NodeType.is_shown`); hidden or not, it has its value.
       read_only: set by the node's own code and shown to users: progress, a text; an output and no input (rule P8).
       pattern: which names of files fit, "*.png *.jpg".
       directory: the path is that of a directory.
@@ -118,10 +118,6 @@ class ParameterSpec(msgspec.Struct, frozen=True):
             if number < len(self.labels) and same(one, value):
                 return self.labels[number]
         return value if isinstance(value, str) else repr(value)
-
-    def is_shown(self, values: Mapping[str, Any]) -> bool:
-        """Say whether an editor shows it, where the node's parameters have these values."""
-        return all(one.holds(values[one.parameter]) for one in self.shown_if if one.parameter in values)
 
     def encode(self, value: Any) -> Any:
         """Give a value as plain data, as files and commands hold it: a choice by what it is called, if it is.

@@ -114,6 +114,10 @@ def test_what_only_the_graph_shows_is_told_with_its_line_too() -> None:
     assert 'there is no "camera.uot"' in found[3]
 
 
+BOX = "hfg: 1\nnodes:\n  b:\n    graph:\n      parameters:\n        p: "
+"""Begins a subgraph with one parameter."""
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
@@ -159,6 +163,11 @@ def test_what_only_the_graph_shows_is_told_with_its_line_too() -> None:
         ("hfg: 1\nnodes:\n  a: {file: a.hfg.yaml}", '3: "a": files that include each other have no end: a.hfg.yaml'),
         ("hfg: 1\nnodes:\n  a: {type: 'xml.dom.pulldom:x'}", '3: "a.type": module "xml.dom.pulldom" is not one that'),
         ("hfg: 1\ninputs: {a: wave.Wave_read}", '2: "a": module "wave" is not one that this file may import'),
+        (BOX + "{type: int, default: 1, choices: [1], labels: [a, b]}", '6: "b.p": labels are what to call the ch'),
+        (BOX + "{type: int, default: 1, shown_if: {q: {gtt: 3}}}", '6: "b.p": "gtt" is no limit; there are gt, ge'),
+        (BOX + "{type: int, default: 1, shown_if: q}", 'parameter "p" is shown by "q", which is no parameter'),
+        (BOX + "{type: int, default: 1, shown_if: 3}", "shown_if names parameters of the same node and what they must"),
+        (BOX + "{type: int, default: 1, step: 0}", 'parameter "p" has a step of 0'),
         ("hfg: 1\nname: " + "9" * 5000, "2: this number has 5000 digits"),
         ("hfg: 1\nnotes: " + "[" * 300 + "]" * 300, "2: this lies deeper than 200 levels"),
     ],

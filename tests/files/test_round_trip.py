@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
+import msgspec
+import numpy as np
 import pytest
-from annotated_types import Interval
+from annotated_types import Interval, Len, MinLen, MultipleOf
+from numpy.typing import NDArray
 from reactivex import operators as ops
 
 import hfg
 from hfg.files import build, describe, text_of
 from hfg.testing.plans import GraphPlan
 from hfg.testing.shrinking import shrink
+from hfg.types import Shape
+from hfg.values import same
 from tests.files.programs import Ear, Merged, Mode, Pose, Scaling, difference, double, numbers, plan_of, shown
+
+Turn = Annotated[NDArray[np.float64], Shape(3, 3)]
 
 
 def again(graph: hfg.Graph) -> hfg.Graph:
@@ -225,6 +233,69 @@ def test_a_subgraph_without_a_type_of_its_own_has_its_ports_and_parameters_in_th
     assert local.graph["node"]._parameters == {"factor": 4}
     with pytest.raises(ValueError, match="must be <= 9"):
         local.ports.parameters["factor"].value = 10
+
+
+class Every(hfg.Subgraph):
+    """Has a parameter of every kind that users set."""
+
+    soft = hfg.Parameter(False)
+    count = hfg.Parameter(
+        3, Interval(ge=0, le=9), MultipleOf(3), unit="items", step=3, group="numbers/few", help="how many"
+    )
+    title = hfg.Parameter("no: #1")
+    way = hfg.Parameter("fast", choices=("fast", "good"), shown_if="soft")
+    code = hfg.Parameter(8, choices={"Otsu": 8, "Plain": 0}, shown_if={"way": "good"})
+    mode = hfg.Parameter(Mode.FAST, shown_if={"way": ["fast", "good"], "count": Interval(ge=1, lt=9)})
+    letter = hfg.Parameter("a", type=Literal["a", "b"], shown_if={"mode": Mode.GOOD})
+    sides = hfg.Parameter(frozenset({"a"}), type=frozenset[Literal["a", "b"]])
+    some = hfg.Parameter(["a"], choices=("a", "b"), type=list[str])
+    band = hfg.Parameter(hfg.Span(0.1, 0.5), Interval(ge=0, le=1), shown_if={"some": [["a"], ["a", "b"]]})
+    frame = hfg.Parameter(hfg.Colour(255, 128, 0), shown_if={"code": 8})
+    picture = hfg.Parameter(Path("a.png"), pattern="*.png *.jpg", save=True)
+    folder = hfg.Parameter(None, type=Path | None, directory=True, shown_if={"sides": MinLen(1)})
+    gains = hfg.Parameter((0.0, 1.0), Interval(ge=-5, le=5))
+    names = hfg.Parameter(["a"], Len(1, 9), type=list[str])
+    offset = hfg.Parameter(np.eye(3), Interval(ge=-1, le=1), type=Turn)
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.add(double(), name="node")
+
+
+SET: dict[str, Any] = {
+    "soft": True,
+    "count": 6,
+    "title": "yes",
+    "way": "good",
+    "code": 0,
+    "mode": Mode.GOOD,
+    "letter": "b",
+    "sides": frozenset({"a", "b"}),
+    "some": ["b", "a"],
+    "band": hfg.Span(0.0, 1.0),
+    "frame": hfg.Colour(1, 2, 3),
+    "picture": Path("b.jpg"),
+    "folder": Path("there"),
+    "gains": (-5.0, 0.1),
+    "names": ["b", "- c"],
+    "offset": -np.eye(3),
+}
+"""Of `Every`, other values than the defaults."""
+
+
+def test_a_subgraph_without_a_type_keeps_everything_that_is_said_of_its_parameters() -> None:
+    body = {name: Every.__dict__[name] for name in SET} | {"build": Every.build}
+    local: type[hfg.Subgraph] = type("Local", (hfg.Subgraph,), body)
+    graph = hfg.Graph()
+    graph.add(local(**SET), name="local")
+    back = again(graph)["local"]
+    for name, spec in local._type.parameters.items():
+        other = back._type.parameters[name]
+        assert msgspec.structs.replace(other, default=0) == msgspec.structs.replace(spec, default=0)
+        assert same(other.default, spec.default)
+    assert all(same(back._parameters[name], value) for name, value in SET.items())
+    text = text_of(describe(graph))
+    assert "          shown_if: soft\n" in text
+    assert "          labels:\n            - Otsu\n            - Plain\n" in text
 
 
 def test_gates_over_the_borders_of_subgraphs_name_who_is_meant() -> None:

@@ -185,12 +185,32 @@ def test_what_a_kind_takes_is_its_value(name: str, given: Any) -> None:
 def test_conditions_tell_whether_an_editor_shows_a_parameter() -> None:
     values = {"way": "a", "count": 4, "on": True}
     file, text_file = SPECS["file"], SPECS["text_file"]
-    assert file.is_shown(values)
-    assert not file.is_shown(values | {"count": 2})
-    assert not file.is_shown(values | {"way": "b"})
-    assert text_file.is_shown(values)
-    assert not text_file.is_shown(values | {"on": False})
+    is_shown = Everything._type.is_shown
+    assert is_shown("file", values)
+    assert not is_shown("file", values | {"count": 2})
+    assert not is_shown("file", values | {"way": "b"})
+    assert is_shown("text_file", values)
+    assert not is_shown("text_file", values | {"on": False})
     assert [one.in_words() for one in (*file.shown_if, *text_file.shown_if)] == ["way is 'a'", "count > 2", "on is on"]
+
+
+def test_who_is_shown_by_a_hidden_parameter_is_hidden_with_it() -> None:
+    class Blurred(hfg.Node):
+        soft = hfg.Parameter(False)
+        way = hfg.Parameter("fast", choices=("fast", "good"), shown_if="soft")
+        passes = hfg.Parameter(1, shown_if={"way": "good"})
+        rest = hfg.Parameter(0.5, shown_if={"passes": at.Gt(2)})
+
+    def shown(**values: Any) -> list[str]:
+        node = Blurred(**values)
+        return [name for name in Blurred._type.parameters if Blurred._type.is_shown(name, node._parameters)]
+
+    assert shown() == ["soft"]
+    assert shown(way="good", passes=3) == ["soft"]
+    assert shown(soft=True, passes=3) == ["soft", "way"]
+    assert shown(soft=True, way="good") == ["soft", "way", "passes"]
+    assert shown(soft=True, way="good", passes=3) == ["soft", "way", "passes", "rest"]
+    assert not Blurred._type.is_shown("passes", {"way": "good"})  # `soft` is off unless it is said to be on
 
 
 def test_a_function_says_the_same_in_its_annotations() -> None:
@@ -219,7 +239,7 @@ def test_a_function_says_the_same_in_its_annotations() -> None:
     band, width = specs["band"], specs["width"]
     assert (band.unit, band.group, band.minimum, band.maximum, band.default) == ("m", "g", 0, 1, (0.2, 0.8))
     assert (width.step, width.minimum, width.default, width.type) == (0.5, 0, None, float | None)
-    assert not width.is_shown({"soft": False})
+    assert not clip._type.is_shown("width", {"soft": False})
     assert clip._type.help_of("soft") == "with round edges"
     with pytest.raises(ValueError, match=r'parameter "clip\.width" must be > 0, got -1\.0'):
         clip(width=-1.0)
@@ -283,6 +303,12 @@ def declared(**body: Any) -> type:
         (
             lambda: declared(a=hfg.Parameter(1, shown_if={"b": "z"}), b=hfg.Parameter("x", choices=("x", "y"))),
             r"\"a\" is shown if \"b\" is what that can never be: it must be one of 'x', 'y', got 'z'",
+        ),
+        (
+            lambda: declared(
+                a=hfg.Parameter(1, shown_if="b"), b=hfg.Parameter(1, shown_if="c"), c=hfg.Parameter(1, shown_if="a")
+            ),
+            'parameters are shown by each other, "a" by "b" by "c" by "a", so that all could hide for ever; let one of',
         ),
         (lambda: declared(a=hfg.Parameter(trigger=True, choices=(1, 2))), "is a trigger and has no value"),  # type: ignore[call-overload]
         (lambda: declared(a=hfg.Parameter(read_only=True)), "is read-only and has no default to begin with"),  # type: ignore[call-overload]
