@@ -5,8 +5,10 @@ Stands on `nodetype` and `functions`.
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import inspect
+import sys
 from typing import Any
 
 from hfg.description import look_up
@@ -43,10 +45,18 @@ def find(reference: str) -> type[Node] | NodeFunction[..., Any]:
     if isinstance(found, NodeFunction) or (inspect.isclass(found) and issubclass(found, Node)):
         return found
     if found is None:
-        raise TargetError(f'node type "{reference}": module "{module}" has no "{qualname}"')
+        raise TargetError(f'node type "{reference}": module "{module}" has no "{qualname}"{_meant(module, qualname)}')
     raise TargetError(
         f'"{reference}" is {found!r}, no node type; derive it from hfg.Node, or decorate it with hfg.node'
     )
+
+
+def _meant(module: str, name: str) -> str:
+    """Say which name of a module was probably meant."""
+    there = sys.modules[module]
+    known = {*dir(there), *getattr(there, "__all__", ())}
+    near = difflib.get_close_matches(name, [one for one in known if not one.startswith("_")], n=1)
+    return f' (did you mean "{near[0]}"?)' if near else ""
 
 
 def reference_of(node_type: Node | type[Node] | NodeFunction[..., Any]) -> str | None:

@@ -199,6 +199,34 @@ def test_data_that_is_no_value_of_the_type_is_refused_with_its_place(data: Any, 
     assert str(caught.value).startswith(wrong)
 
 
+ODD: list[Any] = [None, True, -1, 10**400, math.nan, "", "abc", "1,2", "#zz", "\ud800", "nan", [], [[1], [1, 2]], [{}]]
+ODD += [
+    {},
+    {"x": "a"},
+    {1: [2]},
+    {"$type": []},
+    "a:b",
+    "[1, 2",
+    "{a: 1}",
+    "2020-13-01",
+    [math.nan] * 3,
+    [None, "a", {}],
+]
+HINTS: list[Any] = [int, float, bool, str, bytes, complex, None, Any, Path, Mode, Sides, Pose, Colour, Span[float]]
+HINTS += [list[float], set[float], tuple[int, float], dict[str, float], float | None, int | str, Literal["a", 1]]
+HINTS += [npt.NDArray[np.float64], Annotated[npt.NDArray[np.float64], Shape(3)], datetime.datetime, frozenset[Mode]]
+
+
+@pytest.mark.parametrize("hint", HINTS, ids=str)
+def test_whatever_the_data_is_it_is_a_value_or_refused(hint: Any) -> None:
+    for data in ODD:
+        for read in [decode, read_text] if isinstance(data, str) else [decode]:
+            try:
+                read(data, hint)
+            except EncodingError as error:
+                assert str(error)
+
+
 @pytest.mark.parametrize(
     ("value", "wrong"),
     [

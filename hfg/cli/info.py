@@ -44,7 +44,7 @@ def _lines(found: RecordingInfo) -> list[str]:
     rows = [(one.path, one.kind, one.type or one.schema, one.values, f"{one.rate_hz:.4g}") for one in found.ports]
     lines += ["", *table(("port", "kind", "type", "values", "Hz"), rows)]
     if found.markers:
-        lines.append(f"and {found.markers} markers")
+        lines.append(f"and {found.markers} marker{'s' * (found.markers != 1)}")
     lines += [
         f'{count} tokens of "{path}" were left out, for the disk was too slow' for path, count in found.left_out.items()
     ]

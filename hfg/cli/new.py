@@ -99,7 +99,7 @@ def _place(named: str) -> tuple[Path, str]:
     place = Path(named)
     module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", place.name).replace("-", "_").lower()
     if not module.isidentifier() or keyword.iskeyword(module) or module.startswith(("_", "test_")):
-        raise TargetError(f'"{named}" names no module: letters, digits and _, as in map_lookup')
+        raise TargetError(f'"{named}" names no module: letters, digits and _, no word of Python, as in map_lookup')
     if not module.isascii() or len(module) > _LONGEST_NAME:
         raise TargetError(f'"{named}" is no good name for a file: take up to {_LONGEST_NAME} letters of a to z')
     if module in sys.stdlib_module_names or module == "hfg":

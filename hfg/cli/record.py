@@ -102,7 +102,8 @@ def told(recording: Recording) -> int:
         return 1
     size = recording.bytes_written
     shown = f"{size / 1e6:.1f} MB" if size >= 100_000 else f"{size / 1e3:.1f} kB"
-    show.sentence(f"{recording.path}: {recording.tokens} tokens of {len(recording.ports)} ports, {shown}")
+    ports = f"{len(recording.ports)} port{'s' * (len(recording.ports) != 1)}"
+    show.sentence(f"{recording.path}: {recording.tokens} tokens of {ports}, {shown}")
     if recording.held_s:
         show.sentence(f"nodes waited {recording.held_s:.3f} s for the disk; --no-lossless would have left tokens out")
     left_out = recording.left_out

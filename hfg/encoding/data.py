@@ -537,7 +537,7 @@ class _Decoder:
             return data if isinstance(data, cls) else self.member(data, cls)
         if _is_instance(data, cls):
             return data
-        if cls is float and data in _INEXACT:
+        if cls is float and isinstance(data, str) and data in _INEXACT:
             return _INEXACT[data]
         if cls is Colour:
             return self.colour(data)
@@ -554,7 +554,11 @@ class _Decoder:
 
     def member(self, data: Any, cls: Any) -> Any:
         """By name; a flag by several; else by value, as people write it."""
-        if issubclass(cls, enum.Flag) and _is_list(data) and all(name in cls.__members__ for name in data):
+        if (
+            issubclass(cls, enum.Flag)
+            and _is_list(data)
+            and all(isinstance(name, str) and name in cls.__members__ for name in data)
+        ):
             found = cls(0)
             for name in data:
                 found |= cls[name]

@@ -104,6 +104,7 @@ class _Loading:
         self.allowed = Allowed(path, allow)
         self.files: dict[Path, Read | None] = {}
         self.types: dict[Path, type[FileBox] | None] = {}
+        self.absent: list[tuple[str, int, str, str]] = []  # file, line and path of types that are not there, and why
         self.later: list[tuple[int, Callable[[], None]]] = []  # what is done when all is built, the outer first
 
     def read(self, path: Path, file: str) -> Read | None:
@@ -136,6 +137,9 @@ class _Loading:
             making.note(graph, None, None, document.notes)
             for _, step in sorted(self.later, key=lambda one: one[0]):
                 step()
+        if self.findings.problems:  # else the graph has them in their places, and its check reports them
+            for file, line, path, why in self.absent:
+                self.findings.add(file, line, path, f"its type is not there: {why}; install what has it, or correct it")
         self.findings.reject(f"{read.file} cannot be loaded")
         return graph
 
@@ -420,6 +424,9 @@ class _Making:
                     self.wrong((*key, "type"), error, graph_path(key))
                     return None
                 where = f"{self.read.file}, line {self.lines.get((*key, 'type'), 0)}"
+                self.loading.absent.append(
+                    (self.read.file, self.lines.get((*key, "type"), 0), graph_path(key), str(error))
+                )
                 return missing_node(said, name, box.edges, str(error), where)
         else:
             assert said.graph is not None

@@ -61,11 +61,11 @@ def read_file(path: Path, file: str, findings: Findings) -> Read | None:
 
 def _nearby(path: Path) -> str:
     try:
-        names = [one.name for one in path.parent.iterdir() if one.name.endswith(SUFFIX)]
+        names = [one.name.removesuffix(SUFFIX) for one in path.parent.iterdir() if one.name.endswith(SUFFIX)]
     except OSError:
         names = []
-    near = difflib.get_close_matches(path.name, names, n=1)
-    return f'; did you mean "{near[0]}"?' if near else "; see where it is, and whether its name is right"
+    near = difflib.get_close_matches(path.name.removesuffix(SUFFIX), names, n=1)
+    return f'; did you mean "{near[0]}{SUFFIX}"?' if near else "; see where it is, and whether its name is right"
 
 
 def read_bytes(data: bytes, file: str, findings: Findings) -> Read | None:

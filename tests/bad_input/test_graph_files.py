@@ -85,6 +85,21 @@ def test_everything_that_is_wrong_is_told_at_once_with_its_line() -> None:
     ]
 
 
+def test_types_that_are_not_there_are_told_with_what_else_is_wrong() -> None:
+    assert refusal(
+        """
+        hfg: 1
+        nodes:
+          lost: {type: hfg.testing.nodes:Scrpt}
+          numbers: {type: hfg.testing.nodes:Script, parameters: {count: [3]}}
+        """
+    ) == [
+        'a.hfg.yaml:3: "lost": its type is not there: node type "hfg.testing.nodes:Scrpt": module "hfg.testing.nodes" '
+        'has no "Scrpt" (did you mean "Script"?); install what has it, or correct it',
+        'a.hfg.yaml:4: "numbers.count": must be of type int, got [3]; correct the value, or take it out',
+    ]
+
+
 def test_what_only_the_graph_shows_is_told_with_its_line_too() -> None:
     found = refusal(
         f"""
@@ -135,7 +150,7 @@ BOX = "hfg: 1\nnodes:\n  b:\n    graph:\n      parameters:\n        p: "
         ("hfg: 1\nname: [a", "this is no YAML: while parsing a flow sequence"),
         ("hfg: 1\nnodes:\n  a:\n    type: x:y\n   b: 1", "5: this is no YAML"),
         ("hfg: 1\nname: a\nname: b", '3: "name" is here twice, already in line 2; take one out, or rename it'),
-        ("hfg: 1\nnodes:\n  a: {type: 'x:y'}\n  a: {type: 'x:z'}", '4: "a" is here twice, already in line 3'),
+        ("hfg: 1\nnodes:\n  a: {type: 'hfg.testing.nodes:sink'}\n  a: {type: 'x:z'}", '4: "a" is here twice, already in line 3'),
         ("hfg: 1\n---\nhfg: 1", "2: a second document begins here"),
         ("hfg: 1\nname: !!python/name:os.system x", '2: "tag:yaml.org,2002:python/name:os.system" is a tag'),
         ("hfg: 1\nnotes: !!python/object/apply:os.system {a: ls}", "2: "),
@@ -293,6 +308,8 @@ def test_there_is_no_such_file_and_one_like_it() -> None:
         hfg.errors.FileError, match=r'rbot.hfg.yaml: there is no such file; did you mean "robot.hfg.yaml"'
     ):
         hfg.load("rbot.hfg.yaml")
+    with pytest.raises(hfg.errors.FileError, match=r"house.hfg.yaml: there is no such file; see where it is"):
+        hfg.load("house.hfg.yaml")
     Path("b.hfg.yaml").mkdir()
     with pytest.raises(hfg.errors.FileError, match="this is a folder"):
         hfg.load("b.hfg.yaml")
