@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import datetime
 import decimal
@@ -221,10 +222,8 @@ HINTS += [npt.NDArray[np.float64], Annotated[npt.NDArray[np.float64], Shape(3)],
 def test_whatever_the_data_is_it_is_a_value_or_refused(hint: Any) -> None:
     for data in ODD:
         for read in [decode, read_text] if isinstance(data, str) else [decode]:
-            try:
+            with contextlib.suppress(EncodingError):  # anything else fails
                 read(data, hint)
-            except EncodingError as error:
-                assert str(error)
 
 
 @pytest.mark.parametrize(

@@ -138,8 +138,8 @@ class _Loading:
             for _, step in sorted(self.later, key=lambda one: one[0]):
                 step()
         if self.findings.problems:  # else the graph has them in their places, and its check reports them
-            for file, line, path, why in self.absent:
-                self.findings.add(file, line, path, f"its type is not there: {why}; install what has it, or correct it")
+            for file, line, at, why in self.absent:
+                self.findings.add(file, line, at, f"its type is not there: {why}; install what has it, or correct it")
         self.findings.reject(f"{read.file} cannot be loaded")
         return graph
 

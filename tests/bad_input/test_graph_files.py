@@ -150,7 +150,7 @@ BOX = "hfg: 1\nnodes:\n  b:\n    graph:\n      parameters:\n        p: "
         ("hfg: 1\nname: [a", "this is no YAML: while parsing a flow sequence"),
         ("hfg: 1\nnodes:\n  a:\n    type: x:y\n   b: 1", "5: this is no YAML"),
         ("hfg: 1\nname: a\nname: b", '3: "name" is here twice, already in line 2; take one out, or rename it'),
-        ("hfg: 1\nnodes:\n  a: {type: 'hfg.testing.nodes:sink'}\n  a: {type: 'x:z'}", '4: "a" is here twice, already in line 3'),
+        ("hfg: 1\nnodes:\n  a: {type: 'hfg.testing.nodes:sink'}\n  a: {type: 'x:z'}", '4: "a" is here twice'),
         ("hfg: 1\n---\nhfg: 1", "2: a second document begins here"),
         ("hfg: 1\nname: !!python/name:os.system x", '2: "tag:yaml.org,2002:python/name:os.system" is a tag'),
         ("hfg: 1\nnotes: !!python/object/apply:os.system {a: ls}", "2: "),
