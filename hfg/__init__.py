@@ -27,6 +27,7 @@ from hfg.files import load, save
 from hfg.functions import node
 from hfg.graph import Graph, Subgraph, commands, operator
 from hfg.logs import log
+from hfg.meeting import publish, subscribe
 from hfg.nodetype import Node
 from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
 from hfg.registry import reference_of
@@ -67,10 +68,12 @@ __all__ = [
     "node",
     "now",
     "operator",
+    "publish",
     "reference_of",
     "run",
     "run_async",
     "running",
     "save",
     "slot",
+    "subscribe",
 ]

@@ -47,15 +47,18 @@ FLOORS = {
     "hfg.activity": 4,
     "hfg.links": 4,
     "hfg.links.running": 5,
+    "hfg.links.meeting": 5,
     "hfg.timeline": 4,
     "hfg.engine": 5,
     "hfg.nodes": 6,
     "hfg.files": 6,
     "hfg.recording": 6,
     "hfg.parts": 6,
+    "hfg.parts.transports": 5,  # finds them, and knows nothing of parts
     "hfg.catalogue": 6,
     "hfg.cli": 7,
     "hfg.studio": 7,
+    "hfg.meeting": 7,
     "hfg.composing": 7,  # puts what stands high where lower floors ask for it
     "hfg.__main__": 8,  # the two doors: they may see everything, and nobody sees them
     "hfg": 8,
@@ -66,6 +69,7 @@ SAME_FLOOR_FREE = {0, 2}  # one vocabulary each: what everybody speaks of, and w
 SAME_FLOOR_PAIRS = {
     ("hfg.cli", "hfg.studio"),
     ("hfg.engine", "hfg.links.running"),
+    ("hfg.links.meeting", "hfg.links.running"),
     ("hfg.__main__", "hfg.cli"),
     ("hfg.testing", "hfg"),
     ("hfg.nodes", "hfg.recording"),  # a family of it is made there

@@ -13,6 +13,8 @@ from hfg.testing import Trial
 from hfg.testing.usable import try_all
 
 NEEDS: dict[str, str] = {
+    "hfg.nodes.links:Publish": "a graph around it, which says the type",
+    "hfg.nodes.links:Subscribe": "a graph around it, which says the type",
     "hfg.nodes.video:Camera": "a camera",
     "hfg.nodes.video:Screenshot": "a screen",
 }

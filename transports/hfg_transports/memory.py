@@ -87,6 +87,11 @@ class Network:
         self._watches: dict[_Watching, None] = {}
         self._answers: dict[str, list[_Answering]] = defaultdict(list)
 
+    @property
+    def sessions(self) -> tuple[MemorySession, ...]:
+        """Those that are open, in the order in which they were opened."""
+        return tuple(self._sessions)
+
     async def open(self) -> MemorySession:
         """Begin a session on the running loop."""
         session = MemorySession(self, asyncio.get_running_loop())
@@ -533,11 +538,13 @@ class _Memory:
     def __init__(self) -> None:
         self._networks: dict[str, Network] = {}
 
+    def network(self, name: str = "default") -> Network:
+        """Give the network of a name, to set its faults and to cut sessions off."""
+        return self._networks.setdefault(name, Network())
+
     async def open(self, *, network: Network | str = "default") -> MemorySession:
         """Begin a session on a network, or on that of a name."""
-        if isinstance(network, str):
-            network = self._networks.setdefault(network, Network())
-        return await network.open()
+        return await (self.network(network) if isinstance(network, str) else network).open()
 
 
 transport: Final = _Memory()

@@ -1,0 +1,221 @@
+"""Programs that meet by a name: what one publishes the others subscribe to, started in any order.
+
+    hfg.publish("camera/front", camera.out)          # in one program
+    hfg.subscribe("camera/front", viewer.picture)    # in another
+
+Both ends have the type of the port that they are connected to, and say it when they meet. Nothing else is needed on
+this computer but `pip install 'hfg[zenoh]'`; other hosts are reached with a settings file.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+from typing import Any, Literal
+
+from annotated_types import Ge
+
+from hfg.clock import now
+from hfg.encoding import type_fingerprint, wire_problem
+from hfg.errors import EndOfStream, UsageError
+from hfg.graph import Graph
+from hfg.graph.flat import flatten
+from hfg.graph.structure.level import level_of
+from hfg.links.meeting import Publication, Subscription
+from hfg.links.offers import need_link_name
+from hfg.nodes._sessions import share
+from hfg.nodetype import Node
+from hfg.ports import Input, Output, Parameter
+from hfg.token import END, Token
+from hfg.types import describe
+
+__all__ = ["Publish", "Subscribe"]
+
+
+class Publish(Node):
+    """Give all values to the programs that subscribe to a name.
+
+    Subscribers that want every value get every value from the moment they join, once and in order, and hold this node
+    up when they are slow; `lossless=False` waits for nobody. Whatever the node is connected to gives the type. Markers
+    of silence and activity do not cross: an active edge belongs to one graph. The end does.
+
+    Attributes:
+      value: what is published, with its stamp.
+      name: by which the programs meet, "camera/front".
+      lossless: whether subscribers that want every value are waited for.
+      window: how many values may be on their way to them.
+      absent: what to do while nobody has subscribed: "pass" lets values go by; "wait" waits, also for somebody who
+        takes the place of the last subscriber, and then nothing is lost by its death.
+      transport: "zenoh" or "memory"; empty: the environment variable HFG_TRANSPORT, else Zenoh, and memory in virtual
+        time.
+      settings: the settings file of Zenoh, or the name of a network in memory; empty: HFG_SETTINGS, else this computer
+        alone.
+
+    Raises:
+      UsageError: it is connected to no port whose values can cross, or the name is none.
+      TransportError: the transport cannot be used, or a value is too large for it.
+      EncodingError: a value is not of the type.
+    """
+
+    value = Input(Any)
+    name = Parameter("link")
+    lossless = Parameter(True)
+    window = Parameter(8, Ge(1))
+    absent = Parameter("pass", type=Literal["pass", "wait"])
+    transport = Parameter("")
+    settings = Parameter("")
+
+    async def setup(self) -> None:
+        """Say what is published."""
+        hint = _type_of(self)
+        self._share = share(_whole(self), self.transport, self.settings)
+        self._end = Publication(
+            await self._share.session(),
+            need_link_name(self.name),
+            hint,
+            who=_who(self),
+            lossless=self.lossless,
+            window=self.window,
+            absent=self.absent,
+            complain=self.log.warning,
+        )
+
+    async def process(self, value: Token[Any]) -> None:
+        """Publish it; wait while the subscribers have no room."""
+        await self._end.send(value.value, value.stamp)
+
+    async def end(self) -> None:
+        """Say that nothing more comes, and wait until those who want every value have done with it."""
+        await self._end.end(now())
+
+    async def teardown(self) -> None:
+        """Take part no more."""
+        await _close(self)
+
+    def statistics(self) -> dict[str, int]:
+        """Say what has happened, in numbers: who is `here`, what was `sent` and `passed` by, `lost`, `refused` ..."""
+        return _statistics(self)
+
+
+class Subscribe(Node):
+    """Send what another program publishes by a name: a source that waits for it.
+
+    It waits until somebody publishes, and takes part in what the first one does that fits; when that has gone, in what
+    the next one does. What is connected to it gives the type. Its tokens have the stamps of the publisher's clock.
+
+    Attributes:
+      out: what was published.
+      name: by which the programs meet, "camera/front".
+      overflow: "wait": every value, and the publisher waits for this program; else what becomes of one too many, as on
+        edges from events, and nobody waits: "latest", "drop_oldest", "drop_newest", "error".
+      capacity: how many values wait here.
+      latest: begin with the latest value that was published before.
+      at_end: what to do when what was published has ended: "end", or "wait" for somebody who publishes it anew.
+      if_gone: what to do when a publisher has gone without an end: "wait" until one returns, or "end".
+      transport: as of `Publish`.
+      settings: as of `Publish`.
+
+    Raises:
+      UsageError: it is connected to no port whose values can cross, or to ports of several types, or the name is none.
+      TransportError: the transport cannot be used.
+      QueueOverflow: a value was too many, under overflow="error".
+    """
+
+    out = Output(Any)
+    name = Parameter("link")
+    overflow = Parameter("wait", type=Literal["wait", "latest", "drop_oldest", "drop_newest", "error"])
+    capacity = Parameter(8, Ge(1))
+    latest = Parameter(False)
+    at_end = Parameter("end", type=Literal["end", "wait"])
+    if_gone = Parameter("wait", type=Literal["wait", "end"])
+    transport = Parameter("")
+    settings = Parameter("")
+
+    async def setup(self) -> None:
+        """Look who publishes."""
+        hint = _type_of(self)
+        self._share = share(_whole(self), self.transport, self.settings)
+        self._end = Subscription(
+            await self._share.session(),
+            need_link_name(self.name),
+            hint,
+            who=_who(self),
+            overflow=self.overflow,
+            capacity=self.capacity,
+            latest=self.latest,
+            complain=self.log.warning,
+        )
+
+    async def process(self) -> None:
+        """Wait for the next value and send it; the one before is done now (F5), which the publisher hears."""
+        while True:
+            token = await self._end.take()
+            wish = self.if_gone if token is None else self.at_end
+            if token is not None and token.value is not END:
+                self.out.send(token.value, stamp=token.stamp)
+                return
+            if wish == "end":
+                raise EndOfStream
+
+    async def teardown(self) -> None:
+        """Take part no more."""
+        await _close(self)
+
+    def statistics(self) -> dict[str, int]:
+        """Say what has happened, in numbers: who is `here`, what was `received`, `lost`, `dropped`, `refused` ..."""
+        return _statistics(self)
+
+
+def _whole(node: Node) -> Graph:
+    whole: Graph = level_of(node.place.graph).whole.root.face
+    return whole
+
+
+def _who(node: Node) -> str:
+    return f'"{_whole(node).name}" (process {os.getpid()} on {socket.gethostname()})'
+
+
+def _type_of(node: Publish | Subscribe) -> Any:
+    """Give the type of the ports at the other end of the node's edges."""
+    what = "published" if isinstance(node, Publish) else "subscribed to"
+    named = f'"{need_link_name(node.name)}" cannot be {what} by "{node.place.path}"'
+    ports: list[Any] = []
+    for flat in flatten(_whole(node)).walk():
+        for edge in flat.edges:
+            here, there = (edge.target, edge.source) if isinstance(node, Publish) else (edge.source, edge.target)
+            if getattr(here.port, "node", None) is node and here.name in ("value", "out"):
+                ports.append(there.port)
+    if not ports:
+        raise UsageError(f"{named}: it is connected to no port that would say the type; connect it, or remove it")
+    types: dict[str, Any] = {}
+    for port in ports:
+        hint = getattr(port, "type", Any)  # an observable says none
+        path = getattr(port, "path", "an observable")
+        problem = wire_problem(hint)
+        if problem is not None:
+            raise UsageError(f'{named}: a value of "{path}" cannot be sent: {problem}')
+        types.setdefault(type_fingerprint(hint), port)
+    if len(types) > 1:
+        one, other = list(types.values())[:2]
+        raise UsageError(
+            f'{named}: "{one.path}" is of type {describe(one.type)} and "{other.path}" of {describe(other.type)}; '
+            "take a node for each type"
+        )
+    return next(iter(types.values())).type
+
+
+async def _close(node: Any) -> None:
+    end, borrowed = getattr(node, "_end", None), getattr(node, "_share", None)
+    node._share = None
+    if end is not None:
+        node._last = end.statistics()
+        await end.close()
+        node._end = None
+    if borrowed is not None:
+        await borrowed.give_back()
+
+
+def _statistics(node: Any) -> dict[str, int]:
+    end = getattr(node, "_end", None)
+    numbers: dict[str, int] = getattr(node, "_last", {}) if end is None else end.statistics()
+    return numbers
