@@ -8,12 +8,16 @@ from __future__ import annotations
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
+
+import numpy as np
 
 from hfg.ports.automatic import sent_name
 from hfg.testing import nodes as types
 from hfg.testing.operators import through
 from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
+from hfg.values import Colour, Span
 
 __all__ = [
     "FEEDS",
@@ -88,6 +92,7 @@ class Allowed:
     iteration: bool = False  # inside of iteration
     endings: bool = False  # last words, sources without end that work for who will have ended
     clinging: bool = False  # teardowns that hang
+    tuned: bool = False  # parameters of every kind
     threads: bool = False
     feeds: bool = False
     sources: bool = True
@@ -160,6 +165,23 @@ _OPERATORS: list[tuple[str, list[float]]] = [
 _SEVERAL = ("slow_double", "Waiting", "restless", "calm", "Unsteady")
 _TRIED_AGAIN = ("Unsteady", "Stubborn")
 
+_TUNED: dict[str, list[Any]] = {
+    "soft": [True],
+    "effort": [types.Effort.MUCH, types.Effort.LITTLE],
+    "code": [0, 8],
+    "sides": [frozenset({"left"}), frozenset({"right", "left"})],
+    "picks": [["b"], ["c", "a", "c"]],
+    "share": [0.25, 1.0, 0],
+    "band": [Span(1, 1), Span(-9, 9)],
+    "frame": [Colour(0, 0, 0), Colour(1, 2, 3)],
+    "file": [Path("b.jpg"), Path("a b/../ü: #.png")],
+    "folder": [Path(), Path("/there")],
+    "gains": [(3, 2, 1), (-1, 0, 10**12)],
+    "turn": [np.zeros((2, 2)), np.array([[1.5, -2.0], [0.0, 7.25]])],
+    "names": [["no"], ["- x", "", "a: b\nc "]],
+}
+"""What the parameters of every kind are set to."""
+
 _DELICATE_SLOTS = ["activate", "deactivate", "reset", "disable", "enable"]
 
 
@@ -185,6 +207,7 @@ class _Making:
         inner += ["Unsteady"] * 3 + ["Stubborn"] * 2 if allowed.retries else []
         inner += ["LastWord", "LastWord", "Hums"] if allowed.endings and not allowed.plain else []
         inner += ["EachOfEach"] if allowed.iteration and not allowed.plain else []
+        inner += ["Tuned"] * 6 if allowed.tuned else []
         inner += ["Clings"] if allowed.clinging and not allowed.plain else []
         if not allowed.events:
             inner = [name for name in inner if name != "AsyncRelay"]
@@ -233,6 +256,8 @@ class _Making:
                 return {"at": choose.number(2, 3)}
             case "slow_double" | "Waiting" | "Unsteady":
                 return {"pause_s": choose.one_of([0.0, 0.003, 0.01])}
+            case "Tuned":
+                return {name: choose.one_of(values) for name, values in _TUNED.items() if choose.chance(40)}
         return {}
 
     def _options(self, kind: str) -> dict[str, Any]:

@@ -7,10 +7,17 @@ reference can be compared.
 from __future__ import annotations
 
 import asyncio
+import enum
 from collections.abc import AsyncIterator, Iterator
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from annotated_types import Gt, Interval
+from numpy.typing import NDArray
 
 import hfg
+from hfg.types import Shape
 
 __all__ = [
     "AsyncRelay",
@@ -38,6 +45,7 @@ __all__ = [
     "Stateful",
     "Stubborn",
     "Tally",
+    "Tuned",
     "Unsteady",
     "Waiting",
     "add",
@@ -486,6 +494,55 @@ class Waiting(hfg.Node):
         await asyncio.sleep(self.pause_s)
         self.after.trigger(value)
         return None if value % 2 else value
+
+
+class Effort(enum.Enum):
+    """What a parameter chooses from."""
+
+    LITTLE = 1
+    MUCH = 2
+
+
+Turn = Annotated[NDArray[np.float64], Shape(2, 2)]
+
+
+class Tuned(hfg.Node):
+    """Has a parameter of every kind that is no plain number or text, and adds up what they say."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    soft = hfg.Parameter(False)
+    effort = hfg.Parameter(Effort.LITTLE, shown_if="soft")
+    code = hfg.Parameter(8, choices={"Otsu": 8, "Plain": 0}, shown_if={"effort": Effort.MUCH})
+    sides = hfg.Parameter(frozenset(), type=frozenset[Literal["left", "right"]])
+    picks = hfg.Parameter([], choices=("a", "b", "c"), type=list[str])
+    share = hfg.Parameter(0.5, Interval(ge=0, le=1), unit="m", step=0.25, group="numbers/few")
+    band = hfg.Parameter(hfg.Span(0, 3), Interval(ge=-9, le=9), shown_if={"share": Gt(0.25)})
+    frame = hfg.Parameter(hfg.Colour(255, 128, 0))
+    file = hfg.Parameter(Path("a.png"), pattern="*.png *.jpg", save=True)
+    folder = hfg.Parameter(None, type=Path | None, directory=True)
+    gains = hfg.Parameter((0, 1, 2))
+    turn = hfg.Parameter(np.eye(2), type=Turn)
+    names = hfg.Parameter([], type=list[str])
+    press = hfg.Parameter(trigger=True)
+    done = hfg.Parameter(0.0, Interval(ge=0, le=1), read_only=True)
+    said = hfg.Parameter("", read_only=True)
+
+    def process(self, value: int) -> int:
+        """Give the value and all that is set, and say so."""
+        self.done = (self.done + 0.25) % 1
+        numbers = [
+            self.soft,
+            self.effort.value,
+            self.code,
+            len(self.sides),
+            *map(ord, self.picks),
+            round(4 * self.share),
+        ]
+        numbers += [*self.band, *self.frame, len(str(self.file)), len(str(self.folder)), *self.gains]
+        numbers += [int(self.turn.sum()), sum(map(len, self.names))]
+        self.said = f"{value}: {sum(numbers)}"
+        return value + sum(numbers)
 
 
 class Unsteady(hfg.Node):

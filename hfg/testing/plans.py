@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import Any, Final
 
 from hfg.graph import Graph, Subgraph
@@ -273,6 +274,9 @@ class _Writing:
 
     def text(self) -> str:
         lines = ["import hfg", "from typing import Any", "from hfg.testing.nodes import *"]
+        if any(node.type == "Tuned" for node in self.plan.nodes):
+            lines += ["from pathlib import PosixPath", "from numpy import array", "from hfg import Colour, Span"]
+            lines += ["from hfg.testing.nodes import Effort"]
         if any("through" in edge.options for edge in self.plan.edges):
             lines.append("from hfg.testing.operators import through")
         lines.append("")
@@ -318,4 +322,8 @@ class _Writing:
 
 
 def _arguments(values: dict[str, Any], before: str = "") -> str:
-    return before + ", ".join(f"{name}={value!r}" for name, value in values.items()) if values else ""
+    return before + ", ".join(f"{name}={_written(value)}" for name, value in values.items()) if values else ""
+
+
+def _written(value: Any) -> str:
+    return f"{type(value).__name__}.{value.name}" if isinstance(value, Enum) else repr(value)

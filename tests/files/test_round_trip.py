@@ -337,3 +337,13 @@ def test_saving_changes_nothing_and_may_be_done_while_it_runs(tmp_path: Path) ->
         runner.run(main())
     assert hfg.load(tmp_path / "a.hfg.yaml")["double"]._parameters["factor"] == 5
     graph.undo()
+
+
+def test_random_graphs_have_parameters_of_every_kind_that_are_set() -> None:
+    """And a plan prints as the program that sets them."""
+    plans = [plan for seed in range(0, 60, 3) if (plan := plan_of(seed)) is not None]
+    tuned = [(plan, node) for plan in plans for node in plan.nodes if node.type == "Tuned"]
+    assert len({name for _, node in tuned for name in node.parameters}) >= 9
+    names: dict[str, Any] = {}
+    exec(repr(tuned[-1][0]), names)
+    assert text_of(describe(names["graph"])) == text_of(describe(tuned[-1][0].build()))
