@@ -16,7 +16,6 @@ from hfg.engine.runtime.settings import Settings
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, cut, flatten
-from hfg.graph.structure.level import level_of
 from hfg.logs import Log
 from hfg.parts.agreement import Rest
 from hfg.parts.channels import Carrier, Channel, name_of
@@ -25,35 +24,27 @@ from hfg.parts.inheriting import inheriting
 from hfg.parts.messages import (
     Ask,
     Begin,
-    Call,
     Close,
     Closed,
     Ended,
     Finish,
     Hears,
     Joins,
-    Logged,
     Message,
     Open,
     Opened,
     Reborn,
     Rests,
-    Sees,
-    Shares,
     Speaks,
     Told,
 )
 from hfg.parts.part import Part
-from hfg.parts.rings import sweep_run
-from hfg.parts.serving import Serving
-from hfg.parts.sieve import sieve
 from hfg.transport import Session
 
 __all__ = ["FIRST_LIFE", "Worker"]
 
 _LOGGER = Log("hfg.parts")
 FIRST_LIFE = 1
-_MOST_RECORDS = 1000  # that wait to be told
 _PARTING_S = 2.0  # how long the last words may take
 
 
@@ -80,8 +71,6 @@ class Worker:
         self._channels = {MAIN: Channel(session, run, name, MAIN, lives, self._inbox.put_nowait)}
         self._part: Part | None = None
         self._carrier: Carrier | None = None
-        self._shares_memory = False
-        self._serving: Serving | None = None
         self._is_closed = False
 
     async def serve(self) -> None:
@@ -102,16 +91,8 @@ class Worker:
         finally:
             if self._part is not None and not self._is_closed:  # nobody is there any more who would say so
                 self._part.finish("cancelled", None)
-                if self._serving is not None:
-                    self._serving.close()
                 await self._part.composition.lifetime.close()
             await self._leave()
-
-    def log(self, logged: Logged) -> None:
-        """Bring a log record to the main part; when that is slow, some are left out."""
-        channel = self._channels[MAIN]
-        if channel.waiting < _MOST_RECORDS:
-            channel.send(logged)
 
     def _say(self, part: str, message: Message) -> None:
         self._channels[part].send(message)
@@ -121,9 +102,6 @@ class Worker:
     async def _open(self, message: Open) -> None:
         try:
             self._part = part = self._make(message)
-            assert self._serving is not None
-            for call in message.calls:
-                self._serving.obey(call)
             went_well = await part.composition.lifetime.set_up()
         except HfgError as error:
             self._say(MAIN, Opened(self._name, as_failed(error)))
@@ -137,8 +115,7 @@ class Worker:
 
     def _make(self, message: Open) -> Part:
         graph = self._build(message)
-        flat = flatten(graph)
-        cutting = cut(flat)
+        cutting = cut(flatten(graph))
         if self._name not in cutting.parts:
             raise EngineInternalError(f'graph "{graph.name}" has no part "{self._name}" here')
         edges = list(cutting.edges_of(self._name))
@@ -152,18 +129,12 @@ class Worker:
             inherits=self._name in heirs,
             returns=self._life > FIRST_LIFE,
         )
-        self._serving = Serving(graph, flat, composition, partial(self._say, MAIN))
-        level_of(graph).whole.begin_run(self._serving.run)
-        composition.consumers.leave_out(sieve(self._name, edges))
         part.engine.callbacks.finished.append(partial(self._ended, part))
         lives = message.incarnations
         neighbours = {edge.source for edge in edges} | {edge.target for edge in edges}
         for other in neighbours - {self._name, MAIN}:
             self._channels[other] = self._channel_to(part, other, lives[other])
-        self._carrier = Carrier(
-            part, self._session, self._run, lives, edges, self._say, heirs, shares_memory=message.shares_memory
-        )
-        self._shares_memory = message.shares_memory
+        self._carrier = Carrier(part, self._session, self._run, lives, edges, self._say, heirs)
         return part
 
     def _channel_to(self, part: Part, other: str, life: int) -> Channel:
@@ -193,14 +164,8 @@ class Worker:
             case Joins():
                 if self._carrier is not None:
                     self._carrier.join(message)
-            case Shares() | Sees():
-                if self._carrier is not None:
-                    self._carrier.share(message)
             case Finish():
                 part.finish(message.outcome, None)
-            case Call():
-                assert self._serving is not None
-                self._serving.obey(message)
             case _:
                 _LOGGER.warning('%s was told "%s", which it does not know', name_of(self._name), type(message).__name__)
 
@@ -208,8 +173,6 @@ class Worker:
         self._say(MAIN, Rests(rest))
 
     def _ended(self, part: Part) -> None:
-        assert self._serving is not None
-        self._serving.flush()
         self._say(MAIN, Ended(self._name, part.engine.outcome, as_failed(part.engine.error)))
 
     # --- the end ----------------------------------------------------------------------------------------------------
@@ -222,8 +185,6 @@ class Worker:
         try:
             await part.composition.lifetime.close()
         finally:
-            if self._serving is not None:
-                self._serving.close()
             engine = part.engine
             failed = as_failed(engine.error) if engine.outcome == "failed" else None
             self._say(MAIN, _closed(self._name, engine, failed))
@@ -232,8 +193,6 @@ class Worker:
         await self._channels[MAIN].flush(_PARTING_S)
         if self._carrier is not None:
             await self._carrier.close()
-        if self._shares_memory:
-            sweep_run(self._run)  # if the main part was killed, nobody else is left who would
         for channel in self._channels.values():
             await channel.close()
 

@@ -6,16 +6,16 @@ from collections.abc import Callable
 from typing import Any
 
 from hfg.errors import Aborted, NodeError
+from hfg.testing.reference.firing import Firing
 from hfg.testing.reference.state import Flight, Line, Lying, Station
 from hfg.testing.reference.structure import ROOT, boundary_of, is_box
-from hfg.testing.reference.tasks import Tending
 from hfg.token import Token
 from hfg.trace import CallEnded, CallStarted, ErrorRaised, FiringEnded, NodeEnabled, TokenProcessed, TokenTaken
 
 __all__ = ["Calling"]
 
 
-class Calling(Tending):
+class Calling(Firing):
     """A machine whose slots can be called."""
 
     def start_call(self, owner: int, line: Line) -> None:
@@ -84,12 +84,9 @@ class Calling(Tending):
         return actions[name]
 
     def launch_call(self, flight: Flight, handler: Callable[[], Any]) -> None:
-        """Run the handler where its group runs; what tears the node down behind its firings (F14) and its tasks."""
-        station = flight.station
-        automatic = flight.slot not in station.type.slots
-        if automatic and self.begins_afresh(flight) and (station.is_flying or station.tasks):
-            if not station.is_flying:
-                self.cancel_tasks(station)
+        """Run the handler where its group runs; what tears the node down behind its firings (F14)."""
+        automatic = flight.slot not in flight.station.type.slots
+        if automatic and self.begins_afresh(flight) and flight.station.is_flying:
             flight.when_rested = lambda: self.launch_call(flight, handler)
             return
         # `setup` and `teardown` run where the node does
@@ -107,9 +104,9 @@ class Calling(Tending):
 
     def begins_afresh(self, flight: Flight) -> bool:
         """Whether what an automatic slot does begins with a teardown (A9, F10)."""
-        index = flight.station.leaf.index
         if flight.slot == "reset":
-            return flight.station.resting_until is None or flight.station.is_flying
+            return True
+        index = flight.station.leaf.index
         return flight.slot == "enable" and not self.is_enabled(index) and self.is_enabled_around(index)
 
     def is_async_slot(self, flight: Flight) -> bool:
@@ -165,7 +162,7 @@ class Calling(Tending):
             self.quench(-2 - owner, "slot")
         else:
             for station in self.members_of(owner):
-                if not station.is_amid and not station.tasks:
+                if not station.is_amid:
                     self.reset(station)
                 else:
                     station.afterwards = station.afterwards or "reset"
@@ -199,15 +196,10 @@ class Calling(Tending):
             station.node._reset_states()
             hook = station.node._hook("setup")
             if hook is not None:
-                station.opening = True
                 self.run_hook(station, hook)
-                station.opening = False
-            if not self.is_enabled(station.leaf.index):  # they last as long as its setup (F10)
-                self.cancel_tasks(station)
 
     def tear_down(self, station: Station) -> None:
         """Close what `setup` opened."""
-        self.abandon_tasks(station)
         if station.set_up and station.leaf.inside is None:
             hook = station.node._hook("teardown")
             if hook is not None:
@@ -265,7 +257,6 @@ class Calling(Tending):
 
     def _silence(self, station: Station) -> None:
         index = station.leaf.index
-        self.cancel_tasks(station)
         for flight in station.firings_under_way:
             flight.void = True
         for line in self.lines:  # nobody waits for what it has taken
