@@ -27,6 +27,7 @@ __all__ = [
     "Doubter",
     "EachOfEach",
     "EachOfThose",
+    "Effort",
     "Failing",
     "Greeter",
     "Hums",

@@ -46,12 +46,20 @@ def _name_of_class(kind: type) -> str | None:
 
 
 def _name_of_alias(hint: object) -> str | None:
-    """The name that a module has given to a type that has none of its own, such as an array of a shape."""
+    """The name that a module has given to a type that has none of its own, such as an array of a shape.
+
+    One that is equal is as good: which of several equal ones `typing` gives out depends on what was imported before.
+    """
+    equal: str | None = None
     for name, module in list(sys.modules.items()):
         for own, value in list(getattr(module, "__dict__", {}).items()):
-            if value is hint and own.isidentifier():
+            if not own.isidentifier():
+                continue
+            if value is hint:
                 return f"{name}.{own}"
-    return None
+            if equal is None and type(value) is type(hint) and value == hint:
+                equal = f"{name}.{own}"
+    return equal
 
 
 def type_of_text(text: str, where: str) -> Any:  # noqa: ANN401 - any type hint

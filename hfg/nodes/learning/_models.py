@@ -46,6 +46,8 @@ def model_of(data: bytes, name: str) -> Any:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         node = storage.getFirstTopLevelNode()
         kind = _KINDS[node.name()]
+        if not _is_whole(node):
+            raise ValueError
         model = kind()
         model.read(node)
         if not model.isTrained():
@@ -56,6 +58,24 @@ def model_of(data: bytes, name: str) -> Any:
             "train one"
         ) from None
     return model
+
+
+def _is_whole(node: Any) -> bool:
+    """Whether all of the trees are there: OpenCV reads a file that was cut off, and then follows what it has not read.
+
+    In each tree there is one leaf more than there are nodes that split.
+    """
+    trees = node.getNode("trees")
+    if trees.empty():
+        return True
+    if trees.size() != int(node.getNode("ntrees").real()):
+        return False
+    for number in range(trees.size()):
+        nodes = trees.at(number).getNode("nodes")
+        splits = sum(not nodes.at(index).getNode("splits").empty() for index in range(nodes.size()))
+        if nodes.size() != 2 * splits + 1:
+            return False
+    return True
 
 
 def table_of(samples: Sequence[Sample], width: int | None = None) -> Any:
