@@ -285,17 +285,18 @@ def writes_beyond(value: int) -> int:
 
 
 @pytest.mark.timeout(180)  # four processes that import all
+@pytest.mark.timeout(240)
 def test_a_type_that_ends_its_process_or_does_not_come_back_is_named_and_the_others_go_on() -> None:
     kinds = (half, crashes, leaves, asks_to_leave, hangs, counts_without_end, divides)
-    trials = try_all(named(*kinds), confirm=False, limit_s=3)
+    trials = try_all(named(*kinds), confirm=False, limit_s=5)
     assert [trial.reference for trial in trials] == named(*kinds)
     assert [trial.usable for trial in trials] == [True, False, False, False, False, False, True]
     faults = [trial.fault.removeprefix(f"{trial.reference}: ") for trial in trials if trial.fault]
     assert faults[0].startswith("ended its process by SIGSEGV")
     assert faults[1].startswith("ended its process with exit code 3")
     assert faults[2].startswith("SystemExit: 2")
-    assert faults[3] == "did not come back within 12 s"
-    assert faults[4] == "did not come back within 3 s of processor time"
+    assert faults[3] == "did not come back within 20 s"
+    assert faults[4] == "did not come back within 5 s of processor time"
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc can look after its heap")
@@ -345,7 +346,7 @@ class _Processes:
         ),
         ({("a", "b", "c"): (2, "did not come back within 3 s")}, "", ["a b c", "c"]),
         (
-            {("a", "b", "c"): (2, "did not come back within 3 s"), ("c",): (0, "did not come back within 12 s")},
+            {("a", "b", "c"): (2, "did not come back within 3 s"), ("c",): (0, "did not come back within 20 s")},
             "c: did not come back within 12 s",
             ["a b c", "c"],
         ),
