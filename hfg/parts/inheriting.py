@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 from hfg.graph.flat import LINK, MAIN, Cutting, FlatGraph, FlatNode
+from hfg.graph.flat.order import strongly_connected
 
 __all__ = ["Alignment", "Arrived", "Where", "inheriting"]
 
@@ -34,19 +35,35 @@ def inheriting(cutting: Cutting) -> frozenset[str]:
 
 
 def _is_one_to_one(flat: FlatGraph) -> bool:
-    """Whether each token that comes in is answered by one on each edge that leaves."""
+    """Whether each token that comes in is answered by one on each edge that leaves.
+
+    For that all of it hangs together: of two chains that have nothing in common one may be far ahead of the other.
+    """
     fed = {edge.target.node for edge in flat.edges}
+    sending = {edge.source.node for edge in flat.edges}
     return (
         not flat.gates
         and any(edge.source.node == LINK for edge in flat.edges)
         and all(edge.source.kind == "output" and edge.target.kind == "input" for edge in flat.edges)
-        and all(not edge.active and edge.source.node >= LINK for edge in flat.edges)
         and all(edge.source.node >= 0 or edge.source.node == LINK for edge in flat.edges)
-        and all(node.index in fed and _answers_each(node) for node in flat.nodes)
+        and not any(edge.active for edge in flat.edges)
+        and all(node.index in fed and _answers_each(node, node.index in sending) for node in flat.nodes)
+        and _hangs_together(flat)
     )
 
 
-def _answers_each(node: FlatNode) -> bool:
+def _hangs_together(flat: FlatGraph) -> bool:
+    beside: list[list[int]] = [[] for _ in flat.nodes]
+    for edge in flat.edges:
+        if edge.source.node >= 0 and edge.target.node >= 0:
+            beside[edge.source.node].append(edge.target.node)
+            beside[edge.target.node].append(edge.source.node)
+    return len(strongly_connected(beside)) == 1
+
+
+def _answers_each(node: FlatNode, sends: bool) -> bool:
+    if sends and node.node._hook("end") is not None:
+        return False  # it may have a last word, which answers nothing
     options = node.options
     return options.enabled and options.concurrency == 1 and options.on_error == "stop" and not options.active_for_s
 

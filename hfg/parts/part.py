@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from hfg.engine.face.composition import Composition
+from hfg.engine.model.worker import ENDED
 from hfg.engine.rules import quiet
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
@@ -105,7 +106,11 @@ class Part:
         self._leading = coming[0] if coming else ""
         self._origin = dict.fromkeys(self.inlets, 0)  # how many tokens came to former lives, or were skipped
         self._alignment = Alignment(coming if returns else [])
-        self._last = [worker for worker in engine.core.by_path.values() if not any(worker.all_out_edges())]
+        self._last = [  # who fires and sends nothing on; what stands for a subgraph never fires
+            worker
+            for worker in engine.core.by_path.values()
+            if worker.scope is None and not any(worker.all_out_edges())
+        ]
         self._leaving = False
         engine.agreement = self._nothing_moves
         engine.callbacks.pumped.append(self._pumped)
@@ -235,11 +240,18 @@ class Part:
             self._incoming[inlet.label].taken(inlet.taken)
 
     def _settle(self) -> None:
-        """Each token gives one everywhere: so many are done as have passed every end, and their firings are over."""
+        """Each token gives one everywhere: so many are done as have passed every end, and their firings are over.
+
+        Who has ended holds nobody up: whatever still comes to it is drained (F12).
+        """
         ends = [outlet.finished for outlet in self.outlets.values() if outlet.hearing == "open"]
         if self._last:
             self.engine.core.settle_counts()
-            ends += [worker.firings - (worker.busy == "firing") for worker in self._last]
+            ends += [
+                worker.firings - (worker.busy == "firing")
+                for worker in self._last
+                if worker.busy or not worker.blocked & ENDED
+            ]
         for label, inlet in self.inlets.items():
             done = min([inlet.taken, *(self._origin[label] + count for count in ends)])
             if done > inlet.done:

@@ -191,9 +191,8 @@ class TransportTests:
             await self.reach(publisher, inbox)
             for number in range(2000):
                 publisher.put(b"number", number.to_bytes(4, "big"))
-                if number % 100 == 99:
-                    await asyncio.sleep(0)
-            await self.reach(publisher, inbox, header=b"end")  # the last number itself may be lost
+                if number % 100 == 99:  # what nobody takes out in time may be dropped, on the kindest network
+                    await self.reach(publisher, inbox, header=b"%d" % number)
             arrived = [payload for header, payload in map(_plain, inbox.items) if header == b"number"]
             numbers = [int.from_bytes(payload, "big") for payload in arrived]
             assert numbers == sorted(set(numbers)), "the order is lost, or something is doubled"

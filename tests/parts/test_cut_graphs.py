@@ -111,6 +111,28 @@ def test_what_runs_over_every_edge_does_not_depend_on_where_a_graph_is_cut(block
         assert found is None, f"{found}\n{plan}"
 
 
+@pytest.mark.rule("F7", "G1", "L1", "L2")
+@pytest.mark.parametrize("block", range(10))
+def test_as_much_comes_over_real_links_as_in_one_piece(block: int) -> None:
+    for seed in range(20 * block, 20 * block + 20):
+        plan = random_plan(seed, SYNCHRONOUS)
+        outcome, trace = run_whole(plan)
+        ended = {event.node for event in trace if isinstance(event, NodeEnded)}
+        found, edges = "done", {}
+        try:
+            edges = hfg.run(cut_at_random(plan, seed)(), clock="virtual").edges
+        except hfg.errors.RunError as error:
+            found = type(error).__name__
+        assert found == outcome, f"{plan}"
+        if outcome != "done":
+            continue
+        wanted = {label: len(tokens) for label, tokens in sequences(trace).items()}
+        for label in edges.keys() | wanted.keys():
+            count = edges[label].sent if label in edges else 0
+            if label.split(" -> ")[1].rsplit(".", 1)[0] not in ended:  # its last tokens may be drained on the way
+                assert count == wanted.get(label, 0), f"edge {label}\n{plan}"
+
+
 @pytest.mark.rule("L1", "R5", "F8", "F13", "A8")
 @pytest.mark.parametrize("block", range(4))
 def test_graphs_with_everything_end_as_they_do_in_one_piece(block: int) -> None:

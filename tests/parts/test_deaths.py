@@ -256,6 +256,45 @@ def test_only_parts_that_answer_each_token_with_one_inherit_positions() -> None:
     assert inheriting(cut(flatten(graph))) == {"relay0"}
 
 
+class Summing(hfg.Node):
+    """Has a last word."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        return value
+
+    def end(self) -> None:
+        self.out.send(-1)
+
+
+@pytest.mark.rule("L2", "F4")
+def test_who_has_a_last_word_at_its_end_has_no_position_for_it() -> None:
+    graph = hfg.Graph()
+    graph.group("summing", process=True)
+    summing = graph.add(Summing(), group="summing")
+    graph.connect(graph.add(numbers(count=3)).out, summing.value)
+    graph.connect(summing.out, graph.output("out", int))
+    assert inheriting(cut(flatten(graph))) == frozenset()
+    assert hfg.run(graph, clock="virtual").outputs == {"out": [0, 1, 2, -1]}
+
+
+@pytest.mark.rule("L2")
+def test_two_chains_in_one_part_do_not_keep_step() -> None:
+    """One may be far ahead of the other, so what is done in one says nothing of what is in the other."""
+    graph = hfg.Graph()
+    graph.group("both", process=True)
+    for name, takes_s in (("slow", 0.01), ("fast", 0.0)):
+        source = graph.add(numbers(count=40), name=f"{name}_numbers")
+        middle = graph.add(relay(takes_s=takes_s), name=name, group="both")
+        graph.connect(source.out, middle.value)
+        graph.connect(middle.out, graph.output(f"{name}_out", int))
+    assert inheriting(cut(flatten(graph))) == frozenset()
+    wanted = [1000 + number for number in range(40)]
+    assert hfg.run(graph, clock="virtual").outputs == {"slow_out": wanted, "fast_out": wanted}
+
+
 @pytest.mark.rule("L2")
 def test_edges_go_on_behind_the_producer_that_knows_most() -> None:
     alignment = Alignment(["a", "b"])

@@ -347,7 +347,7 @@ class _Processes:
         ({("a", "b", "c"): (2, "did not come back within 3 s")}, "", ["a b c", "c"]),
         (
             {("a", "b", "c"): (2, "did not come back within 3 s"), ("c",): (0, "did not come back within 20 s")},
-            "c: did not come back within 12 s",
+            "c: did not come back within 20 s",
             ["a b c", "c"],
         ),
     ],
