@@ -3,7 +3,7 @@
 agreement     when the whole is quiet, and what follows from that: decides, never waits
 part          one part: an engine, and the tokens that leave it and come in
 messages      what parts tell each other beside tokens; failing: errors among it
-channels      messages and tokens on a session of a transport
+channels      messages and tokens on a session of a transport; rings: large arrays among these, in shared memory
 worker        a part that somebody else has begun; process: the process around it
 distribution  the whole, as the main part sees it; launching: where the others are begun
 local         all parts on one event loop, without links

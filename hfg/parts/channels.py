@@ -9,7 +9,9 @@ the younger where (`Joins`). Stands on `hfg.links`, `part` and
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 import msgspec
@@ -21,10 +23,11 @@ from hfg.graph.flat import CutEdge
 from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
 from hfg.parts.inheriting import Arrived, Where
-from hfg.parts.messages import Hears, Joins, Message, Speaks, pack, unpack
+from hfg.parts.messages import Hears, Joins, Message, Sees, Shares, Speaks, pack, unpack
 from hfg.parts.part import Part
+from hfg.parts.rings import Borrowing, Lending, segment_of
 from hfg.token import Token
-from hfg.transport import Position, Session
+from hfg.transport import Delivery, Position, Session
 
 __all__ = ["Carrier", "Channel", "name_of"]
 
@@ -122,6 +125,8 @@ class Carrier:
         edges: list[CutEdge],
         say: Callable[[str, Message], None],
         inheriting: frozenset[str] = frozenset(),
+        *,
+        shares_memory: bool = False,
     ) -> None:
         """Connect the part.
 
@@ -133,6 +138,7 @@ class Carrier:
           edges: those between it and others.
           say: brings a message to another part.
           inheriting: the parts whose tokens inherit positions.
+          shares_memory: large arrays may go through shared memory.
         """
         self._links: dict[str, _Outgoing | _Incoming] = {}
         outgoing: dict[str, _Outgoing] = {}
@@ -146,6 +152,9 @@ class Carrier:
                 self._links[edge.label] = incoming[edge.label] = _Incoming(
                     part, session, key, lives, edge, say, remembers
                 )
+            if shares_memory and edge.guarantee == "exact":
+                self._links[edge.label].share(run, lives)
+        self._outgoing, self._incoming = outgoing, incoming
         part.connect(outgoing, incoming)
         for other, life in lives.items():
             if life > lives[part.name]:
@@ -162,6 +171,14 @@ class Carrier:
         link = self._links.get(message.label)
         if link is not None:
             link.join(message)
+
+    def share(self, message: Shares | Sees) -> None:
+        """The other end of an edge speaks of shared memory."""
+        if isinstance(message, Shares):
+            if message.label in self._incoming:
+                self._incoming[message.label].borrow(message)
+        elif message.label in self._outgoing:
+            self._outgoing[message.label].seen(message)
 
     async def close(self) -> None:
         """End all links."""
@@ -189,6 +206,7 @@ class _Outgoing:
         self._codec = TokenCodec[Any](edge.hint, what=f'the value of "{edge.edge.source.port.path}"')
         self._waits_to_join = lives[part.name] > lives[edge.target]
         self._known: Where = (0, 0)  # the last that had come from former lives
+        self._lending: Lending | None = None
         self._sender: LinkSender | BoundedSender
         if edge.guarantee == "exact":
             self._sender = sender = LinkSender(
@@ -228,17 +246,19 @@ class _Outgoing:
 
     def send(self, tokens: list[Token[Any]]) -> None:
         """See `Outgoing`."""
-        sender, part, label = self._sender, self._part, self._edge.label
+        sender, part, label, lending = self._sender, self._part, self._edge.label, self._lending
         repeated = 0
         try:
             for token in tokens:
-                encoded = self._codec.encode(token)
+                encoded = self._codec.encode(token) if lending is None else lending.encode(self._codec, token)
                 if part.inherits and isinstance(sender, LinkSender):
                     where = part.positions[label].popleft()
                     repeated += where <= self._known
                     sender.send_nowait(encoded, Position(*where))
                 else:
                     sender.send_nowait(encoded)
+                if lending is not None:
+                    lending.sent()
         except (EncodingError, TransportError) as error:
             problem = RunError(f'edge "{label}" cannot carry a value to {name_of(self._edge.target)}: {error}')
             problem.__cause__ = error
@@ -259,6 +279,8 @@ class _Outgoing:
         self._say(self._edge.target, Speaks(self._edge.label, speaking, total))
 
     def _released(self) -> None:
+        if self._lending is not None:
+            self._lending.settle()
         label = self._edge.label
         self._part.be_taken(label, self._part.outlets[label].sent - self._unfinished)
 
@@ -269,6 +291,8 @@ class _Outgoing:
         if isinstance(sender, LinkSender):
             sender.admit(name_of(self._edge.target), life)
             stream, number = sender.machine.position
+        if self._lending is not None:
+            self._lending.admit()
         done = self._part.outlets[label].sent - self._unfinished
         self._say(self._edge.target, Joins(label, done, stream, number - self._unfinished))
         self._waits_to_join = False
@@ -280,9 +304,30 @@ class _Outgoing:
         self._waits_to_join = False
         self._part.precede(self._edge.label, message.total, message.hearing)  # type: ignore[arg-type]  # checked there
 
+    def share(self, run: str, lives: dict[str, int]) -> None:
+        """Put large arrays into shared memory from now on, if the consumer can open it."""
+        edge, sender = self._edge, self._sender
+        assert isinstance(sender, LinkSender)
+        machine = sender.machine
+        self._lending = Lending(
+            run,
+            segment_of(run, lives[edge.source], edge.edge.index),
+            edge.label,
+            edge.window,
+            lambda: machine.unfinished,
+            partial(self._say, edge.target),
+        )
+
+    def seen(self, message: Sees) -> None:
+        """The consumer has opened it, or cannot."""
+        if self._lending is not None:
+            self._lending.seen(message)
+
     async def close(self) -> None:
         """End it."""
         await self._sender.close()
+        if self._lending is not None:
+            self._lending.close()
 
 
 class _Incoming:
@@ -305,6 +350,8 @@ class _Incoming:
         self._done = 0
         self._remembers = remembers
         self._codec = TokenCodec[Any](edge.hint, what=f'the value of "{edge.edge.source.port.path}"')
+        self._borrowing: Borrowing | None = None
+        self._undecoded: deque[Delivery] = deque()
         self._receiver: LinkReceiver | BoundedReceiver
         if edge.guarantee == "exact":
             self._receiver = LinkReceiver(
@@ -320,16 +367,26 @@ class _Incoming:
             self._receiver = BoundedReceiver(session, key, arrived=self._arrived, producer=lives[edge.source])
 
     def _arrived(self) -> None:
+        self._undecoded.extend(self._receiver.machine.take_all())
+        self._decode()
+
+    def _decode(self) -> None:
         tokens: list[Arrived] = []
-        for delivery in self._receiver.machine.take_all():
+        borrowing = self._borrowing
+        view = None if borrowing is None else borrowing.view
+        while self._undecoded:
+            delivery = self._undecoded[0]
             metadata, value = delivery.token
             try:
-                token = self._codec.decode(metadata, value)
+                token = self._codec.decode(metadata, value, view=view)
             except EncodingError as error:
+                if borrowing is not None and borrowing.is_awaited:
+                    break  # sent to a former life, and this one has not heard of the memory yet
                 problem = RunError(f'edge "{self._edge.label}" brought what it cannot: {error}')
                 problem.__cause__ = error
                 self._part.finish("failed", problem)
                 return
+            self._undecoded.popleft()
             where = (delivery.position.stream, delivery.position.sequence)
             tokens.append(((token.value, token.activity, token.stamp), where))
         if tokens:
@@ -349,6 +406,9 @@ class _Incoming:
         """The producer begins anew: what it has sent until now is told to it."""
         label, machine = self._edge.label, self._receiver.machine
         machine.believe(life)
+        if self._undecoded:  # they lie in the memory of a life that died before it could say so to this one
+            self._borrowing = None
+            self._decode()
         stream = number = 0
         if isinstance(machine, ExactConsumer):
             stream, number = machine.accepted
@@ -360,6 +420,16 @@ class _Incoming:
         """The producer says what former lives have done."""
         self._done += message.total
         self._part.follow(self._edge.label, message.total, (message.stream, message.number))
+
+    def share(self, run: str, lives: dict[str, int]) -> None:
+        """Look at large arrays in shared memory, when the producer offers it."""
+        self._borrowing = Borrowing(run, partial(self._say, self._edge.source))
+
+    def borrow(self, message: Shares) -> None:
+        """The producer offers it."""
+        if self._borrowing is not None:
+            self._borrowing.open(message)
+            self._decode()
 
     async def close(self) -> None:
         """End it."""

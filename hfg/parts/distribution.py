@@ -41,10 +41,13 @@ from hfg.parts.messages import (
     Opened,
     Reborn,
     Rests,
+    Sees,
+    Shares,
     Speaks,
     Told,
 )
 from hfg.parts.part import Part
+from hfg.parts.rings import sweep_run, sweep_runs
 from hfg.parts.worker import FIRST_LIFE
 from hfg.transport import Session
 
@@ -65,7 +68,13 @@ class Launched(Protocol):
 
 
 class Launcher(Protocol):
-    """Begins the other parts, and gives the session over which they are spoken to."""
+    """Begins the other parts, and gives the session over which they are spoken to.
+
+    Attributes:
+      shares_memory: whether large arrays between parts may go through shared memory.
+    """
+
+    shares_memory: bool
 
     async def open(self) -> Session:
         """Give the session of the main part."""
@@ -135,10 +144,19 @@ class Distribution:
         self._is_open = True
         self._session = session = await self._launcher.open()
         edges = list(self._cutting.edges_of(MAIN))
+        if self._launcher.shares_memory:
+            sweep_runs()
         for other in self._others.values():
             other.begin(self._channel_to(other))
         self._carrier = Carrier(
-            self._part, session, self._run, self._lives, edges, self._say, inheriting(self._cutting)
+            self._part,
+            session,
+            self._run,
+            self._lives,
+            edges,
+            self._say,
+            inheriting(self._cutting),
+            shares_memory=self._launcher.shares_memory,
         )
         for other in self._others.values():
             await self._launch(other)
@@ -157,7 +175,9 @@ class Distribution:
         other.launched = await self._launcher.launch(self._run, name, host, lives)
         other.watch(partial(self._gone, other))
         other.is_told = True
-        self._say(name, Open(self._text, self._options, dict(self._lives), _known_packages()))
+        self._say(
+            name, Open(self._text, self._options, dict(self._lives), _known_packages(), self._launcher.shares_memory)
+        )
 
     def begin(self) -> None:
         """All are set up: let them go, behind which the main part goes."""
@@ -178,6 +198,9 @@ class Distribution:
                 self._agreement.rest(message.rest)
             case Told():
                 self._agreement.hear(message.answer)
+            case Shares() | Sees():
+                if self._carrier is not None:
+                    self._carrier.share(message)
             case Speaks():
                 self._part.speak(message.label, message.speaking, message.total)
             case Hears():
@@ -277,6 +300,8 @@ class Distribution:
             await other.end()
         if self._carrier is not None:
             await self._carrier.close()
+        if self._launcher.shares_memory:
+            sweep_run(self._run)  # of processes that were killed
         await self._launcher.close()
 
     def failure(self) -> HfgError | None:

@@ -79,6 +79,8 @@ def build_graph(message: Open, *, beside: Path | None = None) -> Graph:
 class LoopLauncher:
     """Begins parts on the running loop, over the transport in memory: in virtual time, and to look at."""
 
+    shares_memory = False
+
     def __init__(self, **settings: Any) -> None:
         """Begin nothing yet.
 
@@ -139,6 +141,8 @@ class _Task:
 
 class ProcessLauncher:
     """Begins parts as processes of this host."""
+
+    shares_memory = True
 
     def __init__(self) -> None:
         """Begin nothing yet."""

@@ -2,7 +2,7 @@
 
     Whole -> part     Open, Begin, Question, Reborn, Finish, Call, Close
     Part  -> whole    Opened, Rest, Answer, Ended, Result, Logged, Closed
-    Part  -> part     Speaks, Hears, Joins
+    Part  -> part     Speaks, Hears, Joins, Shares, Sees
 
 All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
 """
@@ -34,6 +34,8 @@ __all__ = [
     "Reborn",
     "Rests",
     "Result",
+    "Sees",
+    "Shares",
     "Speaks",
     "Told",
     "pack",
@@ -67,12 +69,14 @@ class Open(msgspec.Struct, frozen=True, tag=True):
       options: of the run, as `hfg.run` takes them.
       incarnations: which life of each part this is for.
       allow: packages whose node types may be imported.
+      shares_memory: large arrays may go through shared memory.
     """
 
     graph: str
     options: dict[str, Any]
     incarnations: dict[str, int]
     allow: list[str]
+    shares_memory: bool = False
 
 
 class Opened(msgspec.Struct, frozen=True, tag=True):
@@ -226,6 +230,34 @@ class Logged(msgspec.Struct, frozen=True, tag=True):
     function: str
 
 
+class Shares(msgspec.Struct, frozen=True, tag=True):
+    """Large arrays on an edge will be in shared memory, once its consumer has opened that.
+
+    Attributes:
+      label: of the edge.
+      segment: what the memory is called.
+      lane: the number under which this life of the consumer opens it.
+    """
+
+    label: str
+    segment: str
+    lane: int
+
+
+class Sees(msgspec.Struct, frozen=True, tag=True):
+    """The consumer of an edge has opened it.
+
+    Attributes:
+      label, segment, lane: as they were offered.
+      refused: why it could not; "" if it has.
+    """
+
+    label: str
+    segment: str
+    lane: int
+    refused: str = ""
+
+
 Message: TypeAlias = (
     Open
     | Opened
@@ -244,6 +276,8 @@ Message: TypeAlias = (
     | Speaks
     | Hears
     | Joins
+    | Shares
+    | Sees
 )
 
 pack: Final = msgspec.msgpack.Encoder().encode

@@ -35,10 +35,13 @@ from hfg.parts.messages import (
     Opened,
     Reborn,
     Rests,
+    Sees,
+    Shares,
     Speaks,
     Told,
 )
 from hfg.parts.part import Part
+from hfg.parts.rings import sweep_run
 from hfg.transport import Session
 
 __all__ = ["FIRST_LIFE", "Worker"]
@@ -71,6 +74,7 @@ class Worker:
         self._channels = {MAIN: Channel(session, run, name, MAIN, lives, self._inbox.put_nowait)}
         self._part: Part | None = None
         self._carrier: Carrier | None = None
+        self._shares_memory = False
         self._is_closed = False
 
     async def serve(self) -> None:
@@ -134,7 +138,10 @@ class Worker:
         neighbours = {edge.source for edge in edges} | {edge.target for edge in edges}
         for other in neighbours - {self._name, MAIN}:
             self._channels[other] = self._channel_to(part, other, lives[other])
-        self._carrier = Carrier(part, self._session, self._run, lives, edges, self._say, heirs)
+        self._carrier = Carrier(
+            part, self._session, self._run, lives, edges, self._say, heirs, shares_memory=message.shares_memory
+        )
+        self._shares_memory = message.shares_memory
         return part
 
     def _channel_to(self, part: Part, other: str, life: int) -> Channel:
@@ -164,6 +171,9 @@ class Worker:
             case Joins():
                 if self._carrier is not None:
                     self._carrier.join(message)
+            case Shares() | Sees():
+                if self._carrier is not None:
+                    self._carrier.share(message)
             case Finish():
                 part.finish(message.outcome, None)
             case _:
@@ -193,6 +203,8 @@ class Worker:
         await self._channels[MAIN].flush(_PARTING_S)
         if self._carrier is not None:
             await self._carrier.close()
+        if self._shares_memory:
+            sweep_run(self._run)  # if the main part was killed, nobody else is left who would
         for channel in self._channels.values():
             await channel.close()
 

@@ -1,0 +1,265 @@
+"""Large arrays on edges between processes of one host: they lie in shared memory, and only leases travel.
+
+The producer of an edge makes a ring when the first large array goes over it, and offers that to the consumer, which
+opens it and says so, or cannot, being on another host. Until then, and whenever no slot is free or large enough, arrays
+go the ordinary way. A slot is given back when the link is done with its token. Nothing here waits. Stands on
+`hfg.sharedmemory` and `messages`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+import numpy as np
+
+from hfg.encoding import ArrayHead, Lease, TokenCodec
+from hfg.errors import SharedMemoryError
+from hfg.logs import Log
+from hfg.parts.messages import Sees, Shares
+from hfg.sharedmemory import Reader, Ring, RingCounts, segment_name, sweep, unavailable
+from hfg.token import Token
+
+__all__ = ["Borrowing", "Lending", "LendingCounts", "segment_of", "segments_of", "sweep_run", "sweep_runs"]
+
+_LOGGER = Log("hfg.parts")
+_REALM: Final = "run"
+_SMALLEST: Final = 2**16
+"""Bytes of an array below which a copy costs less than a lease."""
+_SPARE: Final = 2  # slots beside those of the tokens under way: one is looked at, one is written to
+_MOST_SLOTS: Final = 128
+_LARGEST: Final = 2**28
+"""Bytes of a ring that are not exceeded for the sake of a long queue: what finds no slot is copied."""
+
+
+def segments_of(run: str) -> str:
+    """Give how the names of all shared memory of a run begin."""
+    return f"hfg-{_REALM}-{run.rpartition('/')[2]}-"
+
+
+def segment_of(run: str, life: int, edge: int) -> str:
+    """Give the name of the ring of an edge; each life of its producer has its own."""
+    return segment_name(_REALM, run.rpartition("/")[2], life, f"edge_{edge}")
+
+
+def sweep_run(run: str) -> None:
+    """Remove what processes of a run have left that were killed."""
+    sweep(segments_of(run))
+
+
+def sweep_runs() -> None:
+    """Remove what whole runs of this user have left that were killed; those that live keep theirs."""
+    sweep(f"hfg-{_REALM}-")
+
+
+class LendingCounts(msgspec.Struct):
+    """Why large arrays of an edge went the ordinary way although there is shared memory.
+
+    Attributes:
+      early: the consumer had not opened the ring yet.
+      without_slot: no slot was free.
+      too_large: no slot is large enough.
+    """
+
+    early: int = 0
+    without_slot: int = 0
+    too_large: int = 0
+
+
+class Lending:
+    """The producer's side of an edge.
+
+    Attributes:
+      ring: what large arrays lie in, once there was one.
+    """
+
+    def __init__(
+        self,
+        run: str,
+        segment: str,
+        label: str,
+        window: int,
+        unfinished: Callable[[], int],
+        say: Callable[[Shares], None],
+    ) -> None:
+        """Make nothing yet.
+
+        Args:
+          run: by which name all parts of the run know it.
+          segment: what the ring is to be called.
+          label: of the edge.
+          window: how many tokens may be under way.
+          unfinished: how many are, as the link knows it.
+          say: brings a message to the part of the consumer.
+        """
+        self.ring: Ring | None = None
+        self._run = run
+        self._segment = segment
+        self._label = label
+        self._slots = window + _SPARE
+        self._unfinished = unfinished
+        self._say = say
+        self._lane = 0
+        self._is_seen = False
+        self._is_refused = unavailable() is not None
+        self._early = 0
+        self._leases: deque[list[Lease]] = deque()  # of each token under way, oldest first
+        self._new: list[Lease] = []
+
+    @property
+    def counts(self) -> LendingCounts:
+        """How many large arrays went the ordinary way, and why."""
+        found = RingCounts() if self.ring is None else self.ring.counts
+        return LendingCounts(self._early, found.without_slot, found.too_large)
+
+    def encode(self, codec: TokenCodec[Any], token: Token[Any]) -> tuple[bytes, bytes]:
+        """Make bytes of a token, whose large arrays go into the ring; `sent` is called when the link has it."""
+        self.settle()
+        try:
+            return codec.encode(token, place=self._place)
+        except BaseException:
+            self._give_back(self._new)
+            self._new = []
+            raise
+
+    def sent(self) -> None:
+        """The link has the token, or has found that it needs none of it."""
+        if self.ring is None:
+            return
+        new, self._new = self._new, []
+        if self._unfinished() > len(self._leases):
+            self._leases.append(new)
+        else:
+            self._give_back(new)
+        self.settle()
+
+    def settle(self) -> None:
+        """The link is done with some tokens, perhaps: their slots are free."""
+        if self.ring is None:
+            return
+        unfinished = self._unfinished()
+        while len(self._leases) > unfinished:
+            self._give_back(self._leases.popleft())
+
+    def _give_back(self, leases: list[Lease]) -> None:
+        ring = self.ring
+        if ring is not None:
+            for lease in leases:
+                ring.done(lease)
+
+    def _place(self, array: np.ndarray[Any, Any]) -> Lease | None:
+        if self._is_refused or array.nbytes < _SMALLEST:
+            return None
+        if self.ring is None:
+            self._make(array.nbytes)
+        if self.ring is None or self._is_refused:
+            return None
+        if not self._is_seen:
+            self._early += 1
+            return None
+        lease = self.ring.place(array)
+        if lease is not None:
+            self._new.append(lease)
+        return lease
+
+    def _make(self, size: int) -> None:
+        try:
+            sweep_run(self._run)  # a former life of this part may have left a large one
+            slots = max(1 + _SPARE, min(self._slots, _MOST_SLOTS, _LARGEST // size))
+            self.ring = Ring(self._segment, slots, size, smallest=_SMALLEST)
+            self._leases.extend([] for _ in range(self._unfinished()))
+            self._offer()
+        except (SharedMemoryError, OSError) as error:
+            _LOGGER.warning('edge "%s" copies its arrays: %s', self._label, error)
+            self.close()
+
+    def _offer(self) -> None:
+        assert self.ring is not None
+        self._lane = self.ring.admit()
+        self._say(Shares(self._label, self._segment, self._lane))
+
+    def admit(self) -> None:
+        """The consumer has died and begins anew: what it held is free, and what is sent again it can open."""
+        if self.ring is None or self._is_refused:
+            return
+        self.ring.dismiss(self._lane)
+        self._is_seen = False
+        self._offer()
+
+    def seen(self, message: Sees) -> None:
+        """The consumer has opened what it was offered, or cannot."""
+        if (message.segment, message.lane) != (self._segment, self._lane):
+            return  # from a former life
+        if message.refused:
+            _LOGGER.debug('edge "%s" copies its arrays: %s', self._label, message.refused)
+            if not any(self._leases):
+                self.close()
+            return
+        self._is_seen = True
+
+    def close(self) -> None:
+        """Remove the ring; who looks at arrays in it keeps them."""
+        self._is_refused = True
+        self._is_seen = False
+        ring = self.ring
+        if ring is None:
+            return
+        counts = self.counts
+        if counts.without_slot or counts.too_large:
+            _LOGGER.info(
+                'edge "%s" has sent %d large arrays through shared memory, and copied %d because no slot was free, '
+                "%d because they were larger than the first",
+                self._label,
+                ring.counts.placed,
+                counts.without_slot,
+                counts.too_large,
+            )
+        self._leases.clear()
+        ring.close()
+
+
+class Borrowing:
+    """The consumer's side of an edge.
+
+    Attributes:
+      is_awaited: a lease has come before the ring was offered: that is on its way.
+    """
+
+    def __init__(self, run: str, say: Callable[[Sees], None]) -> None:
+        """Nothing was offered yet.
+
+        Args:
+          run: by which name all parts of the run know it.
+          say: brings a message to the part of the producer.
+        """
+        self.is_awaited = False
+        self._segments = segments_of(run)
+        self._say = say
+        self._reader: Reader | None = None
+
+    def open(self, message: Shares) -> None:
+        """The producer has offered a ring."""
+        refused = ""
+        try:
+            self._reader = Reader(message.segment, message.lane, self._is_announced)
+        except (SharedMemoryError, OSError) as error:
+            refused = str(error)
+        self.is_awaited = False
+        self._say(Sees(message.label, message.segment, message.lane, refused))
+
+    def _is_announced(self, segment: str) -> bool:
+        return segment.startswith(self._segments)
+
+    def view(self, head: ArrayHead) -> np.ndarray[Any, Any]:
+        """Give the array of a lease.
+
+        Raises:
+          ValueError: there is none, or it is not known yet.
+        """
+        lease = head.lease
+        if self._reader is None or lease is None or lease.segment != self._reader.segment:
+            self.is_awaited = lease is not None and self._is_announced(lease.segment)
+            raise ValueError("it has an array in shared memory that was not offered to this end")
+        return self._reader.view(head)
