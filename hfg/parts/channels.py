@@ -75,6 +75,11 @@ class Channel:
         self._out.admit(other, lives[1])
         self._in = LinkReceiver(session, here_from_there, consumer=one, incarnation=lives[0], arrived=self._arrived)
 
+    @property
+    def waiting(self) -> int:
+        """How many messages have not left."""
+        return len(self._waiting)
+
     def send(self, message: Message) -> None:
         """Say something; it arrives when the other is there. Nothing is heard of it once this is closed."""
         if self._is_closed:

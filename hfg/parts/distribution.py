@@ -7,6 +7,8 @@ follows from quiet, and ends them with the run. Stands on `worker`'s side of the
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import logging
 import sys
 import uuid
 from collections.abc import Callable, Mapping
@@ -36,6 +38,7 @@ from hfg.parts.messages import (
     Finish,
     Hears,
     Joins,
+    Logged,
     Message,
     Open,
     Opened,
@@ -62,6 +65,9 @@ class Launched(Protocol):
 
     async def wait(self) -> str:
         """Wait until it is gone; give a sentence about how, as in 'process 1234 was killed by SIGKILL'."""
+
+    def begins(self) -> None:
+        """Its nodes are set up and let go: from now on it may be expected to answer."""
 
     async def end(self) -> None:
         """See to it that it is gone, whatever it does."""
@@ -182,8 +188,13 @@ class Distribution:
     def begin(self) -> None:
         """All are set up: let them go, behind which the main part goes."""
         self._has_begun = True
-        for name in self._others:
-            self._say(name, Begin())
+        for other in self._others.values():
+            self._let_go(other)
+
+    def _let_go(self, other: _Other) -> None:
+        self._say(other.name, Begin())
+        if other.launched is not None:
+            other.launched.begins()
 
     # --- what is said -----------------------------------------------------------------------------------------------
 
@@ -210,6 +221,8 @@ class Distribution:
                 self._carrier.join(message)
             case Ended():
                 self._ended_there(other, message)
+            case Logged():
+                _log(other.name, message)
             case Closed():
                 other.close(message)
             case _:
@@ -279,7 +292,7 @@ class Distribution:
         except HfgError as error:
             self._part.finish("failed", error)
             return
-        self._say(name, Begin())
+        self._let_go(other)
         if self._part.engine.core.over:  # meanwhile, when nobody could tell it
             self._say(name, Finish(self._part.engine.outcome))
 
@@ -363,6 +376,20 @@ def distribute(graph: Graph, flat: FlatGraph, options: Mapping[str, Any], *, vir
         return Distribution(cutting, "", options, LoopLauncher())
     text = text_of(describe(graph, same_program=True))
     return Distribution(cutting, text, options, LoopLauncher() if virtual else ProcessLauncher())
+
+
+def _log(part: str, logged: Logged) -> None:
+    """Hand a record of another part to the loggers here, as if its node were."""
+    logger = logging.getLogger(logged.logger)
+    if not logger.isEnabledFor(logged.level):
+        return
+    extra = {"group": part} | ({"path": logged.path} if logged.path else {})
+    record = logger.makeRecord(
+        logged.logger, logged.level, logged.file, logged.line, "%s", (logged.text,), None, logged.function, extra
+    )
+    record.created = logged.created
+    with contextlib.suppress(Exception):  # a handler that raises harms nobody
+        logger.handle(record)
 
 
 def _known_packages() -> list[str]:

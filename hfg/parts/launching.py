@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
+import os
 import shutil
 import signal
 import sys
@@ -19,12 +21,19 @@ import msgspec
 
 from hfg.errors import TransportError, UsageError, in_words
 from hfg.graph import Graph
+from hfg.parts.channels import name_of
 from hfg.parts.messages import Open
 from hfg.parts.transports import transport
 from hfg.parts.worker import Worker
-from hfg.transport import Session
+from hfg.transport import Buffer, Session
 
-__all__ = ["Begun", "LoopLauncher", "ProcessLauncher", "build_graph"]
+__all__ = ["BEAT_S", "STARTS_S", "Begun", "LoopLauncher", "ProcessLauncher", "build_graph"]
+
+BEAT_S: Final = 0.5
+"""How often a process says that its event loop goes round."""
+
+STARTS_S: Final = 60.0
+"""How long it may take until it says anything."""
 
 _ENDS_S: Final = 2.0  # how long a process may take to go by itself, once it was told
 
@@ -42,6 +51,10 @@ class Begun(msgspec.Struct, frozen=True):
       main: the file of the program, for node types that are in it; "" if there is none.
       targets: other files that hfg itself has imported, by the name of the module.
       path: where modules are found.
+      parent: the process that has begun it; when that is gone, the folder is of no use to anybody.
+      folder: in which the parts meet.
+      beat: the key on which the process says that its event loop goes round.
+      level: of log records that are of use to the main program.
     """
 
     run: str
@@ -53,6 +66,10 @@ class Begun(msgspec.Struct, frozen=True):
     main: str
     targets: dict[str, str]
     path: list[str]
+    parent: int
+    folder: str
+    beat: str
+    level: int
 
 
 def build_graph(message: Open, *, beside: Path | None = None) -> Graph:
@@ -122,6 +139,9 @@ class _Task:
         error = self._task.exception()
         return "its task is over" if error is None else f"its task failed: {in_words(error)}"
 
+    def begins(self) -> None:
+        """See `Launched`: who shares the loop needs no heartbeat."""
+
     def kill(self) -> None:
         """End it at once and without a word, as a process that is killed; but for the teardowns of its nodes."""
         die = getattr(self._session, "die", None)
@@ -168,8 +188,25 @@ class ProcessLauncher:
                 f'group "{part}" is for host "{host}", and nobody here knows its agent: run "hfg agent" there and '
                 "`hfg deploy` the graph"
             )
-        begun = Begun(run, part, lives, "zenoh", self._settings, sys.argv, _main_program(), _targets(), sys.path)
-        return await _Process.begin(part, begun)
+        assert self._session is not None
+        begun = Begun(
+            run,
+            part,
+            lives,
+            "zenoh",
+            self._settings,
+            sys.argv,
+            _main_program(),
+            _targets(),
+            sys.path,
+            parent=os.getpid(),
+            folder=str(self._folder),
+            beat=f"{run}/beat/{name_of(part)}/{lives[0]}",
+            level=logging.getLogger("hfg").getEffectiveLevel(),
+        )
+        process = await _Process.begin(part, begun)
+        process.watch(self._session, begun.beat)
+        return process
 
     async def close(self) -> None:
         """See `Launcher`."""
@@ -177,6 +214,15 @@ class ProcessLauncher:
             await self._session.close()
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _patience_s() -> float:
+    """Give how long the event loop of a process may stand still; 0 is for ever."""
+    said = os.environ.get("HFG_PROCESS_SILENCE_S", "5")
+    try:
+        return max(float(said), 0.0)
+    except ValueError:
+        raise UsageError(f"HFG_PROCESS_SILENCE_S is a number of seconds, 0 for ever, got {said!r}") from None
 
 
 def _main_program() -> str:
@@ -200,6 +246,38 @@ class _Process:
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self.process = process
         self._ended = asyncio.ensure_future(process.wait())
+        self._patience_s = STARTS_S
+        self._silent_s = 0.0
+        self._listening: asyncio.Task[None] | None = None
+        self._why_killed = ""
+
+    def watch(self, session: Session, beat: str) -> None:
+        """End it when its event loop does not go round any more."""
+        hearing = session.subscribe(beat, self._hear)
+        self._listening = asyncio.create_task(self._listen(), name="hfg heartbeats")
+        self._listening.add_done_callback(lambda _: hearing.close())
+
+    def begins(self) -> None:
+        """See `Launched`."""
+        self._patience_s = _patience_s() or float("inf")
+        self._silent_s = 0.0
+
+    def _hear(self, beats: list[tuple[Buffer, Buffer]]) -> None:
+        del beats  # that they came is all they say
+        self._silent_s = 0.0
+        if self._patience_s == STARTS_S:
+            self._patience_s = float("inf")  # a setup may take as long as it likes
+
+    async def _listen(self) -> None:
+        """Count silence by what this loop has itself been awake for."""
+        while not self._ended.done():
+            await asyncio.sleep(BEAT_S)
+            self._silent_s += BEAT_S
+            if self._silent_s > self._patience_s:
+                self._why_killed = f", for its event loop has not gone round for {self._silent_s:g} s"
+                with contextlib.suppress(ProcessLookupError):
+                    self.process.kill()
+                return
 
     @classmethod
     async def begin(cls, part: str, begun: Begun) -> _Process:
@@ -210,7 +288,12 @@ class _Process:
         """
         try:
             process = await asyncio.create_subprocess_exec(
-                sys.executable, "-m", "hfg.parts.process", part, stdin=asyncio.subprocess.PIPE
+                sys.executable,
+                "-m",
+                "hfg.parts.process",
+                part,
+                stdin=asyncio.subprocess.PIPE,
+                process_group=0,  # Ctrl-C is for the main program, which ends this one
             )
         except OSError as error:
             raise TransportError(f'no process can be begun for group "{part}": {error}') from error
@@ -225,12 +308,14 @@ class _Process:
         code = await asyncio.shield(self._ended)
         if code < 0:
             with contextlib.suppress(ValueError):
-                return f"process {self.process.pid} was ended by {signal.Signals(-code).name}"
+                return f"process {self.process.pid} was ended by {signal.Signals(-code).name}{self._why_killed}"
         return f"process {self.process.pid} has ended with code {code}"
 
     async def end(self) -> None:
         """See `Launched`: it goes by itself, or is made to."""
         assert self.process.stdin is not None
+        if self._listening is not None:
+            self._listening.cancel()
         self.process.stdin.close()
         for how in (None, self.process.terminate, self.process.kill):
             if how is not None and not self._ended.done():

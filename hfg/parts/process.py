@@ -8,8 +8,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import importlib.util
+import io
+import logging
 import os
 import runpy
+import shutil
 import signal
 import sys
 import threading
@@ -22,10 +25,13 @@ from typing import Final
 import msgspec
 
 from hfg.engine import PunctualLoop
-from hfg.errors import HfgError
-from hfg.parts.launching import Begun, build_graph
+from hfg.errors import HfgError, RunError, TransportError, in_words
+from hfg.graph import Graph
+from hfg.parts.launching import BEAT_S, Begun, build_graph
+from hfg.parts.messages import Logged, Open
 from hfg.parts.transports import transport
 from hfg.parts.worker import Worker
+from hfg.transport import Session, Traffic
 
 __all__ = ["main"]
 
@@ -43,41 +49,114 @@ def main() -> None:
         raise SystemExit("hfg.parts.process serves a part of a run and is begun by that; use hfg run") from None
     sys.path[:] = begun.path
     sys.argv[:] = begun.argv
-    if begun.main:
-        _be_like(begun.main)
-    for name, file in begun.targets.items():
-        _import_as(name, file)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # what nodes print is seen, however this ends
+    problem = _import(begun)
     try:
         with asyncio.Runner(loop_factory=PunctualLoop) as runner:
-            runner.run(_serve(begun))
+            runner.run(_serve(begun, problem))
     except HfgError as error:
         raise SystemExit(f'hfg: group "{begun.part}": {error}') from None
     except asyncio.CancelledError:
         raise SystemExit(1) from None
+    finally:
+        _sweep(begun)
 
 
-async def _serve(begun: Begun) -> None:
+def _sweep(begun: Begun) -> None:
+    """Remove what a main part that was killed has left behind; one that lives does so itself."""
+    if begun.folder and os.getppid() != begun.parent:
+        shutil.rmtree(begun.folder, ignore_errors=True)
+
+
+def _import(begun: Begun) -> RunError | None:
+    """Import what the main program has, for node types that are in it; gives what went wrong."""
+    file = begun.main
+    try:
+        if begun.main:
+            _be_like(begun.main)
+        for name, file in begun.targets.items():
+            _import_as(name, file)
+    except (Exception, SystemExit) as error:
+        problem = RunError(
+            f'the process of group "{begun.part}" cannot import "{file}" ({in_words(error)}): it does so for the node '
+            'types in it; put what runs the graph below `if __name__ == "__main__":`, or the node types into a module'
+        )
+        problem.__cause__ = error
+        return problem
+    return None
+
+
+async def _beat(session: Session, begun: Begun) -> None:
+    """Say again and again that this loop goes round."""
+    publisher = session.publisher(begun.beat, Traffic.BACKGROUND)
+    with contextlib.suppress(TransportError):
+        while True:
+            publisher.put(b"beat")
+            await asyncio.sleep(BEAT_S)
+
+
+class _ToMain(logging.Handler):
+    """Takes log records to the main part, from any thread."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, log: Callable[[Logged], None], level: int) -> None:
+        super().__init__(level)
+        self._loop = loop
+        self._log = log
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Put it into words, which is all that can be told."""
+        try:
+            logged = Logged(
+                record.name,
+                record.levelno,
+                self.format(record),
+                str(getattr(record, "path", "")),
+                record.created,
+                record.pathname,
+                record.lineno,
+                record.funcName or "",
+            )
+            self._loop.call_soon_threadsafe(self._log, logged)
+        except Exception:
+            self.handleError(record)
+
+
+async def _serve(begun: Begun, problem: RunError | None) -> None:
     task = asyncio.current_task()
     assert task is not None
     stop = partial(asyncio.get_running_loop().call_soon_threadsafe, task.cancel)
-    threading.Thread(target=_watch, args=(stop,), daemon=True, name="hfg watch of the main part").start()
+    threading.Thread(target=_watch, args=(stop, begun), daemon=True, name="hfg watch of the main part").start()
     session = await transport(begun.transport).open(**begun.settings)
     try:
         beside = Path(begun.main).parent if begun.main else None
-        worker = Worker(
-            session, begun.run, begun.part, begun.lives, lambda message: build_graph(message, beside=beside)
-        )
-        await worker.serve()
+
+        def build(message: Open) -> Graph:
+            if problem is not None:
+                raise problem
+            return build_graph(message, beside=beside)
+
+        worker = Worker(session, begun.run, begun.part, begun.lives, build)
+        handler = _ToMain(asyncio.get_running_loop(), worker.log, begun.level)
+        logging.getLogger().addHandler(handler)
+        logging.getLogger().setLevel(begun.level)
+        beating = asyncio.create_task(_beat(session, begun), name="hfg heartbeats")
+        try:
+            await worker.serve()
+        finally:
+            beating.cancel()
+            logging.getLogger().removeHandler(handler)
     finally:
         await session.close()
 
 
-def _watch(stop: Callable[[], object]) -> None:
+def _watch(stop: Callable[[], object], begun: Begun) -> None:
     """End the process when the input ends: at first as it should, with teardowns, and then in any case."""
     os.read(sys.stdin.fileno(), 1)
     with contextlib.suppress(RuntimeError):  # it ends already
         stop()
     time.sleep(_PATIENCE_S)
+    _sweep(begun)
     os._exit(1)
 
 

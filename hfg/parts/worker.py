@@ -30,6 +30,7 @@ from hfg.parts.messages import (
     Finish,
     Hears,
     Joins,
+    Logged,
     Message,
     Open,
     Opened,
@@ -48,6 +49,7 @@ __all__ = ["FIRST_LIFE", "Worker"]
 
 _LOGGER = Log("hfg.parts")
 FIRST_LIFE = 1
+_MOST_RECORDS = 1000  # that wait to be told
 _PARTING_S = 2.0  # how long the last words may take
 
 
@@ -97,6 +99,12 @@ class Worker:
                 self._part.finish("cancelled", None)
                 await self._part.composition.lifetime.close()
             await self._leave()
+
+    def log(self, logged: Logged) -> None:
+        """Bring a log record to the main part; when that is slow, some are left out."""
+        channel = self._channels[MAIN]
+        if channel.waiting < _MOST_RECORDS:
+            channel.send(logged)
 
     def _say(self, part: str, message: Message) -> None:
         self._channels[part].send(message)

@@ -1,0 +1,209 @@
+"""Graphs with processes, run with real ones over Zenoh: their deaths, ends, logs and words (rules L2, X1, X3)."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("zenoh", reason="processes speak over Zenoh")
+
+NODES = """
+    import asyncio, logging, os, signal, sys
+    from collections.abc import Iterator
+    from pathlib import Path
+    import hfg
+
+    @hfg.node
+    def numbers(*, count: int = 200) -> Iterator[int]:
+        yield from range(count)
+
+    @hfg.node
+    async def relay(value: int, *, pids: str) -> int:
+        with Path(pids).open("a") as file:
+            file.write(f"{os.getpid()}\\n")
+        await asyncio.sleep(0.005)
+        return value
+
+    @hfg.node
+    def deadly(value: int, *, pids: str, how: str) -> int:
+        '''Ends its process once, at 20.'''
+        if value == 20 and not Path(pids).exists():
+            Path(pids).write_text(str(os.getpid()))
+            if how == "exit":
+                os._exit(3)
+            os.kill(os.getpid(), getattr(signal, how))
+        return value
+
+    @hfg.node
+    def talks(value: int) -> None:
+        print("printed", value)
+        hfg.log().warning("logged %d", value)
+"""
+
+
+def program(folder: Path, body: str) -> subprocess.Popen[str]:
+    """Begin a program that has these nodes."""
+    file = folder / "program.py"
+    file.write_text(textwrap.dedent(NODES) + textwrap.dedent(body))
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "TMPDIR": str(folder)}
+    return subprocess.Popen(
+        [sys.executable, str(file)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+        start_new_session=True,
+    )
+
+
+def wait_for(condition: Callable[[], object], within_s: float = 30.0) -> None:
+    """Look until it holds; how fast that is depends on the machine alone."""
+    end = time.monotonic() + within_s
+    while not condition():
+        assert time.monotonic() < end, "it never came true"
+        time.sleep(0.02)
+
+
+def is_there(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return Path(f"/proc/{process}/stat").read_text().split()[2] != "Z" if Path("/proc").exists() else True
+
+
+def nothing_is_left(folder: Path, pids: Path) -> None:
+    wait_for(lambda: not any(is_there(int(line)) for line in set(pids.read_text().split())))
+    wait_for(lambda: not list(folder.glob("hfg-*")))
+
+
+CHAIN = """
+    def build(pids: str) -> hfg.Graph:
+        graph = hfg.Graph("chain")
+        graph.group("far", process=True)
+        source, one = graph.add(numbers(count={count})), graph.add(relay(pids=pids), group="far")
+        graph.connect(source.out, one.value)
+        graph.connect(one.out, graph.output("out", int))
+        return graph
+"""
+
+
+@pytest.mark.rule("L2", "L3")
+@pytest.mark.parametrize("how", ["exit", "SIGKILL"])
+def test_a_process_that_dies_is_begun_again_and_nothing_is_lost(tmp_path: Path, how: str) -> None:
+    pids = tmp_path / "pids"
+    running = program(
+        tmp_path,
+        f"""
+    if __name__ == "__main__":
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        source, one = graph.add(numbers()), graph.add(deadly(pids={str(pids)!r}, how={how!r}), group="far")
+        graph.connect(source.out, one.value)
+        graph.connect(one.out, graph.output("out", int))
+        report = hfg.run(graph)
+        assert report.outputs == {{"out": list(range(200))}}, report.outputs
+        print(report.errors)
+    """,
+    )
+    out, err = running.communicate(timeout=60)
+    assert running.returncode == 0, err
+    assert 'the process of group "far" was begun again 1 times' in out
+    assert ("has ended with code 3" if how == "exit" else "was ended by SIGKILL") in err
+    nothing_is_left(tmp_path, pids)
+
+
+@pytest.mark.rule("L2", "X2")
+def test_a_process_whose_loop_stands_still_is_ended_and_begun_again(tmp_path: Path) -> None:
+    pids = tmp_path / "pids"
+    running = program(
+        tmp_path,
+        f"""
+    if __name__ == "__main__":
+        os.environ["HFG_PROCESS_SILENCE_S"] = "3"
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        source, one = graph.add(numbers()), graph.add(deadly(pids={str(pids)!r}, how="SIGSTOP"), group="far")
+        graph.connect(source.out, one.value)
+        graph.connect(one.out, graph.output("out", int))
+        assert hfg.run(graph).outputs == {{"out": list(range(200))}}
+    """,
+    )
+    _, err = running.communicate(timeout=60)
+    assert running.returncode == 0, err
+    assert "was ended by SIGKILL, for its event loop has not gone round for" in err
+    nothing_is_left(tmp_path, pids)
+
+
+@pytest.mark.rule("X3")
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_however_the_main_process_ends_nothing_is_left(tmp_path: Path, how: signal.Signals) -> None:
+    pids = tmp_path / "pids"
+    running = program(
+        tmp_path,
+        CHAIN.format(count=1_000_000)
+        + f"""
+    if __name__ == "__main__":
+        hfg.run(build({str(pids)!r}))
+    """,
+    )
+    try:
+        wait_for(lambda: pids.exists() and len(pids.read_text().split()) > 10)
+        running.send_signal(how)
+        running.communicate(timeout=30)
+    finally:
+        running.kill()
+    nothing_is_left(tmp_path, pids)
+
+
+@pytest.mark.rule("X1")
+def test_a_program_that_cannot_be_imported_by_its_workers_is_told_so_in_one_sentence(tmp_path: Path) -> None:
+    running = program(
+        tmp_path,
+        """
+    if __name__ != "__main__":
+        raise ImportError("not here")
+    graph = hfg.Graph()
+    graph.group("far", process=True)
+    source, last = graph.add(numbers()), graph.add(talks(), group="far")
+    graph.connect(source.out, last.value)
+    try:
+        hfg.run(graph)
+    except hfg.errors.RunError as error:
+        print(error)
+    """,
+    )
+    out, err = running.communicate(timeout=60)
+    assert 'the process of group "far" cannot import' in out, err
+    assert "not here" in out
+
+
+@pytest.mark.rule("R7")
+def test_what_nodes_print_and_log_elsewhere_is_seen_here(tmp_path: Path) -> None:
+    running = program(
+        tmp_path,
+        """
+    if __name__ == "__main__":
+        logging.basicConfig(format="%(name)s %(levelname)s %(message)s", stream=sys.stderr)
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        source, last = graph.add(numbers(count=2)), graph.add(talks(), group="far")
+        graph.connect(source.out, last.value)
+        hfg.run(graph)
+    """,
+    )
+    out, err = running.communicate(timeout=60)
+    assert running.returncode == 0, err
+    assert out.split("\n") == ["printed 0", "printed 1", ""]
+    assert [line for line in err.split("\n") if "logged" in line] == [
+        "hfg.node.talks WARNING logged 0",
+        "hfg.node.talks WARNING logged 1",
+    ]
