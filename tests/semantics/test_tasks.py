@@ -525,6 +525,35 @@ def test_one_that_triggers_without_end_waits_for_room() -> None:
     assert report.edges["node.told -> slow.hear"].grown == 0
 
 
+class Speaks(hfg.Node):
+    """Says its last word behind one for which it waits, amid its firing."""
+
+    value = hfg.Input(int)
+    told = hfg.Event(object)
+
+    async def process(self, value: int) -> None:
+        await last_words(self)
+
+
+async def last_words(node: Any) -> None:
+    for word in ("first", "second"):
+        await node.told.trigger_wait(word)
+    node.told.trigger("third")
+
+
+@pytest.mark.rule("F8", "F13")
+@pytest.mark.parametrize("by_task", [True, False])
+def test_it_is_not_quiet_while_code_that_waited_for_room_has_it_but_has_not_gone_on(by_task: bool, fast: bool) -> None:
+    """Else events would end before it, and what it says then would be dropped."""
+    graph, keep = hfg.Graph(), Keep()
+    node = Starter(work=last_words) if by_task else Speaks()
+    graph.connect(graph.add(numbers(count=1)).out, graph.add(node, name="node").ports.inputs["value"])
+    graph.connect(node.ports.events["told"], graph.add(keep).value, capacity=1)
+    report = run(graph, fast)
+    assert keep.values == ["first", "second", "third"]
+    assert report.edges["node.told -> keep.value"].dropped == 0
+
+
 @pytest.mark.rule("F8")
 def test_where_nothing_moves_but_one_that_waits_for_room_its_queue_grows() -> None:
     async def floods(node: Starter) -> None:

@@ -403,16 +403,30 @@ class CodeRunner:
         else:
             trigger(event, value, activity, stamp)
         while worker.full_edges and core.started and not core.over:
-            waiter: asyncio.Future[None] = self.loop.create_future()
-            worker.when_room(partial(answer, waiter, None))
-            own(1)
-            self._look_for_room()
-            core.host.kick()
-            try:
-                await waiter
-            finally:
+            await self._room(worker, own)
+
+    async def _room(self, worker: Worker, own: Callable[[int], None]) -> None:
+        """Wait until there is room behind all events of a worker; `own` counts who of it waits."""
+        waiter: asyncio.Future[None] = self.loop.create_future()
+        waits = True
+
+        def over() -> None:
+            """From here on it is not quiet, though the code goes on only at the loop's next pass (F13)."""
+            nonlocal waits
+            if waits:
+                waits = False
                 own(-1)
-                self._look_for_room()
+            answer(waiter, None)
+
+        worker.when_room(over)
+        own(1)
+        self._look_for_room()
+        worker.core.host.kick()
+        try:
+            await waiter
+        finally:
+            over()
+            self._look_for_room()
 
     def _look_for_room(self) -> None:
         """An edit that waits for this code must not hold those who could make room."""
