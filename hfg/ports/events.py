@@ -63,7 +63,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
     async def trigger_wait(
         self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None
     ) -> None:
-        """Send a signal and wait until every queue behind it has room again.
+        """Send a signal and wait until every queue behind the events of its node has room again.
 
         For async code that triggers without end (rule F8).
         """

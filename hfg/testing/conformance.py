@@ -260,6 +260,7 @@ class Replay:
         if self.expected:
             raise Divergence("the run went on before all of the last decision was done", event, self)
         self._end_rest(event.node)
+        self._end_tasks(event.node)
         for move in self.machine.moves():
             fires = move.kind == "fire" and isinstance(event, FiringStarted)
             calls = move.kind == "call" and isinstance(event, CallStarted) and move.edge == event.edge
@@ -274,6 +275,12 @@ class Replay:
         """Nobody sees a restarted node come back, but that it goes on."""
         for move in self.machine.moves():
             if move.kind == "timer" and move.node == node and not self.machine.times_out(self.machine.paths[node]):
+                self._apply(move)
+
+    def _end_tasks(self, node: str) -> None:
+        """Nobody sees tasks end that were cancelled, but that their node begins something."""
+        for move in self.machine.moves():
+            if move.kind == "task" and move.node == node and self.machine.task_of(move).cancelled:
                 self._apply(move)
 
     def _end(self, event: RunEnded) -> None:
@@ -303,7 +310,7 @@ class Replay:
         ringing = next((move for move in moves if self._rings(move, event)), None)
         if ringing is not None:
             return ringing
-        steps = [move for move in moves if move.kind in ("go on", "time out") and move.node == node]
+        steps = [move for move in moves if move.kind in ("go on", "task", "time out") and move.node == node]
         if steps:
             return min(steps, key=lambda move: self._strangeness(move, event))
         fitting = (move for move in moves if self._leads_to(move, event, node) or self._follows_from_quiet(move, event))
@@ -348,24 +355,31 @@ class Replay:
         return False
 
     def _may_go_unseen(self, move: Move, event: TraceEvent) -> bool:
-        """Whether it is a step of which nothing need be seen: a restart, or a firing that waits for its turn (F14)."""
+        """Whether it is a step of which nothing need be seen: of a task, a restart, or to a firing's turn (F14)."""
         if move.kind == "timer":
             return not (move.node and self.machine.times_out(self.machine.paths[move.node]))
-        return move.kind == "go on" and isinstance(event, QueueGrown)
+        return move.kind == "task" or (move.kind == "go on" and isinstance(event, QueueGrown))
 
     def _strangeness(self, move: Move, event: TraceEvent) -> tuple[bool, bool, bool]:
         """Of several firings of one node (F14) the step of which is least likely to be behind the event.
 
         Signals have the stamp of their firing (T5); what is told of the end of one names it. The code of a run begins
-        with its firing, so a first step comes before the next of those that have waited.
+        with its firing, so a first step comes before the next of those that have waited. A task triggers and fails, and
+        does nothing else that could be seen.
         """
+        if move.kind == "task":
+            is_signal = isinstance(event, EventTriggered) or self._is_signal(event)
+            return not (is_signal or _is_of_task(event)), False, False
         if not move.number:
-            return False, False, False
+            return _is_of_task(event), False, False
         flight = self.machine.under_way(move)
-        number = getattr(event, "number", flight.number)
+        number = -1 if _is_of_task(event) else getattr(event, "number", flight.number)
         token = getattr(event, "token", None)
         other = token is not None and abs(token.stamp - flight.stamp) > _SAME_TIME
         return number != flight.number, other, flight.stepped
+
+    def _is_signal(self, event: TraceEvent) -> bool:
+        return isinstance(event, TokenSent) and self.machine.labels[event.edge].edge.is_event
 
     def _source_of(self, label: str) -> str:
         return self.machine.path_of(self.machine.labels[label].edge.source.owner)
@@ -394,7 +408,7 @@ class Replay:
             steps = [
                 move
                 for move in self.machine.moves()
-                if move.kind in ("go on", "timer") or (move.kind == "feed" and not self._reaches(move.edge))
+                if move.kind in ("go on", "task", "timer") or (move.kind == "feed" and not self._reaches(move.edge))
             ]
             if not steps:
                 return
@@ -462,6 +476,10 @@ def value_key(value: Any) -> Any:
     if isinstance(value, Failure):
         return (type(value.error).__name__, repr(value.taken))
     return (type(value).__name__, repr(value))
+
+
+def _is_of_task(event: TraceEvent) -> bool:
+    return isinstance(event, ErrorRaised) and event.what.startswith('task "')
 
 
 def _owner(event: str) -> str:

@@ -88,6 +88,7 @@ class Allowed:
     readiness: bool = True
     concurrency: bool = False  # several firings of async nodes under way at once
     retries: bool = False  # firings that fail are tried again
+    tasks: bool = False  # nodes start something beside their firings, outside of subgraphs
     through: bool = False  # operators on edges, with schedulers and without
     iteration: bool = False  # inside of iteration
     endings: bool = False  # last words, sources without end that work for who will have ended
@@ -138,7 +139,10 @@ _PLAIN_WHERE_ACTIVITY_MOVES = ["handing"]
 FEEDS = ("red", "blue")
 """The inputs of graphs that are fed from outside."""
 
-_WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay", "calm", "restless", "calling", "Unsteady"}
+_TENDING = ("Tends", "Beats")
+"""Whose code starts tasks."""
+
+_WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay", "calm", "restless", "calling", "Unsteady", *_TENDING}
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear"}
 _TURNED = {"Scaled": "factor", "Pulse": "most", "Script": "count", "Hums": "tone"}
@@ -205,6 +209,7 @@ class _Making:
         inner += ["Scaled"] if allowed.parameters else []
         inner += ["OnlyTwice"] if allowed.readiness else []
         inner += ["Unsteady"] * 3 + ["Stubborn"] * 2 if allowed.retries else []
+        inner += ["Tends"] * 4 + ["Beats"] * 3 if allowed.tasks else []
         inner += ["LastWord", "LastWord", "Hums"] if allowed.endings and not allowed.plain else []
         inner += ["EachOfEach"] if allowed.iteration and not allowed.plain else []
         inner += ["Tuned"] * 6 if allowed.tuned else []
@@ -254,6 +259,8 @@ class _Making:
                 return {"modulus": choose.number(2, 3)}
             case "Failing" | "picky" | "gives_up":
                 return {"at": choose.number(2, 3)}
+            case "Tends" | "Beats":  # whose steps of one moment are in the order in which they were set
+                return {"pause_s": choose.one_of([0.003, 0.01])}
             case "slow_double" | "Waiting" | "Unsteady":
                 return {"pause_s": choose.one_of([0.0, 0.003, 0.01])}
             case "Tuned":
@@ -273,7 +280,7 @@ class _Making:
             options["max_rate_hz"] = 100.0
         if kind == "Clings":
             return options
-        if kind in ("Failing", "picky", "gives_up") or (allowed.failures and choose.chance(5)):
+        if kind in ("Failing", "picky", "gives_up", *_TENDING) or (allowed.failures and choose.chance(5)):
             options["on_error"] = choose.one_of(
                 ["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"]
             )
@@ -495,7 +502,8 @@ class _Making:
     def make_boxes(self) -> list[BoxPlan]:
         choose = self.choose
         boxes: list[BoxPlan] = []
-        free = [node.name for node in self.nodes if node.type != "Clings" and not self._has_parameter_edge(node.name)]
+        left = ("Clings", *_TENDING)
+        free = [node.name for node in self.nodes if node.type not in left and not self._has_parameter_edge(node.name)]
         while len(boxes) < 3 and len(free) > 1 and choose.chance(40):
             members = [name for name in free if choose.chance(45)]
             if not members:

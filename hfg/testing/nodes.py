@@ -22,6 +22,7 @@ from hfg.types import Shape
 __all__ = [
     "AsyncRelay",
     "Attentive",
+    "Beats",
     "Clings",
     "Counter",
     "Doubter",
@@ -46,6 +47,7 @@ __all__ = [
     "Stateful",
     "Stubborn",
     "Tally",
+    "Tends",
     "Tuned",
     "Unsteady",
     "Waiting",
@@ -687,6 +689,62 @@ class Clings(hfg.Node):
     async def teardown(self) -> None:
         """Wait until it is cancelled."""
         await asyncio.Event().wait()
+
+
+class Tends(hfg.Node):
+    """Starts a task for each value and each call, which speaks later, twice or for whom there is room, or fails."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    later = hfg.Event(int)
+    pause_s = hfg.Parameter(0.003)
+    heard: Any = hfg.State(0)
+
+    def process(self, value: int) -> int:
+        """Pass the value on and leave the rest to the task."""
+        self.start_soon(self.speak(value))
+        return value
+
+    @hfg.slot
+    def hear(self) -> None:
+        """Start one more; of the first two calls, so that rings end."""
+        self.heard += 1
+        if self.heard <= 2:
+            self.start_soon(self.speak(10 * self.heard))
+
+    async def speak(self, value: int) -> None:
+        """Wait, then signal; every third value fails, and even ones say more."""
+        await asyncio.sleep(self.pause_s)
+        if value % 3 == 0:
+            raise ValueError(f"cannot do {value}")
+        self.later.trigger(value)
+        if value % 2 == 0:
+            await asyncio.sleep(2 * self.pause_s)
+            await self.later.trigger_wait(-value)
+            self.later.trigger(value)
+
+
+class Beats(hfg.Node):
+    """Speaks by a task of its `setup()` a few times, and lives by its slot."""
+
+    beat = hfg.Event(int)
+    pause_s = hfg.Parameter(0.003)
+    heard: Any = hfg.State(0)
+
+    def setup(self) -> None:
+        """Begin."""
+        self.start_soon(self.beats())
+
+    async def beats(self) -> None:
+        """Speak three times."""
+        for number in range(1, 4):
+            await asyncio.sleep(self.pause_s)
+            self.beat.trigger(number)
+
+    @hfg.slot
+    def hear(self) -> None:
+        """Count."""
+        self.heard += 1
 
 
 @hfg.node

@@ -24,6 +24,7 @@ MOST_MOVES = 1500
 EVERYTHING = Allowed()
 SEVERAL_AT_ONCE = Allowed(concurrency=True)
 TRIED_AGAIN = Allowed(concurrency=True, retries=True)
+TENDING = Allowed(tasks=True, max_nodes=6)
 THREADS = Allowed(threads=True, lossy=False, gates=False)
 
 
@@ -103,6 +104,16 @@ def test_so_it_does_where_firings_that_fail_are_tried_again(block: int) -> None:
     for seed in range(25 * block, 25 * block + 25):
         plan = random_plan(seed, replace(TRIED_AGAIN, threads=seed % 5 == 0))
         if reference(plan, seed) is not None:
+            check(plan, seed)
+
+
+@pytest.mark.rule("X1", "X3", "R5", "F10", "T5", "F8", "F13")
+@pytest.mark.parametrize("block", range(4))
+def test_so_it_does_where_nodes_start_tasks_beside_their_firings(block: int) -> None:
+    """Tasks that speak later, wait for room or fail; nodes that are disabled, reset and restarted meanwhile."""
+    for seed in range(25 * block, 25 * block + 25):
+        plan = random_plan(seed, replace(TENDING, concurrency=seed % 5 == 0, retries=seed % 5 == 0))
+        if any(node.type in ("Tends", "Beats") for node in plan.nodes) and reference(plan, seed) is not None:
             check(plan, seed)
 
 

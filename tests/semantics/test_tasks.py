@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import contextvars
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from typing import Any, Literal
 
 import pytest
@@ -13,6 +14,8 @@ from hypothesis import strategies as st
 
 import hfg
 from hfg import commands
+from hfg.testing import Divergence, recorder, replay
+from hfg.testing.nodes import Beats, Doubter, Tends, script
 from hfg.trace import EventTriggered, TokenSent, TraceEvent
 from tests.semantics.nodes import Ear, Keep, drive, forward, modifiers, named, numbers, of_kind, run, sent, slow_numbers
 
@@ -598,6 +601,62 @@ def test_one_sees_the_context_of_the_code_that_has_started_it() -> None:
     graph, _, ear = starting(tells, kind=Sets, source=numbers(count=2))
     run(graph)
     assert ear.heard == ["firing 1", "firing 2"]
+
+
+# --- beside the oracle ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.rule("F10", "A9", "X1", "R5")
+@pytest.mark.parametrize(
+    ("slot", "heard"),
+    [("", [1, 2, 3]), ("disable", [1]), ("reset", [1, 1, 2, 3]), ("deactivate", [1, 2, 3])],
+)
+def test_the_oracle_tends_them_as_the_engine_does(slot: str, heard: list[int]) -> None:
+    """Three beats, 10 ms apart; behind the first of them something is done to the node."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        node, late = graph.add(Beats(pause_s=0.01), name="beats"), graph.add(slow_words(), name="late")
+        graph.connect(node.beat, graph.add(Keep()).value)
+        if slot:
+            graph.connect(late.ports.events["out.sent"], node.ports.slots[slot])
+        return graph
+
+    seen = recorder()
+    run(build(), trace=seen)
+    assert [value for value in seen.values("beats.beat -> keep.value") if value is not hfg.END] == heard
+    replay(build, seen)
+    seen.remove(next(event for event in seen if isinstance(event, TokenSent) and event.edge.startswith("beats.beat")))
+    with pytest.raises(Divergence):
+        replay(build, seen)
+
+
+@hfg.node
+async def slow_words() -> AsyncIterator[int]:
+    await asyncio.sleep(0.015)
+    yield 1
+
+
+@pytest.mark.rule("X1")
+@pytest.mark.parametrize(
+    ("policy", "heard"), [("skip", [1, 1, 2, -2, 2]), ("disable", [1, 1]), ("restart", [1, 1]), ("stop", [1, 1])]
+)
+def test_the_oracle_judges_their_errors_as_the_engine_does(policy: Any, heard: list[int]) -> None:
+    """The third of four tasks fails at once with the others; what the fourth says comes behind that."""
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        node = graph.add(Tends(), name="tends", on_error=policy)
+        graph.connect(graph.add(script(values=(1, 1, 3, 2))).out, node.value)
+        graph.connect(node.later, graph.add(Keep()).value)
+        graph.connect(node.failed, graph.add(Doubter()).hear)
+        return graph
+
+    seen = recorder()
+    with contextlib.suppress(hfg.errors.NodeError):
+        run(build(), trace=seen)
+    assert [value for value in seen.values("tends.later -> keep.value") if value is not hfg.END] == heard
+    replay(build, seen)
 
 
 # --- random tasks -----------------------------------------------------------------------------------------------------

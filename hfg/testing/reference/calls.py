@@ -6,16 +6,16 @@ from collections.abc import Callable
 from typing import Any
 
 from hfg.errors import Aborted, NodeError
-from hfg.testing.reference.firing import Firing
 from hfg.testing.reference.state import Flight, Line, Lying, Station
 from hfg.testing.reference.structure import ROOT, boundary_of, is_box
+from hfg.testing.reference.tasks import Tending
 from hfg.token import Token
 from hfg.trace import CallEnded, CallStarted, ErrorRaised, FiringEnded, NodeEnabled, TokenProcessed, TokenTaken
 
 __all__ = ["Calling"]
 
 
-class Calling(Firing):
+class Calling(Tending):
     """A machine whose slots can be called."""
 
     def start_call(self, owner: int, line: Line) -> None:
@@ -84,9 +84,12 @@ class Calling(Firing):
         return actions[name]
 
     def launch_call(self, flight: Flight, handler: Callable[[], Any]) -> None:
-        """Run the handler where its group runs; what tears the node down behind its firings (F14)."""
-        automatic = flight.slot not in flight.station.type.slots
-        if automatic and self.begins_afresh(flight) and flight.station.is_flying:
+        """Run the handler where its group runs; what tears the node down behind its firings (F14) and its tasks."""
+        station = flight.station
+        automatic = flight.slot not in station.type.slots
+        if automatic and self.begins_afresh(flight) and (station.is_flying or station.tasks):
+            if not station.is_flying:
+                self.cancel_tasks(station)
             flight.when_rested = lambda: self.launch_call(flight, handler)
             return
         # `setup` and `teardown` run where the node does
@@ -104,9 +107,9 @@ class Calling(Firing):
 
     def begins_afresh(self, flight: Flight) -> bool:
         """Whether what an automatic slot does begins with a teardown (A9, F10)."""
-        if flight.slot == "reset":
-            return True
         index = flight.station.leaf.index
+        if flight.slot == "reset":
+            return flight.station.resting_until is None or flight.station.is_flying
         return flight.slot == "enable" and not self.is_enabled(index) and self.is_enabled_around(index)
 
     def is_async_slot(self, flight: Flight) -> bool:
@@ -162,7 +165,7 @@ class Calling(Firing):
             self.quench(-2 - owner, "slot")
         else:
             for station in self.members_of(owner):
-                if not station.is_amid:
+                if not station.is_amid and not station.tasks:
                     self.reset(station)
                 else:
                     station.afterwards = station.afterwards or "reset"
@@ -196,10 +199,15 @@ class Calling(Firing):
             station.node._reset_states()
             hook = station.node._hook("setup")
             if hook is not None:
+                station.opening = True
                 self.run_hook(station, hook)
+                station.opening = False
+            if not self.is_enabled(station.leaf.index):  # they last as long as its setup (F10)
+                self.cancel_tasks(station)
 
     def tear_down(self, station: Station) -> None:
         """Close what `setup` opened."""
+        self.abandon_tasks(station)
         if station.set_up and station.leaf.inside is None:
             hook = station.node._hook("teardown")
             if hook is not None:
@@ -257,6 +265,7 @@ class Calling(Firing):
 
     def _silence(self, station: Station) -> None:
         index = station.leaf.index
+        self.cancel_tasks(station)
         for flight in station.firings_under_way:
             flight.void = True
         for line in self.lines:  # nobody waits for what it has taken

@@ -364,6 +364,9 @@ class Firing(RunningCode):
         """No code of it may go on any more: what has waited for that is done (F14, G2, X1)."""
         if not station.afterwards or station.is_amid:
             return
+        if station.tasks:  # which come to their end first, and call again behind the last
+            self.cancel_tasks(station)
+            return
         wanted, station.afterwards = station.afterwards, ""
         if wanted == "rest":
             self.rest(station)
@@ -373,6 +376,10 @@ class Firing(RunningCode):
 
     def reset(self, station: Station) -> None:
         """Teardown, setup, not ended."""
+        raise NotImplementedError
+
+    def cancel_tasks(self, station: Station) -> None:
+        """Let what its code has started beside its firings end."""
         raise NotImplementedError
 
     def shipments(self, flight: Flight, outcome: str) -> list[tuple[Line, Any, int | None, float]]:
@@ -432,7 +439,7 @@ class Firing(RunningCode):
             return
         if policy == "restart" and not station.is_restarting:
             station.restarts += 1
-            if station.is_concurrent:
+            if station.is_concurrent or station.tasks:
                 station.afterwards = "rest"
             else:
                 self.rest(station)

@@ -14,7 +14,7 @@ from typing import Any, Final, Literal
 
 from hfg.errors import QueueLimit, Stalled, UsageError
 from hfg.testing.reference.edits import Editing
-from hfg.testing.reference.state import Flight, Line, Station
+from hfg.testing.reference.state import Flight, Line, Station, Task
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
 from hfg.token import END, NO_MESSAGE, Token
@@ -40,17 +40,20 @@ class Move:
 
     Attributes:
       kind: "fire" node; "call" a slot of node with the token of `edge`; "go on" with the firing or call of node;
+        "task": go on with what its code has started beside them;
         "time out" the firing of node (X2); "timer": what a timer of node, or the operators of `edge`, waited for;
         "feed" the graph's input `edge`, "read" the output at the end of `edge` (P10); "wait" until `time`;
         "grow" the queue of `edge`; "give up" sources; "complete" operators; "end events"; "finish" the run.
       outcome: of "finish".
       number: of "go on" and "time out": which of the node's firings, if several may be under way (F14); else 0.
+        Of "task": which of the node's tasks.
     """
 
     kind: Literal[
         "fire",
         "call",
         "go on",
+        "task",
         "time out",
         "timer",
         "feed",
@@ -80,6 +83,8 @@ class Move:
                 return f"{self.kind} {self.edge}"
             case "call":
                 return f'call a slot of "{self.node}" over {self.edge}'
+            case "task":
+                return f'go on with task {self.number} of "{self.node}"'
             case "give up" | "complete" | "end events":
                 return self.kind
         return f'{self.kind} "{self.node}"' + (f" in firing {self.number}" if self.number else "")
@@ -176,6 +181,7 @@ class ReferenceMachine(Editing):
         for index, station in enumerate(self.stations):
             if only is not None and index not in only:
                 continue
+            found += [Move("task", station.path, number=task.number) for task in self.tasks_in_turn(station)]
             for flight in station.flights:
                 number = flight.number if station.is_concurrent and flight.what == "firing" else 0
                 if self.can_go_on(flight):
@@ -205,6 +211,10 @@ class ReferenceMachine(Editing):
         if move.number:
             return next(one for one in station.firings_under_way if one.number == move.number)
         return next((one for one in station.flights if one.what == "call"), station.flights[0])
+
+    def task_of(self, move: Move) -> Task:
+        """Which task a move goes on with."""
+        return next(task for task in self.stations[self.paths[move.node]].tasks if task.number == move.number)
 
     def can_feed(self, name: str) -> bool:
         """Whether the graph's input is free (P10)."""
@@ -242,7 +252,7 @@ class ReferenceMachine(Editing):
     def is_moving(self, index: int) -> bool:
         """Whether a node works, or waits for a time to come; not if its code waits until a queue has room (F8)."""
         station = self.stations[index]
-        works = any(not flight.waiting_for for flight in station.flights)
+        works = any(not work.waiting_for for work in station.work)
         return works or station.resting_until is not None or self.may_fire(index, ignore="timers")
 
     def all_inside(self, index: int) -> set[int]:
@@ -261,6 +271,7 @@ class ReferenceMachine(Editing):
         station = self.stations[index]
         line = self.next_call(index)
         held = bool(self.full_lines(index)) or station.resting_until is not None or station.is_calling
+        held |= bool(station.afterwards) and not station.is_amid  # its tasks come to their end first
         fires = station.place is not None and not station.is_busy and self.may_fire(index)
         if line is not None and (station.place is None or line.queue[0].place < station.place):
             return None if held else Move("call", station.path, line.edge.label)
@@ -297,7 +308,8 @@ class ReferenceMachine(Editing):
         if line is not None:
             return [Move("grow", edge=line.edge.label)]
         busy = any(
-            any(flight.over is None for flight in station.flights) and (index not in moot or station.is_calling)
+            (bool(station.tasks) or any(flight.over is None for flight in station.flights))
+            and (index not in moot or station.is_calling)
             for index, station in enumerate(self.stations)
         )  # but not what is over and waits for its turn behind a token that nobody takes (F14)
         return [] if busy or self.held_open else [self.closing_move()]
@@ -318,10 +330,7 @@ class ReferenceMachine(Editing):
     def next_timer(self, without: Set[int] = frozenset()) -> float | None:
         """The next moment at which something could start: rate, gate, back-off, time-out, operator, waiting code."""
         ignored = {
-            id(flight)
-            for index in without
-            for flight in self.stations[index].flights
-            if not self.stations[index].is_calling
+            id(work) for index in without for work in self.stations[index].work if not self.stations[index].is_calling
         }
         times: list[float | None] = [self.loop.next_time(ignored)]
         for index, station in enumerate(self.stations):
@@ -352,7 +361,7 @@ class ReferenceMachine(Editing):
         for index, station in enumerate(self.stations):
             if only is not None and index not in only:
                 continue
-            waits = any(flight.waiting_for for flight in station.flights)
+            waits = any(work.waiting_for for work in station.work)
             held = (not station.is_busy and self.may_fire(index, ignore="queues")) or (
                 not (station.is_calling if station.is_concurrent else station.flights)
                 and self.next_call(index) is not None
@@ -451,6 +460,9 @@ class ReferenceMachine(Editing):
                 self.start_call(index, self.labels[move.edge])
             case "go on":
                 self.go_on(self.under_way(move))
+                self.settle()
+            case "task":
+                self.go_on_with(self.task_of(move))
                 self.settle()
             case "time out":
                 self.time_out(self.under_way(move))
@@ -581,9 +593,9 @@ class ReferenceMachine(Editing):
         for line in self.lines if outcome in ("stopped", "until") else ():
             for lying in line.queue:
                 self.observe(TokenDropped(self.now, line.edge.label, lying.token, "stopped"))
-        self.close()
+        ended = self.close()
         torn_down = [self.tear_down_at_last(station) for station in reversed(self.stations)]
-        if not all(torn_down) and outcome in ("done", "stopped", "until"):
+        if not (ended and all(torn_down)) and outcome in ("done", "stopped", "until"):
             self.outcome = "failed"
         self.observe(RunEnded(self.now, self.outcome))
 
@@ -593,11 +605,16 @@ class ReferenceMachine(Editing):
         station.set_up = False
         return hook is None or self.run_within(hook, TEARDOWN_LIMIT_S)
 
-    def close(self) -> None:
-        """Throw away what is under way; needed only if the run is not taken to its end."""
+    def close(self) -> bool:
+        """Throw away what is under way; whether all tasks have ended well.
+
+        By hand only for a run that is not taken to its end.
+        """
         for station in self.stations:
             for flight in station.flights:
                 self.abandon(flight)
+        ended = [self.abandon_tasks(station) for station in self.stations]
+        return all(ended)
 
     def fail_run(self, error: BaseException, outcome: str = "failed") -> None:
         """End the run in failure."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -18,7 +18,7 @@ from typing import Any
 from hfg.clock import time_told_by
 from hfg.errors import UsageError
 from hfg.testing.reference.sending import Sending
-from hfg.testing.reference.state import Flight, Station
+from hfg.testing.reference.state import Flight, Station, Task
 from hfg.trace import ParameterSet
 
 __all__ = ["RunningCode"]
@@ -30,9 +30,12 @@ class RunningCode(Sending):
     def __init__(self, graph: Any) -> None:
         super().__init__(graph)
         self.in_code: list[Flight] = []  # whose code is running, the innermost last
+        self.in_task: Task | None = None  # or that of which task
 
     def flight_of(self, station: Station) -> Flight | None:
-        """The firing or call that a port of the node speaks for: the one whose code is running (F14)."""
+        """The firing or call that a port of the node speaks for: the one whose code is running (F14), if not a task."""
+        if self.in_task is not None and self.in_task.station is station:
+            return None
         if not station.is_concurrent:
             return station.flight
         return next((flight for flight in reversed(self.in_code) if flight.station is station), None)
@@ -45,6 +48,7 @@ class RunningCode(Sending):
 
     def connect_one(self, station: Station) -> None:
         """Let the ports of a node speak to this machine."""
+        station.node._start_task = partial(self.start_task, station)
         for name in station.type.outputs:
             station.node.ports.outputs[name]._emit = self._writer(station, name)
         for name in station.type.events:
@@ -91,18 +95,23 @@ class RunningCode(Sending):
             flight = self.flight_of(station)
             if flight is not None:
                 flight.triggered = True
+            speaker = self.in_task if flight is None else flight
             self.trigger(station.leaf.index, name, value, activity, stamp, flight)
-            while flight is not None and self.has_no_room(station, name):
-                flight.waiting_for = name
+            while speaker is not None and self.has_no_room(station):
+                speaker.waiting_for = name
                 await asyncio.sleep(0)
-            if flight is not None:
-                flight.waiting_for = ""
+            if speaker is not None:
+                speaker.waiting_for = ""
 
         return trigger
 
-    def has_no_room(self, station: Station, name: str) -> bool:
-        """Whether a queue behind the event is full (F8)."""
-        return any(line.edge.source.name == name for line in self.full_lines(station.leaf.index))
+    def start_task(self, station: Station, coroutine: Coroutine[Any, Any, Any]) -> None:
+        """Run it beside the firings of the node."""
+        raise NotImplementedError
+
+    def has_no_room(self, station: Station) -> bool:
+        """Whether a queue behind an event of the node is full, which holds back its firings too (F8)."""
+        return bool(self.full_lines(station.leaf.index))
 
     @contextmanager
     def amid_code(self, flight: Flight | None = None) -> Iterator[None]:
@@ -147,7 +156,7 @@ class RunningCode(Sending):
         if flight.pause_until is not None:
             return self.is_over(flight.pause_until)
         if flight.when_rested is not None:
-            return not flight.station.is_flying
+            return not flight.station.is_flying and not any(task.cancelled for task in flight.station.tasks)
         if flight.waits_to_end:
             others = [one for one in flight.station.firings_under_way if not one.waits_to_end]
             return not others and flight.station.firings_under_way[0] is flight
@@ -155,7 +164,7 @@ class RunningCode(Sending):
             return self.can_iterate(flight.station.leaf.index)
         if flight.task is None:
             return flight.in_thread
-        if flight.waiting_for and self.has_no_room(flight.station, flight.waiting_for):
+        if flight.waiting_for and self.has_no_room(flight.station):
             return False
         return self.loop.can_step(flight)
 

@@ -17,7 +17,7 @@ from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import TraceEvent
 
-__all__ = ["Flight", "Line", "Lying", "State", "Station", "fresh", "newest"]
+__all__ = ["Flight", "Line", "Lying", "State", "Station", "Task", "fresh", "newest"]
 
 
 @dataclass
@@ -109,6 +109,18 @@ class Flight:
 
 
 @dataclass(eq=False)
+class Task:
+    """What a node's code has started beside its firings (X1); the `number` tells it from others of its node."""
+
+    station: Station
+    name: str
+    number: int
+    code: Any = None
+    cancelled: bool = False
+    waiting_for: str = ""  # an event whose queues have no room (trigger_wait)
+
+
+@dataclass(eq=False)
 class Station:
     """A node in the machine: a fresh copy that does the work, and what the rules keep of it."""
 
@@ -130,7 +142,8 @@ class Station:
     grid: tuple[float, float] | None = None  # its beginning and its period (F11)
     to_set: list[tuple[str, Any]] = field(default_factory=list)  # parameters, as soon as its firing is over (P8)
     last_function: float = float("-inf")  # for the idle rate of a gate
-    afterwards: str = ""  # "enable" or "reset": what a subgraph around it wants as soon as its firing or call is over
+    # "enable" or "reset": what a subgraph around it wants as soon as its firing or call is over; "rest": so a restart
+    afterwards: str = ""
     resting_until: float | None = None  # the back-off of a restart
     restarts: int = 0
     iterator: Any = None
@@ -141,6 +154,9 @@ class Station:
     drained_modifiers: list[int] = field(default_factory=list)  # wait until the own END is sent (F12)
     stamp: float = 0.0  # of the firing in which it ended
     set_up: bool = False
+    opening: bool = False  # its `setup()` runs
+    tasks: list[Task] = field(default_factory=list)  # under way beside its firings
+    tasks_begun: int = 0
     stops_itself: bool = False  # `ready` raised EndOfStream
 
     @property
@@ -162,6 +178,11 @@ class Station:
     def flight(self) -> Flight | None:
         """What is under way; of several firings the one that began first."""
         return self.flights[0] if self.flights else None
+
+    @property
+    def work(self) -> list[Flight | Task]:
+        """All of its code that is under way: firings, calls, tasks."""
+        return [*self.flights, *self.tasks]
 
     @property
     def firings_under_way(self) -> list[Flight]:
@@ -187,7 +208,7 @@ class Station:
     def is_busy(self) -> bool:
         """Whether no firing may begin, because of what is under way (F1, F14)."""
         if not self.is_concurrent:
-            return bool(self.flights)
+            return bool(self.flights) or bool(self.afterwards)  # its tasks come to their end first
         return self.is_calling or bool(self.afterwards) or len(self.firings_under_way) >= self.concurrency
 
     @property

@@ -110,6 +110,10 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         """Whether something of `owner` can go on now."""
         return any(one is owner and not handle.cancelled() for one, handle in self._ready)
 
+    def owners_in_turn(self) -> list[object]:
+        """Give those of whom something can go on now, in the order in which it could."""
+        return [owner for owner, handle in self._ready if not handle.cancelled()]
+
     def step(self, owner: object) -> bool:
         """Run the first waiting step of `owner`; False if there was none."""
         for index, (one, handle) in enumerate(self._ready):
@@ -134,7 +138,7 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         """Make the timers whose moment has come into steps of their owners, in order of time."""
         due = [entry for entry in self._timers if entry[1].when() <= self._now() + MOMENT_S]
         self._timers = [entry for entry in self._timers if entry not in due]
-        self._ready.extend((owner, timer) for owner, timer in sorted(due, key=lambda entry: entry[1].when()))
+        self._ready.extend((owner, timer) for owner, timer in sorted(due, key=lambda entry: round(entry[1].when(), 9)))
 
     def forget(self, owner: object) -> None:
         """Throw away what `owner` still has to do."""

@@ -1,0 +1,122 @@
+"""What the code of a node starts beside its firings by `start_soon` (rules X1, X3, R5, F10, T5).
+
+A task is a child of its node: quiet waits for it, its errors are the node's, and it has ended before the node is torn
+down. Its steps are moves of their own, one task after another in the order in which they could go on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+from typing import Any
+
+from hfg.errors import Failure, NodeError, NotRunning, UsageError
+from hfg.testing.reference.firing import Firing
+from hfg.testing.reference.state import Station, Task
+from hfg.trace import ErrorRaised
+
+__all__ = ["Tending"]
+
+
+class Tending(Firing):
+    """A machine whose nodes may have tasks."""
+
+    def start_task(self, station: Station, coroutine: Coroutine[Any, Any, Any]) -> None:
+        """Make a task of it; nothing of it runs yet.
+
+        Raises:
+          UsageError: the node is in a thread.
+          NotRunning: it is not set up, or the run is over.
+        """
+        flight = self.flight_of(station)
+        if self.structure.threads.get(station.leaf.options.group, 0) > 0:
+            coroutine.close()
+            raise UsageError(f'"{station.path}" is in a thread, and async code runs on the loop')
+        if self.outcome is not None or not station.set_up:
+            coroutine.close()
+            raise NotRunning(f'"{station.path}" is not set up')
+        if flight is not None:
+            flight.triggered = True  # such a firing cannot be taken back (X1)
+        if not self.is_enabled(station.leaf.index) and not station.opening:
+            coroutine.close()  # the firing was switched off meanwhile: what it does goes nowhere (F10)
+            return
+        station.tasks_begun += 1
+        task = Task(station, getattr(coroutine, "__name__", type(coroutine).__name__), station.tasks_begun)
+        station.tasks.append(task)
+        task.code = self.loop.start(task, coroutine)
+
+    def tasks_in_turn(self, station: Station) -> list[Task]:
+        """Those that can go on now, in the order in which they could."""
+        turn = self.loop.owners_in_turn() if station.tasks else []
+        able = [task for task in station.tasks if self.loop.can_step(task) and not self.is_waiting(task)]
+        return sorted(able, key=turn.index)
+
+    def is_waiting(self, task: Task) -> bool:
+        """Whether it waits until a queue has room, and is not to end (F8)."""
+        return bool(task.waiting_for) and not task.cancelled and self.has_no_room(task.station)
+
+    def go_on_with(self, task: Task) -> None:
+        """Take its next step; it may be its last."""
+        with self.amid_code():
+            self.in_task = task
+            try:
+                self.loop.step(task)
+            finally:
+                self.in_task = None
+        if task.code.done() and task in task.station.tasks:
+            self.end_task(task)
+
+    def end_task(self, task: Task) -> None:
+        """It is over; behind the last one those have their turn who wait for that."""
+        station = task.station
+        station.tasks.remove(task)
+        self.loop.forget(task)
+        error = None if task.code.cancelled() else task.code.exception()
+        if error is not None:
+            self.fail_task(task, error)
+        if self.outcome is None:
+            self.let_others(station)
+
+    def fail_task(self, task: Task, error: BaseException) -> None:
+        """X1: its node's policy decides, with nothing taken; a firing under way goes on."""
+        station = task.station
+        index = station.leaf.index
+        if task.cancelled and self.is_enabled(index):
+            raise NotImplementedError(f'task "{task.name}" of "{station.path}" fails as it is to end')
+        what = f'task "{task.name}"'
+        failure = NodeError(station.path, what, error)
+        policy = self.policy_of(station)
+        self.observe(ErrorRaised(self.now, station.path, what, str(failure), policy))
+        if policy == "stop":
+            self.fail_run(failure)
+            return
+        station.changes.append((self.next_tick(), "failed", Failure(failure, {}), None))
+        if policy == "restart" and not station.is_restarting:
+            station.restarts += 1
+            station.afterwards = "rest"
+        if not (station.is_calling if station.is_concurrent else station.flights):
+            self.flush_changes(station)
+        if policy == "disable":
+            self.disable(index)
+
+    def cancel_tasks(self, station: Station) -> None:
+        """Let all of them end, each by its next step."""
+        for task in station.tasks:
+            if not task.cancelled:
+                task.cancelled = True
+                with self.amid_code():
+                    task.code.cancel()
+
+    def abandon_tasks(self, station: Station) -> bool:
+        """Let them end now; whether each has done so, and without an error."""
+        well = True
+        for task in station.tasks:
+            with self.amid_code():
+                task.code.cancel()
+                while self.loop.step(task):
+                    pass
+                if not task.code.done():
+                    task.code.get_coro().close()
+            well &= task.code.done() and (task.code.cancelled() or task.code.exception() is None)
+            self.loop.forget(task)
+        station.tasks = []
+        return well
