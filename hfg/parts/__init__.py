@@ -5,6 +5,8 @@ part          one part: an engine, and the tokens that leave it and come in
 messages      what parts tell each other beside tokens; failing: errors among it
 channels      messages and tokens on a session of a transport; rings: large arrays among these, in shared memory
 worker        a part that somebody else has begun; process: the process around it
+serving       what somebody outside asks of a part, from its side; asking, run: from that of the main part
+crossing      what is brought in and seen, as data; sieve: which side of an edge tells of it
 distribution  the whole, as the main part sees it; launching: where the others are begun
 local         all parts on one event loop, without links
 """

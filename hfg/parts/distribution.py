@@ -24,6 +24,7 @@ from hfg.graph import Graph
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph, cut
 from hfg.logs import Log
 from hfg.parts.agreement import Agreement, Question, Rest
+from hfg.parts.asking import Asking
 from hfg.parts.channels import Carrier, Channel, name_of
 from hfg.parts.failing import as_error
 from hfg.parts.inheriting import inheriting
@@ -31,6 +32,7 @@ from hfg.parts.lives import LIMIT, WITHIN_S, Deaths
 from hfg.parts.messages import (
     Ask,
     Begin,
+    Call,
     Close,
     Closed,
     Ended,
@@ -44,6 +46,8 @@ from hfg.parts.messages import (
     Opened,
     Reborn,
     Rests,
+    Result,
+    Seen,
     Sees,
     Shares,
     Speaks,
@@ -51,6 +55,8 @@ from hfg.parts.messages import (
 )
 from hfg.parts.part import Part
 from hfg.parts.rings import sweep_run, sweep_runs
+from hfg.parts.run import Counts, CutRun
+from hfg.parts.sieve import sieve
 from hfg.parts.worker import FIRST_LIFE
 from hfg.transport import Session
 
@@ -109,10 +115,13 @@ class Distribution:
       flat: the main part, to be run here.
     """
 
-    def __init__(self, cutting: Cutting, text: str, options: Mapping[str, Any], launcher: Launcher) -> None:
+    def __init__(
+        self, flat: FlatGraph, cutting: Cutting, text: str, options: Mapping[str, Any], launcher: Launcher
+    ) -> None:
         """Prepare it; nothing has begun yet.
 
         Args:
+          flat: the whole graph.
           cutting: of the graph.
           text: the graph, as a file would have it.
           options: of the run, for the other parts.
@@ -127,6 +136,8 @@ class Distribution:
         self._lives = dict.fromkeys(cutting.parts, FIRST_LIFE)
         self._agreement = Agreement(cutting.parts, self._ask)
         self._others = {name: _Other(name) for name in cutting.parts if name != MAIN}
+        self._asking = Asking(flat, cutting, self._call)
+        self._run_of_all: CutRun
         self._part: Part
         self._carrier: Carrier | None = None
         self._is_open = False
@@ -139,7 +150,13 @@ class Distribution:
         """Here is the engine of the main part."""
         self._loop = asyncio.get_running_loop()
         self._part = Part(MAIN, composition, self._cutting.edges_of(MAIN), rests=self._rests)
+        composition.consumers.leave_out(sieve(MAIN, self._cutting.edges))
         composition.engine.callbacks.finished.append(self._ended_here)
+
+    def face(self, graph: Graph) -> CutRun:
+        """Give what one can do with the whole."""
+        self._run_of_all = CutRun(graph, self._part.composition, self._asking)
+        return self._run_of_all
 
     async def open(self) -> None:
         """Begin the other parts and set them up.
@@ -181,9 +198,9 @@ class Distribution:
         other.launched = await self._launcher.launch(self._run, name, host, lives)
         other.watch(partial(self._gone, other))
         other.is_told = True
-        self._say(
-            name, Open(self._text, self._options, dict(self._lives), _known_packages(), self._launcher.shares_memory)
-        )
+        calls = self._asking.open(name)
+        shares = self._launcher.shares_memory
+        self._say(name, Open(self._text, self._options, dict(self._lives), _known_packages(), shares, calls))
 
     def begin(self) -> None:
         """All are set up: let them go, behind which the main part goes."""
@@ -200,6 +217,10 @@ class Distribution:
 
     def _say(self, part: str, message: Message) -> None:
         self._others[part].say(message)
+
+    def _call(self, part: str, call: Call) -> None:
+        if self._others[part].is_there:
+            self._say(part, call)
 
     def _hear(self, other: _Other, message: Message) -> None:
         match message:
@@ -223,6 +244,8 @@ class Distribution:
                 self._ended_there(other, message)
             case Logged():
                 _log(other.name, message)
+            case Result() | Seen():
+                self._asking.hear(other.name, message)
             case Closed():
                 other.close(message)
             case _:
@@ -252,15 +275,18 @@ class Distribution:
         """Another part is over, for a reason of its own, or because it was told: so are all."""
         error = None if message.failed is None else self._error(message.failed, other)
         self._part.finish(message.outcome, error)
+        self._asking.over(other.name)
 
     def _gone(self, other: _Other, how: str) -> None:
         """A process has ended that was not told to: another takes its place."""
         other.is_told = False
         self._agreement.leave(other.name)
+        self._asking.gone(other.name, RunError(f'the process of group "{other.name}" is gone: {how}'))
         if not self._has_begun:
             error = RunError(f'the process of group "{other.name}" is gone before the run has begun: {how}')
             other.answer(error)
             self._part.finish("failed", error)
+            self._asking.over(other.name)
             return
         pause_s = other.deaths.died(self._loop.time())
         if pause_s is None:
@@ -269,6 +295,7 @@ class Distribution:
                 "failed",
                 RunError(f'the process of group "{other.name}" is gone: {how}; {often}: see what it ended with'),
             )
+            self._asking.over(other.name)
             return
         _LOGGER.warning('the process of group "%s" is gone: %s; another begins in %g s', other.name, how, pause_s)
         other.returning = self._loop.create_task(self._bring_back(other, pause_s), name=f"hfg return of {other.name}")
@@ -291,6 +318,7 @@ class Distribution:
             await other.opened
         except HfgError as error:
             self._part.finish("failed", error)
+            self._asking.over(name)
             return
         self._let_go(other)
         if self._part.engine.core.over:  # meanwhile, when nobody could tell it
@@ -311,6 +339,7 @@ class Distribution:
             await asyncio.wait({other.closed for other in there}, timeout=_LEAVING_S)
         for other in self._others.values():
             await other.end()
+        self._asking.close()
         if self._carrier is not None:
             await self._carrier.close()
         if self._launcher.shares_memory:
@@ -331,20 +360,24 @@ class Distribution:
         errors = list(report.errors)
         lost = report.lost_activity
         halves: dict[str, dict[str, EdgeReport]] = {MAIN: report.edges}
+        goes_on = report.outcome == "running"
+        said: Mapping[str, Counts] = self._run_of_all.counts() if goes_on else {}
         for other in self._others.values():
-            if other.report is None:
-                errors.append(f'the process of group "{other.name}" has not reported')
+            found = said.get(other.name) if goes_on else other.report
+            if found is None:
+                if not goes_on:
+                    errors.append(f'the process of group "{other.name}" has not reported')
                 continue
             if other.deaths.count:
                 errors.append(
                     f'the process of group "{other.name}" was begun again {other.deaths.count} times; what it counted '
                     "before is not in the report"
                 )
-            nodes |= other.report.nodes
-            edges |= other.report.edges
-            halves[other.name] = other.report.edges
-            errors += other.report.errors
-            lost += other.report.lost_activity
+            nodes |= found.nodes
+            edges |= found.edges
+            halves[other.name] = found.edges
+            errors += found.errors
+            lost += found.lost_activity
         for edge in self._cutting.edges:
             edges[edge.label] = _joined(edge, halves)
         order = [node.path for node in _all_nodes(self._cutting)]
@@ -373,9 +406,9 @@ def distribute(graph: Graph, flat: FlatGraph, options: Mapping[str, Any], *, vir
 
     cutting = cut(flat)
     if len(cutting.parts) == 1:  # groups without nodes
-        return Distribution(cutting, "", options, LoopLauncher())
+        return Distribution(flat, cutting, "", options, LoopLauncher())
     text = text_of(describe(graph, same_program=True))
-    return Distribution(cutting, text, options, LoopLauncher() if virtual else ProcessLauncher())
+    return Distribution(flat, cutting, text, options, LoopLauncher() if virtual else ProcessLauncher())
 
 
 def _log(part: str, logged: Logged) -> None:

@@ -1,7 +1,7 @@
 """What the parts of a run tell each other beside tokens, in order and without loss; and how.
 
     Whole -> part     Open, Begin, Question, Reborn, Finish, Call, Close
-    Part  -> whole    Opened, Rest, Answer, Ended, Result, Logged, Closed
+    Part  -> whole    Opened, Rest, Answer, Ended, Result, Seen, Logged, Closed
     Part  -> part     Speaks, Hears, Joins, Shares, Sees
 
 All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
@@ -9,12 +9,32 @@ All of it is data of declared types (rule L4). Stands on the files of graphs and
 
 from __future__ import annotations
 
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 
 from hfg.engine.observing.report import EdgeReport, NodeReport
 from hfg.parts.agreement import Answer, Question, Rest
+from hfg.trace import (
+    ActivityChanged,
+    ActivityLost,
+    CallEnded,
+    CallStarted,
+    EditWaits,
+    ErrorRaised,
+    FiringEnded,
+    FiringRetried,
+    FiringStarted,
+    NodeEnabled,
+    NodeEnded,
+    QueueGrown,
+    RunEnded,
+    RunPaused,
+    RunResumed,
+    RunStarted,
+    StructureChanged,
+    TokenProcessed,
+)
 
 __all__ = [
     "Ask",
@@ -70,6 +90,7 @@ class Open(msgspec.Struct, frozen=True, tag=True):
       incarnations: which life of each part this is for.
       allow: packages whose node types may be imported.
       shares_memory: large arrays may go through shared memory.
+      calls: what was asked for already, to be done before the nodes are set up.
     """
 
     graph: str
@@ -77,6 +98,7 @@ class Open(msgspec.Struct, frozen=True, tag=True):
     incarnations: dict[str, int]
     allow: list[str]
     shares_memory: bool = False
+    calls: list[Call] = []
 
 
 class Opened(msgspec.Struct, frozen=True, tag=True):
@@ -126,8 +148,8 @@ class Call(msgspec.Struct, frozen=True, tag=True):
     """Do something with the part that somebody outside has asked for.
 
     Attributes:
-      number: of the call.
-      verb: which of the methods that `worker` has for it.
+      number: of the call; nobody waits for the result of number 0.
+      verb: which of the methods of `serving`.
       arguments: by name.
     """
 
@@ -142,6 +164,78 @@ class Result(msgspec.Struct, frozen=True, tag=True):
     number: int
     value: Any = None
     failed: Failed | None = None
+
+
+class Parcel(msgspec.Struct, frozen=True, array_like=True, gc=False):
+    """A token as links carry it.
+
+    Attributes:
+      metadata, value: of `TokenCodec`.
+      shown: text in place of the value, where that is only looked at and cannot be encoded.
+    """
+
+    metadata: bytes
+    value: bytes
+    shown: str | None = None
+
+
+class Passed(msgspec.Struct, frozen=True, tag=True, gc=False):
+    """An event of the trace that has a value in it.
+
+    Attributes:
+      time: see `TraceEvent`.
+      kind: which event.
+      place: an edge, an event or a node.
+      parcel: the token.
+      detail: why it was dropped; the name of the parameter.
+    """
+
+    time: float
+    kind: Literal["sent", "taken", "dropped", "drained", "triggered", "set"]
+    place: str
+    parcel: Parcel
+    detail: str = ""
+
+
+PlainEvent: TypeAlias = (
+    ActivityChanged
+    | ActivityLost
+    | CallEnded
+    | CallStarted
+    | EditWaits
+    | ErrorRaised
+    | FiringEnded
+    | FiringRetried
+    | FiringStarted
+    | NodeEnabled
+    | NodeEnded
+    | QueueGrown
+    | RunEnded
+    | RunPaused
+    | RunResumed
+    | RunStarted
+    | StructureChanged
+    | TokenProcessed
+)
+"""An event of the trace that is data as it is."""
+
+Sight: TypeAlias = PlainEvent | Passed
+
+
+class Seen(msgspec.Struct, frozen=True, tag=True):
+    """What somebody outside looks at has come by, in order.
+
+    Attributes:
+      number: of the call by which he has asked for it.
+      events: of the trace.
+      tokens: at a tap or a breakpoint.
+      count: how many have passed there by now, those included that were skipped.
+    """
+
+    number: int
+    events: list[Sight] = []
+    tokens: list[Parcel] = []
+    count: int = 0
 
 
 class Close(msgspec.Struct, frozen=True, tag=True):
@@ -270,6 +364,7 @@ Message: TypeAlias = (
     | Ended
     | Call
     | Result
+    | Seen
     | Logged
     | Close
     | Closed

@@ -301,7 +301,7 @@ class Part:
     def answer(self, question: Question) -> Answer:
         """Do what follows from quiet, if the part still rests."""
         engine = self.engine
-        if not self._is_at_rest or question.rest != self._numbered or engine.core.over:
+        if not self._is_at_rest or question.rest != self._numbered or engine.core.over or engine.core.held:
             return Answer(self.name, question.step, question.rest, moved=True)
         return Answer(self.name, question.step, question.rest, value=self._do(question))
 

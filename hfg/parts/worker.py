@@ -16,6 +16,7 @@ from hfg.engine.runtime.settings import Settings
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, cut, flatten
+from hfg.graph.structure.level import level_of
 from hfg.logs import Log
 from hfg.parts.agreement import Rest
 from hfg.parts.channels import Carrier, Channel, name_of
@@ -24,6 +25,7 @@ from hfg.parts.inheriting import inheriting
 from hfg.parts.messages import (
     Ask,
     Begin,
+    Call,
     Close,
     Closed,
     Ended,
@@ -43,6 +45,8 @@ from hfg.parts.messages import (
 )
 from hfg.parts.part import Part
 from hfg.parts.rings import sweep_run
+from hfg.parts.serving import Serving
+from hfg.parts.sieve import sieve
 from hfg.transport import Session
 
 __all__ = ["FIRST_LIFE", "Worker"]
@@ -77,6 +81,7 @@ class Worker:
         self._part: Part | None = None
         self._carrier: Carrier | None = None
         self._shares_memory = False
+        self._serving: Serving | None = None
         self._is_closed = False
 
     async def serve(self) -> None:
@@ -97,6 +102,8 @@ class Worker:
         finally:
             if self._part is not None and not self._is_closed:  # nobody is there any more who would say so
                 self._part.finish("cancelled", None)
+                if self._serving is not None:
+                    self._serving.close()
                 await self._part.composition.lifetime.close()
             await self._leave()
 
@@ -114,6 +121,9 @@ class Worker:
     async def _open(self, message: Open) -> None:
         try:
             self._part = part = self._make(message)
+            assert self._serving is not None
+            for call in message.calls:
+                self._serving.obey(call)
             went_well = await part.composition.lifetime.set_up()
         except HfgError as error:
             self._say(MAIN, Opened(self._name, as_failed(error)))
@@ -127,7 +137,8 @@ class Worker:
 
     def _make(self, message: Open) -> Part:
         graph = self._build(message)
-        cutting = cut(flatten(graph))
+        flat = flatten(graph)
+        cutting = cut(flat)
         if self._name not in cutting.parts:
             raise EngineInternalError(f'graph "{graph.name}" has no part "{self._name}" here')
         edges = list(cutting.edges_of(self._name))
@@ -141,6 +152,9 @@ class Worker:
             inherits=self._name in heirs,
             returns=self._life > FIRST_LIFE,
         )
+        self._serving = Serving(graph, flat, composition, partial(self._say, MAIN))
+        level_of(graph).whole.begin_run(self._serving.run)
+        composition.consumers.leave_out(sieve(self._name, edges))
         part.engine.callbacks.finished.append(partial(self._ended, part))
         lives = message.incarnations
         neighbours = {edge.source for edge in edges} | {edge.target for edge in edges}
@@ -184,6 +198,9 @@ class Worker:
                     self._carrier.share(message)
             case Finish():
                 part.finish(message.outcome, None)
+            case Call():
+                assert self._serving is not None
+                self._serving.obey(message)
             case _:
                 _LOGGER.warning('%s was told "%s", which it does not know', name_of(self._name), type(message).__name__)
 
@@ -191,6 +208,8 @@ class Worker:
         self._say(MAIN, Rests(rest))
 
     def _ended(self, part: Part) -> None:
+        assert self._serving is not None
+        self._serving.flush()
         self._say(MAIN, Ended(self._name, part.engine.outcome, as_failed(part.engine.error)))
 
     # --- the end ----------------------------------------------------------------------------------------------------
@@ -203,6 +222,8 @@ class Worker:
         try:
             await part.composition.lifetime.close()
         finally:
+            if self._serving is not None:
+                self._serving.close()
             engine = part.engine
             failed = as_failed(engine.error) if engine.outcome == "failed" else None
             self._say(MAIN, _closed(self._name, engine, failed))

@@ -10,23 +10,23 @@ from typing import Any
 import pytest
 
 import hfg
-from hfg.engine.runtime.settings import Settings
+from hfg.engine.runtime import settings
 from hfg.graph import Graph
 from hfg.graph.flat import cut, flatten
 from hfg.graph.structure.level import level_of
 from hfg.parts.local import LocalParts
 from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
-from hfg.trace import NodeEnded, TokenSent, TraceEvent
+from hfg.trace import NodeEnded, TokenSent, TokenTaken, TraceEvent
 
 Sequences = dict[str, list[tuple[Any, int]]]
 
 
-def sequences(trace: list[TraceEvent]) -> Sequences:
-    """What was put on each edge: values, markers and modifiers."""
+def sequences(trace: list[TraceEvent], kind: type[TokenSent] | type[TokenTaken]) -> Sequences:
+    """What was put on each edge, or taken from it: values, markers and modifiers."""
     found: Sequences = {}
     for event in trace:
-        if isinstance(event, TokenSent):
+        if isinstance(event, kind):
             found.setdefault(event.edge, []).append((event.token.value, event.token.activity))
     return found
 
@@ -49,65 +49,59 @@ def cut_at_random(plan: GraphPlan, seed: int) -> Callable[[], Graph]:
     return build
 
 
-def run_whole(plan: GraphPlan) -> tuple[str, list[TraceEvent]]:
+def run_whole(build: Callable[[], Graph]) -> tuple[str, list[TraceEvent]]:
+    """How a graph ended, in one part or in several, and what was seen."""
     trace: list[TraceEvent] = []
     try:
-        hfg.run(plan.build(), clock="virtual", trace=trace)
+        hfg.run(build(), clock="virtual", trace=trace)
     except hfg.errors.RunError as error:
         return type(error).__name__, trace
     return "done", trace
 
 
-def run_cut(build: Callable[[], Graph], fuse_after: int | None) -> tuple[str, dict[str, list[TraceEvent]]]:
-    """How a graph in parts ended, and what each part has seen."""
-    traces: dict[str, list[TraceEvent]] = {}
-
-    def settings(name: str) -> Settings:
-        made = Settings(trace=traces.setdefault(name, []))
-        if fuse_after is not None:
-            made.fuse_after = fuse_after
-        return made
+def run_on_one_loop(build: Callable[[], Graph]) -> str:
+    """How a graph in parts ended, where tokens go from part to part by themselves, whatever their values."""
 
     async def run() -> str:
         try:
-            await LocalParts(build, settings).run()
+            await LocalParts(build, lambda _: settings.Settings()).run()
         except hfg.errors.RunError as error:
             return type(error).__name__
         return "done"
 
     with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
-        return runner.run(run()), traces
+        return runner.run(run())
 
 
-def difference(plan: GraphPlan, seed: int, fuse_after: int | None = None) -> str | None:
+def difference(plan: GraphPlan, seed: int) -> str | None:
     """Where the cut graph does otherwise than the whole, by rule F7 with its exceptions."""
-    outcome, trace = run_whole(plan)
-    found_outcome, traces = run_cut(cut_at_random(plan, seed), fuse_after)
+    outcome, trace = run_whole(plan.build)
+    found_outcome, found_trace = run_whole(cut_at_random(plan, seed))
     if outcome != found_outcome:
         return f"the whole is {outcome}, the parts are {found_outcome}"
-    wanted = sequences(trace)
     ended = {event.node for event in trace if isinstance(event, NodeEnded)}
-    parts = {name: sequences(seen) for name, seen in traces.items()}
-    for name, found in parts.items():
+    for kind in (TokenSent, TokenTaken):
+        wanted, found = sequences(trace, kind), sequences(found_trace, kind)
         for label, values in found.items():
             expected = wanted.get(label, [])
             both = min(len(expected), len(values))
             may_be_cut_short = outcome != "done" or label.split(" -> ")[1].rsplit(".", 1)[0] in ended
             if expected[:both] != values[:both] or (len(expected) != len(values) and not may_be_cut_short):
-                return f'part "{name}", edge {label}: {values}\nin place of {expected}'
-    if outcome == "done":
-        missing = [label for label in wanted if not any(label in found for found in parts.values())]
-        if missing:
-            return f"nothing ever came over {missing}"
+                return f"edge {label}, {kind.__name__}: {values}\nin place of {expected}"
+        if outcome == "done" and kind is TokenSent and wanted.keys() - found.keys():
+            return f"nothing ever came over {wanted.keys() - found.keys()}"
     return None
 
 
 @pytest.mark.rule("F7", "G1", "L1")
 @pytest.mark.parametrize("block", range(20))
-def test_what_runs_over_every_edge_does_not_depend_on_where_a_graph_is_cut(block: int) -> None:
+def test_what_runs_over_every_edge_does_not_depend_on_where_a_graph_is_cut(
+    block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for seed in range(25 * block, 25 * block + 25):
         plan = random_plan(seed, SYNCHRONOUS)
-        found = difference(plan, seed, fuse_after=0 if seed % 2 else None)
+        monkeypatch.setattr(settings, "FUSE_AFTER", 0 if seed % 2 else 25)
+        found = difference(plan, seed)
         assert found is None, f"{found}\n{plan}"
 
 
@@ -139,9 +133,9 @@ def test_graphs_with_everything_end_as_they_do_in_one_piece(block: int) -> None:
     """Where events decide, the order is another's; but all comes to its end, and to the same one."""
     for seed in range(3000 + 25 * block, 3000 + 25 * block + 25):
         plan = random_plan(seed, Allowed(disabling=False))
-        outcome, _ = run_whole(plan)
+        outcome, _ = run_whole(plan.build)
         build = cut_at_random(plan, seed)
         if cut(flatten(build())).findings:
             continue  # a gate, or the ports of a subgraph, whose nodes are in several processes
-        found, _ = run_cut(build, None)
+        found = run_on_one_loop(build)
         assert found == outcome, f"{found} in place of {outcome}\n{plan}"

@@ -78,6 +78,7 @@ class Pausing:
     Attributes:
       paused: no new firing or call starts.
       why: what paused the run: "pause", or the path of the breakpoint that was hit.
+      hit: told of a breakpoint that has paused this part of a run, so that the others hold still too.
     """
 
     def __init__(self, engine: Engine, consumers: _Trace) -> None:
@@ -85,6 +86,7 @@ class Pausing:
         self._consumers = consumers
         self.paused = False
         self.why = ""
+        self.hit: Callable[[Breakpoint], None] | None = None
         self._stepping = False
         self._waiters: list[asyncio.Future[None]] = []  # for a pause, or for what is under way to be over
         self._at_nodes: dict[Worker, Breakpoint] = {}
@@ -224,13 +226,21 @@ class Pausing:
                 return went_on
             went_on = True
 
-    def _begin(self, what: str) -> None:
+    def need_still(self, what: str) -> None:
+        """Refuse to step a run that is not held still.
+
+        Raises:
+          UsageError: it has ended, goes on, or makes a step already.
+        """
         if self._engine.core.over:
             raise UsageError(f"{what} cannot step: the run has ended")
         if not self.paused:
             raise UsageError(f"{what} cannot step while the run goes on: run.pause() first")
         if self._stepping:
             raise UsageError(f"{what} cannot step while another step is under way: await that first")
+
+    def _begin(self, what: str) -> None:
+        self.need_still(what)
         self._stepping = True
         for region in list(self._engine.core.regions):
             region.dissolve()
@@ -374,6 +384,8 @@ class Pausing:
     def _hit(self, point: Breakpoint) -> None:
         point.hits += 1
         self.pause(point.path)
+        if self.hit is not None:
+            self.hit(point)
 
 
 def _path(place: Any, labels: Sequence[str]) -> str:

@@ -23,7 +23,7 @@ from hfg.values import own_copy
 if TYPE_CHECKING:
     from hfg.engine.runtime.engine import Engine
 
-__all__ = ["refuse_without_effect", "set_parameter"]
+__all__ = ["need_settable", "refuse_without_effect", "set_parameter", "without_effect"]
 
 
 def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
@@ -33,16 +33,8 @@ def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
       ValueError: the value is out of the limits of one of them; nothing is changed.
       UsageError: nobody would see it.
     """
-    if engine.core.over:
-        raise NotRunning(f'the run is over: write node.ports.parameters["{port.name}"].value = ... for the next one')
-    reached = list(stands_for(port))
+    reached = need_settable(engine, port, value)
     value = own_copy(value)  # of now: it may be set a while later
-    for one in reached:
-        if one.spec.read_only:
-            raise ValueError(read_only_refusal(one.path))
-        wrong = one.spec.check(value)
-        if wrong is not None:
-            raise ValueError(f'parameter "{one.path}" {wrong}')
     workers = {worker.node: worker for worker in engine.core.workers if worker.node is not None}
     if any(one.node not in workers for one in reached):
         raise UsageError(f'"{port.path}" is no parameter of this run: its graph is another one, or it was never added')
@@ -53,6 +45,25 @@ def set_parameter(engine: Engine, port: ParameterPort[Any], value: Any) -> None:
             _between_firings(workers[one.node], write)
         else:  # from a thread
             engine.bring_in(partial(_between_firings, workers[one.node], write))
+
+
+def need_settable(engine: Engine, port: ParameterPort[Any], value: Any) -> list[ParameterPort[Any]]:
+    """Give a parameter and those inside that it stands for, all of which may have this value now.
+
+    Raises:
+      ValueError: it is out of the limits of one of them, or set by the node alone.
+      NotRunning: the run is over.
+    """
+    if engine.core.over:
+        raise NotRunning(f'the run is over: write node.ports.parameters["{port.name}"].value = ... for the next one')
+    reached = list(stands_for(port))
+    for one in reached:
+        if one.spec.read_only:
+            raise ValueError(read_only_refusal(one.path))
+        wrong = one.spec.check(value)
+        if wrong is not None:
+            raise ValueError(f'parameter "{one.path}" {wrong}')
+    return reached
 
 
 def _write(worker: Worker, node: Node, name: str, value: Any) -> None:
@@ -97,11 +108,16 @@ def refuse_without_effect(parameters: Sequence[tuple[Any, str]], workers: Iterab
                     f"{_replacing(node, name)}"
                 )
         elif node in running and _has_its_values(running[node]):
-            raise UsageError(
-                f'parameter "{node.place.path}.{name}" belongs to a generator function that was given it when it '
-                "began and cannot see a new value: make it a class whose process() yields, or counts in an "
-                f"hfg.State, and reads self.{name}; or begin it afresh, {_replacing(node, name)}"
-            )
+            raise without_effect(node, name)
+
+
+def without_effect(node: Any, name: str) -> UsageError:
+    """The refusal to set what a generator function was given when it began."""
+    return UsageError(
+        f'parameter "{node.place.path}.{name}" belongs to a generator function that was given it when it '
+        "began and cannot see a new value: make it a class whose process() yields, or counts in an "
+        f"hfg.State, and reads self.{name}; or begin it afresh, {_replacing(node, name)}"
+    )
 
 
 def _has_its_values(worker: Worker) -> bool:

@@ -34,6 +34,9 @@ class Others(Protocol):
     def take(self, composition: Composition) -> None:
         """Here is the engine of the main part."""
 
+    def face(self, graph: Graph) -> Any:  # noqa: ANN401 - a `Run`, which stands on this module
+        """Give the `Run` of all parts."""
+
     async def open(self) -> None:
         """Begin the other parts and set them up.
 

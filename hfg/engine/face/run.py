@@ -102,11 +102,15 @@ class Run:
         if relays.is_relay(port):
             await self._trigger_inside(port, value, activity, stamp)
             return
+        await self._bring(port, value, activity, stamp)
+
+    async def _bring(self, port: Port, value: object, activity: int | None, stamp: float | None) -> None:
+        """Send a signal into the slot of a node, or trigger its event."""
+        worker = self._engine.worker_of(port.node)
         if port.kind == "slot":
-            worker = self._engine.worker_of(port.node)
             await outside.signal(self._engine, worker, port.name, value, activity, stamp)
             return
-        event = bind_event(self._engine.worker_of(port.node), port.name)
+        event = bind_event(worker, port.name)
         await self._engine.code.trigger_wait(event, value, activity, self._engine.now() if stamp is None else stamp)
 
     async def _trigger_inside(self, port: Port, value: object, activity: int | None, stamp: float | None) -> None:
@@ -117,8 +121,7 @@ class Run:
                 f'"{port.path}" is the {port.kind} of a subgraph and leads to no slot inside: name the port of a node'
             )
         for slot, active in behind:
-            explicit = activity if active else 0
-            await outside.signal(self._engine, self._engine.worker_of(slot.node), slot.name, value, explicit, stamp)
+            await self._bring(slot, value, activity if active else 0, stamp)
 
     @overload
     def feed(self, port: GraphInput[T], *, end: bool = True) -> outside.Feed[T]: ...
@@ -246,6 +249,9 @@ class Run:
                 f'run.set takes the path of a parameter, or its port, as in node.ports.parameters["name"], got '
                 f"{parameter!r}"
             )
+        self._set(parameter, value)
+
+    def _set(self, parameter: ParameterPort[Any], value: object) -> None:
         set_parameter(self._engine, parameter, value)
 
     # --- changing it (R4): one edit after the other, in the order they were asked for ---------------------------------
@@ -386,6 +392,9 @@ class Run:
                 '"start" was triggered as the run began, so waiting for it would never end: leave the line out, or '
                 "write `await run.wait_quiet()` to wait for what it began"
             )
+        return await self._next_of(event)
+
+    async def _next_of(self, event: EventPort[Any]) -> Token[Any]:
         waiter: asyncio.Future[Token[Any]] = self._engine.loop.create_future()
         bind_event(self._engine.worker_of(event.node), event.name)
         subscription = event.subscribe(partial(answer, waiter))
@@ -407,14 +416,14 @@ class Run:
 
     async def wait_inputs(self, node: Node | str) -> None:
         """Wait for the node's input barrier: every live input holds a token."""
-        await self._barrier(node, "inputs")
+        await self._barrier(self._at(node), "inputs")
 
     async def wait_outputs(self, node: Node | str) -> None:
         """Wait for the node's output barrier: every token it sent is processed."""
-        await self._barrier(node, "outputs")
+        await self._barrier(self._at(node), "outputs")
 
-    async def _barrier(self, node: Node | str, which: str) -> None:
-        worker = self._engine.worker_of(self._at(node))
+    async def _barrier(self, node: Node, which: Literal["inputs", "outputs"]) -> None:
+        worker = self._engine.worker_of(node)
         if worker.scope is not None:
             raise UsageError(f'"{worker.path}" is a subgraph, in which each node waits for itself: name a node inside')
         neighbours = [edge.source for edge in worker.in_edges] + [edge.target for edge in worker.all_out_edges()]
@@ -459,6 +468,13 @@ class Run:
         """
         _ = self._parts.measuring
         return glance_at(self._engine)
+
+    async def refresh(self) -> None:
+        """Ask nodes in other processes for their counts, and wait for those.
+
+        `active`, `glance`, `statistics` and `report` answer at once: of other processes with what these last said,
+        which they are asked for again each time. Behind this they say how it is now. In one process it does nothing.
+        """
 
     def now(self) -> float:
         """Seconds on the run's clock, as in stamps; `hfg.now` says where it has its zero."""

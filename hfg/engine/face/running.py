@@ -100,7 +100,7 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
         said = {name: getattr(settings, name) for name in ("debug", "policy", "seed", "fast", "block_warning_s")}
         others = Composition.distribute(graph, flat, said, isinstance(loop, VirtualTimeLoop))
     parts = Composition(flat if others is None else others.flat, settings, others)
-    run = Run(graph, parts)
+    run: Run = Run(graph, parts) if others is None else others.face(graph)
     level.whole.begin_run(run)
     return run, parts
 

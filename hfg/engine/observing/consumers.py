@@ -31,6 +31,7 @@ _LAST_S = 1.0  # how long those behind a buffer may go on when the run is over
 _CANCELLED_S = 0.3  # and when they were cancelled for that
 
 Take = Callable[[TraceEvent], Any]
+Sieve = Callable[[TraceEvent], bool]
 
 
 def check_consumer(consumer: Any) -> None:
@@ -232,7 +233,18 @@ class Consumers:
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
+        self._sieve: Sieve | None = None
         self._listeners: list[Listener] = []
+
+    @property
+    def listeners(self) -> list[Listener]:
+        """Those who listen."""
+        return list(self._listeners)
+
+    def leave_out(self, sieve: Sieve) -> None:
+        """From now on tell only what this holds for: of an edge to another part each side tells what is its own."""
+        self._sieve = sieve
+        self.changed()
 
     def add(self, consumer: Any, size: int | None = None) -> Listener:
         """Let a consumer see every event from now on.
@@ -265,6 +277,8 @@ class Consumers:
         core.seldom = _all_of([listener.take for listener in self._listeners])
         before = core.trace
         core.trace = _all_of([listener.take for listener in self._listeners if not listener.seldom])
+        if self._sieve is not None and core.trace is not None:
+            core.trace = _sieved(self._sieve, core.trace)
         if core.trace is before:
             return
         core.speaker = None
@@ -277,6 +291,16 @@ class Consumers:
         async with anyio.create_task_group() as ending:
             for listener in list(self._listeners):
                 ending.start_soon(listener.end)
+
+
+def _sieved(sieve: Sieve, take: Take) -> Take:
+    """What gives only some events on."""
+
+    def tell(event: TraceEvent) -> None:
+        if sieve(event):
+            take(event)
+
+    return tell
 
 
 def _all_of(takes: Sequence[Take]) -> Take | None:

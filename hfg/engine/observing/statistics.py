@@ -144,6 +144,7 @@ class Statistics(msgspec.Struct, frozen=True):
       groups: by name.
       lost_activity: how often activity was discarded with nobody to give it back to (A8).
       errors: failures that did not end the run (X1).
+      ages_s: how old that is which was said by each group with a process of its own (see `Run.refresh`), by its name.
     """
 
     outcome: str
@@ -157,6 +158,7 @@ class Statistics(msgspec.Struct, frozen=True):
     groups: dict[str, GroupStatistics]
     lost_activity: int
     errors: list[str]
+    ages_s: dict[str, float] = {}
 
     def __str__(self) -> str:
         """A table of the nodes, and one of the edges; what nobody has is left out."""

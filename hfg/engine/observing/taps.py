@@ -27,7 +27,7 @@ from hfg.nodetype import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 from hfg.token import Token
 
-__all__ = ["Looker", "Tap", "Taps"]
+__all__ = ["Looker", "Tap", "Taps", "make_tap"]
 
 _SIZE = 100
 
@@ -42,7 +42,7 @@ class Tap:
     It looks from the moment it is made until `close()`, the end of a `with` block, or until nobody holds it any more.
     """
 
-    def __init__(self, buffer: _Buffer, max_rate_hz: float | None, detach: Callable[[], None]) -> None:
+    def __init__(self, buffer: _Buffer, max_rate_hz: float | None, detach: Callable[[], object]) -> None:
         self._buffer = buffer
         self._detach = detach
         self._pause_s = 1.0 / max_rate_hz if max_rate_hz else 0.0
@@ -120,6 +120,7 @@ class _Buffer:
     """What a tap keeps; held by what it looks at, while the tap is held by whoever reads it."""
 
     def __init__(self, size: int) -> None:
+        self.size = size
         self.kept: deque[Token[Any]] = deque(maxlen=size)
         self.seen = 0
         self.latest: Token[Any] | None = None
@@ -137,6 +138,20 @@ class _Buffer:
         """No more will pass."""
         self.over.set()
         self.more.set()
+
+
+def make_tap(size: int | None, max_rate_hz: Any, detach: Callable[[], object]) -> tuple[Tap, _Buffer]:
+    """Make a tap, and the buffer that is to be filled for it; `detach` ends that.
+
+    Raises:
+      UsageError: the size or the rate cannot be.
+    """
+    if size is not None and (type(size) is not int or size < 1):
+        raise UsageError(f"size is how many tokens a tap keeps, 1 or more, got {size!r}")
+    if max_rate_hz is not None and not (isinstance(max_rate_hz, int | float) and max_rate_hz > 0):
+        raise UsageError(f"max_rate_hz is how many tokens a second a tap gives at most, got {max_rate_hz!r}")
+    buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1))
+    return Tap(buffer, max_rate_hz, detach), buffer
 
 
 class Taps:
@@ -157,12 +172,10 @@ class Taps:
           UsageError: nothing passes there, or the size or the rate cannot be.
           GraphError: there is no such path.
         """
-        if size is not None and (type(size) is not int or size < 1):
-            raise UsageError(f"size is how many tokens a tap keeps, 1 or more, got {size!r}")
-        if max_rate_hz is not None and not (isinstance(max_rate_hz, int | float) and max_rate_hz > 0):
-            raise UsageError(f"max_rate_hz is how many tokens a second a tap gives at most, got {max_rate_hz!r}")
-        buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1))
-        return Tap(buffer, max_rate_hz, self.look(what, buffer))
+        found: list[Callable[[], object]] = []
+        tap, buffer = make_tap(size, max_rate_hz, lambda: [end() for end in found])
+        found.append(self.look(what, buffer))
+        return tap
 
     def look(self, what: Any, looker: Looker) -> Callable[[], None]:
         """Let somebody look at a port or an edge from now on; gives back what ends that.

@@ -1,0 +1,275 @@
+"""What somebody outside asks of the other parts of a run, from the side of the main one (rules P8, P10, R3, R7).
+
+A question goes out as a `Call` and comes back as a `Result`. What goes on, such as a tap, has a `Call` that stands and
+`Seen` as long as it does. What stands, and what was set, is told to a part before its nodes are set up: whoever asks in
+`begin=` misses nothing, and a part that begins anew is as it was. Knows where each node lives. Stands on `crossing`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable, Iterator
+from itertools import count
+from typing import Any, Final
+
+from hfg.engine.face.composition import Composition
+from hfg.engine.runtime import relays
+from hfg.errors import HfgError
+from hfg.graph import Graph
+from hfg.graph.flat import MAIN, Cutting, FlatGraph
+from hfg.graph.flat.flat_graph import ROOT, FlatEdge
+from hfg.graph.structure.edge import Edge as DrawnEdge
+from hfg.logs import Log
+from hfg.nodetype import Node
+from hfg.parts.crossing import Crossing
+from hfg.parts.failing import as_error
+from hfg.parts.messages import Call, Failed, Result, Seen
+
+__all__ = ["Asking", "Homes", "Standing"]
+
+_LOGGER = Log("hfg.parts")
+_NOBODY: Final = 0  # the number of calls whose result nobody waits for
+
+
+class Homes:
+    """Where each node, port and edge of a graph that is cut lives."""
+
+    def __init__(self, flat: FlatGraph, cutting: Cutting) -> None:
+        """Look at a graph.
+
+        Args:
+          flat: all of it.
+          cutting: of the same.
+        """
+        self.order = [node.path for one in flat.walk() for node in one.nodes]
+        self._flat = flat
+        self._nodes = [node.node for node in flat.nodes]
+        self._of_path = {node.path: name for name, part in cutting.parts.items() for node in part.nodes}
+        self._of_node = {id(node.node): self._of_path[node.path] for node in flat.nodes}
+        for node in flat.nodes:
+            for inner in node.iteration.walk() if node.iteration is not None else ():
+                for one in inner.nodes:
+                    self._of_path[one.path] = self._of_path[node.path]
+                    self._of_node[id(one.node)] = self._of_path[node.path]
+
+    def has(self, node: Node) -> bool:
+        """Whether a node fires in some part; a subgraph does not."""
+        return id(node) in self._of_node
+
+    def far_nodes(self) -> Iterator[Node]:
+        """Give those of other parts than the main one."""
+        return (node for node in self._nodes if self.of_node(node) != MAIN)
+
+    def of_path(self, path: str) -> str:
+        """Give the part of a node by its path; the main one where there is none."""
+        return self._of_path.get(path, MAIN)
+
+    def of_node(self, node: Any) -> str:
+        """Give the part of a node, or of a subgraph all of which is in one; the main one for whatever else."""
+        if isinstance(node, Node) and id(node) not in self._of_node and node._place is not None:
+            inside = {home for path, home in self._of_path.items() if path.startswith(f"{node.place.path}/")}
+            return inside.pop() if len(inside) == 1 else MAIN
+        return self._of_node.get(id(node), MAIN)
+
+    def of_place(self, place: Any) -> set[str]:
+        """Give the parts in which something passes a port or an edge; that of its source, for an edge."""
+        if isinstance(place, Node):
+            return {self.of_node(place)}
+        kind = getattr(place, "kind", "")
+        if kind == "event":
+            events = relays.events_behind(place) if relays.is_relay(place) else [place]
+            return {self.of_node(event.node) for event in events} or {MAIN}
+        if kind in ("slot", "output") and not relays.is_relay(place):
+            return {self.of_node(place.node)}
+        found = set()
+        for one in self._flat.walk():
+            for edge in one.edges:
+                if place == edge.label or (
+                    place in edge.segments if isinstance(place, DrawnEdge) else relays.is_at(edge.segments, place)
+                ):
+                    found.add(self._of_edge(edge))
+        return found or {MAIN}
+
+    def _of_edge(self, edge: FlatEdge) -> str:
+        """Where its source is; the graph's own events are in each part."""
+        source, _, target = edge.label.partition(" -> ")
+        end = target if edge.source.node == ROOT and edge.source.kind == "event" else source
+        path = end.rpartition(".")[0]
+        if path in self._of_path or not path:
+            return self.of_path(path)
+        return self.of_node(self._flat.graph[path])
+
+    def label_of(self, edge: DrawnEdge) -> str:
+        """Give the label of what an edge as drawn is in the run; "" if that is not one."""
+        labels = {one.label for flat in self._flat.walk() for one in flat.edges if edge in one.segments}
+        return labels.pop() if len(labels) == 1 else ""
+
+
+class Standing:
+    """Something that goes on in other parts, until it is ended here.
+
+    Attributes:
+      number: of its calls.
+      waits_for: the parts in which it goes on.
+    """
+
+    def __init__(self, number: int, seen: Callable[[str, Seen], None], ended: Callable[[], None] | None) -> None:
+        self.number = number
+        self.seen = seen
+        self.ended = ended
+        self.waits_for: set[str] = set()
+
+
+class Asking:
+    """Asks the other parts, and hears what they answer.
+
+    Attributes:
+      homes: where each node lives.
+      crossing: encodes what goes there and comes back.
+      others: the names of the other parts.
+    """
+
+    def __init__(self, flat: FlatGraph, cutting: Cutting, say: Callable[[str, Call], None]) -> None:
+        """Ask nothing yet.
+
+        Args:
+          flat: the whole graph.
+          cutting: of the same.
+          say: brings a call to a part.
+        """
+        self.homes = Homes(flat, cutting)
+        self.crossing = Crossing(flat)
+        self.cutting = cutting
+        self.others = [name for name in cutting.parts if name != MAIN]
+        self.composition: Composition
+        self.graph: Graph = flat.graph
+        self._say = say
+        self._numbers = count(1)
+        self._open: set[str] = set()
+        self._over: set[str] = set()
+        self._kept: dict[tuple[str, str], Call] = {}  # what a part that begins is to be told, by part and key
+        self._early: dict[str, list[Call]] = {}  # what was asked for before the part was there
+        self._waiting: dict[int, tuple[str, asyncio.Future[Any]]] = {}
+        self._standing: dict[int, Standing] = {}
+
+    # --- asking -----------------------------------------------------------------------------------------------------
+
+    def ask(self, part: str, verb: str, **arguments: Any) -> asyncio.Future[Any]:
+        """Ask a part, and give what will hold its answer."""
+        number = next(self._numbers)
+        future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._waiting[number] = part, future
+        future.add_done_callback(lambda _: self._waiting.pop(number, None))
+        self._send(part, Call(number, verb, arguments))
+        return future
+
+    def tell(self, part: str, verb: str, **arguments: Any) -> None:
+        """Have a part do something; that it cannot be done is logged."""
+        self._send(part, Call(_NOBODY, verb, arguments))
+
+    def keep(self, part: str, key: str, verb: str, **arguments: Any) -> None:
+        """Have a part do something, and have it done again if it begins anew."""
+        call = Call(_NOBODY, verb, arguments)
+        self._kept.pop((part, key), None)
+        self._kept[part, key] = call
+        if part in self._open:
+            self._say(part, call)
+
+    def forget(self, part: str, key: str) -> None:
+        """A part that begins anew is not told this any more."""
+        self._kept.pop((part, key), None)
+
+    def stand(
+        self,
+        parts: Iterable[str],
+        verb: str,
+        seen: Callable[[str, Seen], None],
+        ended: Callable[[], None] | None = None,
+        **arguments: Any,
+    ) -> Standing:
+        """Have something go on in some parts.
+
+        Args:
+          parts: in which.
+          verb: what; it takes the number as `number`.
+          seen: called with the name of the part and what has come by.
+          ended: called when nothing more will come, for all these parts are over.
+          **arguments: of the verb.
+        """
+        standing = Standing(next(self._numbers), seen, ended)
+        self._standing[standing.number] = standing
+        for part in parts:
+            if part not in self._over:
+                standing.waits_for.add(part)
+                self.keep(part, f"standing {standing.number}", verb, number=standing.number, **arguments)
+        if not standing.waits_for and ended is not None:
+            ended()
+        return standing
+
+    def end(self, standing: Standing) -> None:
+        """It goes on no more. Does nothing the second time."""
+        if self._standing.pop(standing.number, None) is not None:
+            for part in standing.waits_for:
+                self.forget(part, f"standing {standing.number}")
+                self._send(part, Call(_NOBODY, "leave", {"number": standing.number}))
+
+    def _send(self, part: str, call: Call) -> None:
+        if part in self._open:
+            self._say(part, call)
+        elif part not in self._over:
+            self._early.setdefault(part, []).append(call)
+
+    # --- hearing ----------------------------------------------------------------------------------------------------
+
+    def open(self, part: str) -> list[Call]:
+        """A part begins: give what it is to do before its nodes are set up."""
+        self._open.add(part)
+        kept = [call for (name, _), call in self._kept.items() if name == part]
+        return kept + self._early.pop(part, [])
+
+    def hear(self, part: str, message: Result | Seen) -> None:
+        """A part has answered, or something has come by there."""
+        if isinstance(message, Seen):
+            standing = self._standing.get(message.number)
+            if standing is not None:
+                standing.seen(part, message)
+            return
+        if message.number == _NOBODY:
+            if message.failed is not None:
+                _LOGGER.warning("%s", self._error(part, message.failed))
+            return
+        _, future = self._waiting.get(message.number, (part, None))
+        if future is None or future.done():
+            return
+        if message.failed is None:
+            future.set_result(message.value)
+        else:
+            future.set_exception(self._error(part, message.failed))
+
+    def gone(self, part: str, error: HfgError) -> None:
+        """A part answers no more; whether it begins anew is for others to say."""
+        self._open.discard(part)
+        for name, future in list(self._waiting.values()):
+            if name == part and not future.done():
+                future.set_exception(error)
+                future.exception()  # it may be that nobody waits for it any more
+
+    def over(self, part: str) -> None:
+        """The run is over in a part."""
+        self._over.add(part)
+        for standing in list(self._standing.values()):
+            if part in standing.waits_for:
+                standing.waits_for.discard(part)
+                if not standing.waits_for and standing.ended is not None:
+                    standing.ended()
+
+    def close(self) -> None:
+        """All parts are gone."""
+        for part in self.others:
+            self._open.discard(part)
+            self.over(part)
+        for _, future in list(self._waiting.values()):
+            future.cancel()
+
+    def _error(self, part: str, failed: Failed) -> HfgError:
+        return as_error(failed, f"the process of group {part!r}")

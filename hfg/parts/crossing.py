@@ -1,0 +1,152 @@
+"""What somebody outside brings into another part of a run, and what he sees of it, as data (rules L4, R7, P10).
+
+Both sides have the whole graph, so both know of each port, edge and parameter what values pass there, and encode them
+as links do. What is brought in is exact, or refused. What is only looked at never fails: where a value cannot be
+encoded its text is shown. Stands on `messages`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import msgspec
+
+from hfg.encoding import TokenCodec
+from hfg.engine.observing.encoding import text
+from hfg.errors import EncodingError, HfgError
+from hfg.graph import Graph
+from hfg.graph.flat import FlatGraph
+from hfg.parts.messages import Parcel, Passed, PlainEvent, Sight
+from hfg.token import Token
+from hfg.trace import (
+    EventTriggered,
+    ParameterSet,
+    TokenDrained,
+    TokenDropped,
+    TokenSent,
+    TokenTaken,
+    TraceEvent,
+)
+
+__all__ = ["Crossing"]
+
+_NOTHING: Final = TokenCodec[Any](None)  # for markers, and where a text takes the place of the value
+_MOST_SHOWN: Final = 2**24  # bytes: of what is larger the text is shown
+_AT_EDGES: Final = {"sent": TokenSent, "taken": TokenTaken, "drained": TokenDrained}
+_KIND: Final[dict[type, Any]] = {kind: name for name, kind in _AT_EDGES.items()}
+
+
+class Crossing:
+    """Encodes tokens, values of parameters and events of the trace by what the graph declares.
+
+    Args:
+      flat: the whole graph.
+    """
+
+    def __init__(self, flat: FlatGraph) -> None:
+        self._graph: Graph = flat.graph
+        self._hints: dict[str, Any] = {}
+        for one in flat.walk():
+            for edge in one.edges:
+                is_made_over = bool(edge.through) or edge.source.kind == "observable"
+                self._hints[edge.label] = (edge.target if is_made_over else edge.source).port.type
+        self._codecs: dict[str, TokenCodec[Any] | None] = {}
+
+    # --- exactly ----------------------------------------------------------------------------------------------------
+
+    def codec(self, path: str, hint: Any) -> TokenCodec[Any]:
+        """Give what encodes the values of a port.
+
+        Raises:
+          EncodingError: they cannot cross.
+        """
+        try:
+            return TokenCodec(hint, what=f'the value of "{path}"')
+        except EncodingError as error:
+            raise EncodingError(
+                f'"{path}" is in another process, and its values cannot go there: {error}; declare what it carries'
+            ) from None
+
+    def pack(self, path: str, hint: Any, token: Token[Any]) -> Parcel:
+        """Encode a token.
+
+        Raises:
+          EncodingError: it cannot be.
+        """
+        return Parcel(*self.codec(path, hint).encode(token))
+
+    def unpack(self, path: str, hint: Any, parcel: Any) -> Token[Any]:
+        """Give the token back.
+
+        Raises:
+          EncodingError: it is none.
+        """
+        parcel = msgspec.convert(parcel, Parcel)
+        return self.codec(path, hint).decode(parcel.metadata, parcel.value)
+
+    # --- to look at -------------------------------------------------------------------------------------------------
+
+    def show(self, place: str, token: Token[Any]) -> Parcel:
+        """Encode a token that passes an edge, by label, or a port or parameter, by path."""
+        codec = _NOTHING if token.is_marker else self._codec_at(place)
+        if codec is not None:
+            try:
+                metadata, value = codec.encode(token)
+            except HfgError:
+                pass  # it is not what was declared, which only debug=True forbids
+            else:
+                if len(value) <= _MOST_SHOWN:
+                    return Parcel(metadata, value)
+        bare = _NOTHING.encode(Token(None, token.activity, token.stamp, token.sequence))
+        return Parcel(*bare, shown=text(token.value))
+
+    def see(self, place: str, parcel: Parcel) -> Token[Any]:
+        """Give the token back, or one with the text of its value."""
+        if parcel.shown is None:
+            return (self._codec_at(place) or _NOTHING).decode(parcel.metadata, parcel.value)
+        bare = _NOTHING.decode(parcel.metadata, parcel.value)
+        return Token(parcel.shown, bare.activity, bare.stamp, bare.sequence)
+
+    def show_event(self, event: TraceEvent) -> Sight:
+        """Encode an event of the trace."""
+        match event:
+            case TokenSent() | TokenTaken() | TokenDrained():
+                return Passed(event.time, _KIND[type(event)], event.edge, self.show(event.edge, event.token))
+            case TokenDropped():
+                return Passed(event.time, "dropped", event.edge, self.show(event.edge, event.token), event.reason)
+            case EventTriggered():
+                return Passed(event.time, "triggered", event.event, self.show(event.event, event.token))
+            case ParameterSet():
+                place = f"{event.node}.{event.parameter}"
+                return Passed(event.time, "set", event.node, self.show(place, Token(event.value)), event.parameter)
+        return event  # type: ignore[return-value]  # all others are plain
+
+    def see_event(self, sight: PlainEvent | Passed) -> TraceEvent:
+        """Give the event back."""
+        if not isinstance(sight, Passed):
+            return sight
+        place = f"{sight.place}.{sight.detail}" if sight.kind == "set" else sight.place
+        token = self.see(place, sight.parcel)
+        match sight.kind:
+            case "triggered":
+                return EventTriggered(sight.time, sight.place, token)
+            case "set":
+                return ParameterSet(sight.time, sight.place, sight.detail, token.value)
+            case "dropped":
+                return TokenDropped(sight.time, sight.place, token, sight.detail)  # type: ignore[arg-type]
+        return _AT_EDGES[sight.kind](sight.time, sight.place, token)
+
+    def _codec_at(self, place: str) -> TokenCodec[Any] | None:
+        if place not in self._codecs:
+            try:
+                self._codecs[place] = TokenCodec(self._hint(place), what=f'the value of "{place}"')
+            except HfgError:
+                self._codecs[place] = None  # of no type that can cross
+        return self._codecs[place]
+
+    def _hint(self, place: str) -> Any:
+        """What passes there; an edge that is not drawn brings signals from outside into the slot behind its arrow."""
+        if place in self._hints:
+            return self._hints[place]
+        port: Any = self._graph[place.rpartition(" -> ")[2]]
+        return port.type

@@ -1,0 +1,504 @@
+"""The run of a graph whose nodes are in several processes: one can do with it what one can do with any (rule L1).
+
+What concerns a node is done where it lives. What is read at once, such as statistics, is of now for the main part and
+of when they last said so for the others: asking makes them say it again, and `refresh` waits for that. Stands on
+`asking`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable, Iterable, Mapping
+from types import ModuleType
+from typing import Any, Final, Literal, NoReturn, TypeVar
+
+import msgspec
+
+from hfg.activity.rules import asked_for
+from hfg.engine.editing.pausing import Breakpoint, Step
+from hfg.engine.editing.setting import need_settable, without_effect
+from hfg.engine.face.composition import Composition
+from hfg.engine.face.run import Run
+from hfg.engine.observing.consumers import Listener
+from hfg.engine.observing.glance import Glance
+from hfg.engine.observing.recorder import RunRecording
+from hfg.engine.observing.report import EdgeReport, NodeReport
+from hfg.engine.observing.statistics import EdgeStatistics, Statistics
+from hfg.engine.observing.taps import Tap, make_tap
+from hfg.errors import NotRunning, UsageError
+from hfg.graph import Graph
+from hfg.graph.editing.commands import Command
+from hfg.graph.flat import MAIN, CutEdge
+from hfg.graph.structure.edge import Edge, PortEnd
+from hfg.nodetype import Node
+from hfg.parts.asking import Asking, Standing
+from hfg.parts.messages import Seen
+from hfg.ports import EventPort, ParameterPort, Port
+from hfg.token import Token
+from hfg.trace import Consumer
+from hfg.values import own_copy
+
+__all__ = ["Counts", "CutRun"]
+
+T = TypeVar("T")
+
+_NO_STATISTICS: Final = EdgeStatistics(0, 0.0, 0, 0, 0, 0, None, 0)
+
+
+class Counts(msgspec.Struct, frozen=True):
+    """What a part has said of itself last.
+
+    Attributes:
+      nodes, edges, errors, lost_activity: as in `Report`.
+      glance, statistics: if they were asked for.
+      at: when it was said, on the clock of the main part.
+    """
+
+    nodes: dict[str, NodeReport]
+    edges: dict[str, EdgeReport]
+    errors: list[str]
+    lost_activity: int
+    glance: Glance | None = None
+    statistics: Statistics | None = None
+    at: float = 0.0
+
+
+class CutRun(Run):
+    """A graph that runs in several processes."""
+
+    def __init__(self, graph: Graph, composition: Composition, asking: Asking) -> None:
+        super().__init__(graph, composition)
+        self._asking = asking
+        self._homes = asking.homes
+        self._counts: dict[str, Counts] = {}
+        self._asked: dict[str, asyncio.Future[Any]] = {}
+        self._wanted: list[str] = []
+        self._far_breakpoints: dict[Breakpoint, Standing] = {}
+        self._far_step = False
+        self._heard: dict[EventPort[Any], Standing] = {}
+        self._listeners: list[Listener] = []
+        self._tracing: Standing | None = None
+        composition.pausing.hit = self._hit
+        for listener in composition.consumers.listeners:
+            self._listen(listener)
+        for node in self._homes.far_nodes():
+            for event in node.ports.events.values():
+                if event._observers:
+                    self._adopt(event)
+
+    # --- bringing in ------------------------------------------------------------------------------------------------
+
+    async def _bring(self, port: Port, value: object, activity: int | None, stamp: float | None) -> None:
+        home = self._homes.of_node(port.node)
+        if home == MAIN:
+            await super()._bring(port, value, activity, stamp)
+            return
+        self._need_running("nothing can be brought into it any more")
+        if isinstance(value, Token):
+            activity = asked_for(activity, value.activity)
+            stamp = value.stamp if stamp is None else stamp
+            value = value.value
+        parcel = self._asking.crossing.pack(port.path, port.type, Token(value))
+        self._engine.hold()  # what is on its way can still bring the graph to life
+        try:
+            await self._answer(
+                home,
+                "the run ended before the signal had arrived",
+                "trigger",
+                path=port.path,
+                parcel=parcel,
+                activity=activity,
+                stamp=stamp,
+            )
+        finally:
+            self._engine.unhold()
+
+    def _set(self, parameter: ParameterPort[Any], value: object) -> None:
+        """What this side can refuse is refused before anything is set anywhere."""
+        reached = need_settable(self._engine, parameter, value)
+        homes = {one: self._homes.of_node(one.node) for one in reached}
+        far = {one: home for one, home in homes.items() if home != MAIN}
+        if not far:
+            super()._set(parameter, value)
+            return
+        value = own_copy(value)
+        crossing = self._asking.crossing
+        parcels = {one: crossing.pack(one.path, one.type, Token(value)) for one in far}
+        for one in far:
+            if one.node._type.given_parameters_once and self._engine.core.started:
+                raise without_effect(one.node, one.name)
+        for one in reached:
+            if one not in far and one is not parameter:
+                super()._set(one, value)
+        for one, home in far.items():
+            one.node._parameters[one.name] = own_copy(value)
+            self._asking.keep(home, f"parameter {one.path}", "set", path=one.path, parcel=parcels[one])
+
+    def wake(self, node: Node | str) -> None:
+        """See `Run.wake`."""
+        found: Node = self._at(node)
+        home = self._homes.of_node(found)
+        if home == MAIN:
+            super().wake(found)
+        else:
+            self._asking.tell(home, "wake", node=found.place.path)
+
+    def reset_activity(self) -> None:
+        """See `Run.reset_activity`; each part does so when it hears of it."""
+        super().reset_activity()
+        for part in self._asking.others:
+            self._asking.tell(part, "reset_activity")
+
+    # --- waiting ----------------------------------------------------------------------------------------------------
+
+    async def _next_of(self, event: EventPort[Any]) -> Token[Any]:
+        home = self._homes.of_node(event.node)
+        if home == MAIN:
+            return await super()._next_of(event)
+        crossing = self._asking.crossing
+        crossing.codec(event.path, event.type)
+        ended = f'the run ended before "{event.path}" was triggered'
+        return crossing.unpack(event.path, event.type, await self._answer(home, ended, "wait_for", path=event.path))
+
+    async def _barrier(self, node: Node, which: Literal["inputs", "outputs"]) -> None:
+        home = self._homes.of_node(node)
+        if home == MAIN:
+            await super()._barrier(node, which)
+        else:
+            await self._answer(home, "", f"wait_{which}", node=node.place.path)
+
+    async def _answer(self, part: str, ended: str, verb: str, **arguments: Any) -> Any:
+        """Ask a part and wait for what it answers, or for the end of the run."""
+        if self._engine.core.over and ended:
+            raise NotRunning(ended)
+        asked = self._asking.ask(part, verb, **arguments)
+        ending = asyncio.ensure_future(self._engine.ending.wait())
+        try:
+            await asyncio.wait((asked, ending), return_when=asyncio.FIRST_COMPLETED)
+            if asked.done():
+                return asked.result()
+            if ended:
+                raise NotRunning(ended)
+            return None
+        finally:
+            ending.cancel()
+            asked.cancel()
+
+    # --- holding it still -------------------------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        """See `Run.pause`; each part does so when it hears of it, and `wait_paused` waits for all."""
+        super().pause()
+        self._pause_others()
+
+    def _pause_others(self, but: str = "") -> None:
+        for part in self._asking.others:
+            if part != but:
+                self._asking.keep(part, "pause", "pause")
+
+    def resume(self) -> None:
+        """See `Run.resume`."""
+        if self._far_step:
+            raise UsageError("a step is under way: await it before run.resume()")
+        was_paused = self.paused
+        super().resume()
+        for part in self._asking.others if was_paused else ():
+            self._asking.forget(part, "pause")
+            self._asking.tell(part, "resume")
+
+    async def wait_paused(self) -> str:
+        """See `Run.wait_paused`: of all parts."""
+        why = await super().wait_paused()
+        ended = "the run has ended: nothing can pause it any more"
+        for part in self._asking.others:
+            await self._answer(part, ended, "wait_paused")
+        return why
+
+    async def step(self, node: Node | str | None = None) -> Step:
+        """See `Run.step`. A node steps where it lives; of a wave, each part makes its own."""
+        found: Node | None = None if node is None else self._at(node)
+        what = "a wave" if found is None else found.place.path
+        if self._far_step:
+            raise UsageError(f"{what} cannot step while another step is under way: await that first")
+        home = MAIN if found is None else self._homes.of_node(found)
+        if found is not None and home == MAIN:
+            return await super().step(found)
+        self._pausing.need_still(what)
+        self._far_step = True
+        try:
+            if found is not None:
+                return await self._step_there(home, found.place.path)
+            waves = [await super().step()]
+            waves += [await self._step_there(part, None) for part in self._asking.others]
+        finally:
+            self._far_step = False
+        moved = tuple(path for wave in waves for path in wave.moved)
+        return Step(moved, "" if moved else "no node can move")
+
+    async def _step_there(self, part: str, path: str | None) -> Step:
+        told = await self._answer(part, "the run ended before the step was made", "step", node=path)
+        return msgspec.convert(told, Step)
+
+    @property
+    def breakpoints(self) -> list[Breakpoint]:
+        """See `Run.breakpoints`."""
+        return super().breakpoints + list(self._far_breakpoints)
+
+    def break_at(
+        self, place: Node | PortEnd | Edge | str, *, when: Callable[[Token[Any]], object] | None = None
+    ) -> Breakpoint:
+        """See `Run.break_at`. `when` is code, so it can look at tokens that are sent in the main part only."""
+        self._need_running("nothing will come there any more")
+        path, what, parts = self._find(place)
+        if parts == {MAIN}:
+            return super().break_at(place, when=when)
+        if isinstance(what, Node) and not self._homes.has(what):
+            return super().break_at(place, when=when)  # which refuses a subgraph
+        if when is not None:
+            raise UsageError(
+                f'when= of a breakpoint at "{path}" cannot go to the process of group "{min(parts - {MAIN})}": leave '
+                "it out, or break at a place in the main part"
+            )
+        if MAIN in parts:
+            raise UsageError(
+                f'"{path}" stands for places in several processes: set a breakpoint at the ports of the nodes inside'
+            )
+        point = Breakpoint(what, path, self._remove)
+
+        def seen(part: str, told: Seen) -> None:
+            point.hits += 1
+            if told.tokens:
+                point.token = self._asking.crossing.see(path, told.tokens[-1])
+            self._pausing.pause(point.path)
+            self._pause_others(but=part)
+
+        self._far_breakpoints[point] = self._asking.stand(parts, "break_at", seen, place=path)
+        return point
+
+    def _remove(self, point: Breakpoint) -> None:
+        standing = self._far_breakpoints.pop(point, None)
+        if standing is not None:
+            self._asking.end(standing)
+
+    def _hit(self, _: Breakpoint) -> None:
+        self._pause_others()
+
+    # --- looking ----------------------------------------------------------------------------------------------------
+
+    def tap(self, what: PortEnd | Edge | str, *, size: int | None = None, max_rate_hz: float | None = None) -> Tap:
+        """See `Run.tap`. Tokens of other parts come in batches; of a value that cannot be encoded there is the text."""
+        self._need_running("nothing will pass there any more")
+        path, found, parts = self._find(what)
+        if parts == {MAIN} or isinstance(found, Node):
+            return super().tap(what, size=size, max_rate_hz=max_rate_hz)
+        crossing = self._asking.crossing
+        looking: list[Callable[[], object]] = []
+        tap, buffer = make_tap(size, max_rate_hz, lambda: [end() for end in looking])
+
+        def seen(part: str, told: Seen) -> None:
+            before = counted.get(part, 0)
+            counted[part] = max(told.count, before)  # a part that has begun anew counts anew
+            buffer.seen += max(told.count - before - len(told.tokens), 0)
+            for parcel in told.tokens:
+                buffer.put(crossing.see(path, parcel))
+            self._asking.tell(part, "more", number=standing.number)
+
+        counted: dict[str, int] = {}
+        standing = self._asking.stand(parts - {MAIN}, "tap", seen, buffer.end, place=path, size=buffer.size)
+        looking.append(lambda: self._asking.end(standing))
+        if MAIN in parts:
+            looking.append(self._parts.taps.look(found, buffer))
+        return tap
+
+    def trace(self, consumer: Consumer, *, size: int | None = None) -> Listener:
+        """See `Run.trace`. The events of each part come in its order, those of other parts in batches."""
+        listener = super().trace(consumer, size=size)
+        self._listen(listener)
+        return listener
+
+    def _listen(self, listener: Listener) -> None:
+        self._listeners.append(listener)
+        if self._tracing is None:
+            self._tracing = self._asking.stand(self._asking.others, "trace", self._traced)
+
+    def _traced(self, _: str, told: Seen) -> None:
+        for sight in told.events:
+            event = self._asking.crossing.see_event(sight)
+            for listener in self._listeners:
+                if listener.is_open:
+                    listener.take(event)
+        self._listeners = [listener for listener in self._listeners if listener.is_open]
+        if not self._listeners and self._tracing is not None:
+            self._asking.end(self._tracing)
+            self._tracing = None
+
+    def _adopt(self, event: EventPort[Any]) -> None:
+        """Somebody has subscribed to an event: signals of another part are brought here, all of them."""
+        home = self._homes.of_node(event.node)
+        if home == MAIN:
+            super()._adopt(event)
+            return
+        if event in self._heard or self._engine.core.over:
+            return
+
+        def seen(_: str, told: Seen) -> None:
+            for parcel in told.tokens:
+                event._notify(self._asking.crossing.see(event.path, parcel))
+
+        self._heard[event] = self._asking.stand([home], "tap", seen, event._complete, place=event.path, size=0)
+
+    # --- counts -----------------------------------------------------------------------------------------------------
+
+    async def refresh(self) -> None:
+        """Ask all other parts for their counts, and wait: what is read next without waiting is of now."""
+        self._want("glance", "statistics")
+        if self._engine.core.over:
+            return
+        _ = self._parts.measuring
+        for part in self._asking.others:
+            told = await self._answer(part, "", "counts", what=self._wanted)
+            if told is not None:
+                self._take_counts(part, told)
+
+    def active(self) -> list[str]:
+        """See `Run.active`; of other parts as they last said (see `refresh`)."""
+        self._ask_counts("glance")
+        found = set(super().active())
+        for counts in self._counts.values():
+            found |= {node.path for node in (counts.glance.nodes if counts.glance else ()) if node.active}
+        return [path for path in self._homes.order if path in found]
+
+    def glance(self) -> Glance:
+        """See `Run.glance`; of other parts as they last said (see `refresh`)."""
+        self._ask_counts("glance")
+        mine = super().glance()
+        nodes = {node.path: node for node in mine.nodes}
+        for counts in self._counts.values():
+            if counts.glance is not None:
+                nodes |= {node.path: node for node in counts.glance.nodes}
+        return msgspec.structs.replace(mine, nodes=list(self._in_order(nodes).values()))
+
+    def statistics(self) -> Statistics:
+        """See `Run.statistics`; of other parts as they last said (see `refresh`), with the age of that."""
+        self._ask_counts("statistics")
+        mine = super().statistics()
+        said = {part: counts.statistics for part, counts in self._counts.items() if counts.statistics is not None}
+        all_of_them = [mine, *said.values()]
+        nodes = {path: node for one in all_of_them for path, node in one.nodes.items()}
+        edges = {label: edge for one in all_of_them for label, edge in one.edges.items()}
+        halves = {MAIN: mine.edges, **{part: one.edges for part, one in said.items()}}
+        for edge in self._asking.cutting.edges:
+            edges[edge.label] = _joined(edge, halves)
+        now = self.now()
+        return msgspec.structs.replace(
+            mine,
+            firings=sum(node.firings for node in nodes.values()),
+            nodes=self._in_order(nodes),
+            edges=edges,
+            groups=mine.groups | {part: one.groups[part] for part, one in said.items()},
+            lost_activity=sum(one.lost_activity for one in all_of_them),
+            errors=[error for one in all_of_them for error in one.errors],
+            ages_s={part: max(now - self._counts[part].at, 0.0) for part in said},
+        )
+
+    def counts(self) -> Mapping[str, Counts]:
+        """Give what the other parts have last said, and ask them again; for reports of a run that goes on."""
+        self._ask_counts()
+        return self._counts
+
+    def _want(self, *what: str) -> None:
+        self._wanted += [one for one in what if one not in self._wanted]
+
+    def _ask_counts(self, *what: str) -> None:
+        """See to it that whoever looks again sees newer ones; a part that has not answered yet is not asked again."""
+        self._want(*what)
+        if self._engine.core.over:
+            return
+        for part in self._asking.others:
+            if part not in self._asked:
+                asked = self._asked[part] = self._asking.ask(part, "counts", what=list(self._wanted))
+                asked.add_done_callback(lambda done, part=part: self._told_counts(part, done))  # type: ignore[misc]
+
+    def _told_counts(self, part: str, asked: asyncio.Future[Any]) -> None:
+        self._asked.pop(part, None)
+        if not asked.cancelled() and asked.exception() is None:
+            self._take_counts(part, asked.result())
+
+    def _take_counts(self, part: str, told: Any) -> None:
+        self._counts[part] = msgspec.structs.replace(msgspec.convert(told, Counts), at=self.now())
+
+    def _in_order(self, nodes: dict[str, T]) -> dict[str, T]:
+        return {path: nodes[path] for path in self._homes.order if path in nodes} | nodes
+
+    # --- what only a graph in one process allows --------------------------------------------------------------------
+
+    async def edit(self, *commands: Command) -> None:
+        """Refuse it: what has begun in several processes stays as it is."""
+        self._refuse("edited")
+
+    async def undo(self) -> None:
+        """See `edit`."""
+        self._refuse("edited")
+
+    async def redo(self) -> None:
+        """See `edit`."""
+        self._refuse("edited")
+
+    async def reload(self, module: str | ModuleType) -> None:
+        """See `edit`."""
+        self._refuse("given new code")
+
+    def record(
+        self,
+        file: str | os.PathLike[str],
+        *,
+        select: str | Iterable[str] = "*",
+        lossless: bool = True,
+        images: Literal["raw", "png", "jpeg"] = "raw",
+        pickle: bool = False,
+        force: bool = False,
+    ) -> RunRecording:
+        """Refuse it: what is recorded without loss holds its node back, which over a link nobody does yet."""
+        names = ", ".join(f'"{name}"' for name in self._asking.others)
+        raise UsageError(
+            f'graph "{self.graph.name}" runs in several processes (group {names}), and run.record writes what passes '
+            "in one: take process=True from its groups to record it"
+        )
+
+    def _refuse(self, what: str) -> NoReturn:
+        self._need_running("nothing can be changed any more")
+        names = ", ".join(f'"{name}"' for name in self._asking.others)
+        raise UsageError(
+            f'graph "{self.graph.name}" cannot be {what} while it runs in several processes (group {names}): end the '
+            "run and change the graph before the next one"
+        )
+
+    # --- where things are -------------------------------------------------------------------------------------------
+
+    def _find(self, what: Any) -> tuple[str, Any, set[str]]:
+        """Give by which path or label other parts know a place, the place, and in which parts that is."""
+        homes = self._homes
+        if isinstance(what, Edge):
+            label = homes.label_of(what)
+            return label, what, homes.of_place(what) if label else {MAIN}
+        if isinstance(what, str) and " -> " in what:
+            return what, what, homes.of_place(what)
+        place = self._at(what)
+        if isinstance(place, Node):
+            path = place.place.path if place._place is not None else ""
+        else:
+            path = getattr(getattr(place, "outer", place), "path", "")
+        return path, place, homes.of_place(place)
+
+
+def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeStatistics]]) -> EdgeStatistics:
+    """What an edge has carried, of which each side knows a half."""
+    source = halves.get(edge.source, {}).get(edge.label, _NO_STATISTICS)
+    target = halves.get(edge.target, {}).get(edge.label, _NO_STATISTICS)
+    return msgspec.structs.replace(
+        source,
+        dropped=source.dropped + target.dropped,
+        drained=source.drained + target.drained,
+        untaken=source.untaken if edge.guarantee == "exact" else target.untaken,
+    )
