@@ -356,7 +356,7 @@ class Node:
         handler = self._handler(name)
         if handler is None:
             trigger = self._port("event", name).trigger
-            return lambda token: trigger(token.value)
+            return lambda _token: trigger()  # a trigger has no value, whatever the signal carries
         run = handler
         if spec.token:
             return run

@@ -33,11 +33,21 @@ __all__ = ["Carrier", "Channel", "name_of"]
 
 _WINDOW: Final = 64  # messages on their way
 _MAIN: Final = "main"  # what the part without a name is called in keys
+_UNBOUNDED: Final = 2**31
 
 
 def name_of(part: str) -> str:
     """Give what a part is called in the keys of a transport."""
     return f"part {part}" if part else _MAIN
+
+
+def _most_under_way(edge: CutEdge) -> int:
+    """Give how many tokens a link may hold.
+
+    For signals the edge itself says so, and may come to say more (F8): a link that had a bound of its own would not
+    let go what the larger queue took in.
+    """
+    return _UNBOUNDED if edge.edge.is_event_edge else edge.window
 
 
 class Channel:
@@ -208,6 +218,7 @@ class _Outgoing:
         self._edge = edge
         self._say = say
         self._loop = asyncio.get_running_loop()
+        self._most = _most_under_way(edge)
         self._codec = TokenCodec[Any](edge.hint, what=f'the value of "{edge.edge.source.port.path}"')
         self._waits_to_join = lives[part.name] > lives[edge.target]
         self._known: Where = (0, 0)  # the last that had come from former lives
@@ -218,7 +229,7 @@ class _Outgoing:
                 session,
                 key,
                 epoch=lives[part.name],
-                window=edge.window,
+                window=self._most,
                 released=self._released,
                 inherits=part.inherits,
             )
@@ -233,7 +244,7 @@ class _Outgoing:
             return 0
         if isinstance(sender, BoundedSender):
             return self._edge.window * 4
-        room = self._edge.window - sender.machine.unfinished
+        room = self._most - sender.machine.unfinished
         return self._in_a_row(sender, room) if self._part.inherits and room > 0 else room
 
     def _in_a_row(self, sender: LinkSender, most: int) -> int:
@@ -365,7 +376,7 @@ class _Incoming:
                 consumer=name_of(part.name),
                 incarnation=lives[part.name],
                 arrived=self._arrived,
-                capacity=edge.window,
+                capacity=_most_under_way(edge),
                 producer=lives[edge.source],
             )
         else:

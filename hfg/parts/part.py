@@ -293,8 +293,8 @@ class Part:
             Rest(
                 self.name,
                 self._numbered,
-                {label: (one.sent, one.taken, one.hearing, one.speaking) for label, one in self.outlets.items()},
-                {label: _account(one) for label, one in self.inlets.items()},
+                {label: _account(one, one.sent, one.taken) for label, one in self.outlets.items()},
+                {label: _account(one, one.received, max(one.done, one.orphans)) for label, one in self.inlets.items()},
             )
         )
 
@@ -344,8 +344,9 @@ class Part:
         self.engine.finish(outcome, error)
 
 
-def _account(inlet: Inlet) -> Account:
-    return (inlet.received, max(inlet.done, inlet.orphans), inlet.hearing, inlet.speaking)
+def _account(end: Outlet | Inlet, count: int, done: int) -> Account:
+    """Give what the two ends of an edge have to agree on; whose consumer has ended, all of whose tokens are drained."""
+    return (count, count if end.hearing == "over" else done, end.hearing, end.speaking)
 
 
 def _is_synchronous(edge: CutEdge) -> bool:
