@@ -52,11 +52,16 @@ def test_ports_and_parameters_of_the_target(tab: Tab) -> None:
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_script_for_a_shell_can_be_shown(command: Command, capsys: pytest.CaptureFixture[str], shell: str) -> None:
+def test_the_script_for_a_shell_can_be_shown(
+    command: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], shell: str
+) -> None:
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")  # tests may run where no shell is around
     with pytest.raises(SystemExit) as left:
         command("--show-completion", shell)
     assert not left.value.code
-    assert "_HFG_COMPLETE" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "_HFG_COMPLETE" in shown
+    assert f"complete_{shell}" in shown
 
 
 def test_a_home_that_cannot_be_written_gets_a_sentence(
