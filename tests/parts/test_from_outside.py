@@ -436,7 +436,7 @@ def test_the_slot_stop_ends_all_wherever_it_is_reached() -> None:
     assert report.nodes["scaler"].firings < 1000
 
 
-@pytest.mark.rule("X4", "L1")
+@pytest.mark.rule("A10", "L1")
 def test_the_slot_abort_fails_the_run_wherever_it_is_reached() -> None:
     graph = counted(count=10_000)
     graph.connect(graph["scaler"].large, graph.abort)
