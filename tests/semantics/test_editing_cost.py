@@ -96,3 +96,17 @@ def test_a_ring_that_edits_close_step_by_step_is_refused() -> None:
             assert planned(run._engine) == planned_afresh(run._engine)
 
     asyncio.run(main())
+
+
+@pytest.mark.rule("R4", "G1")
+def test_who_was_replaced_and_enclosed_in_one_step_is_where_he_was_when_that_is_undone() -> None:
+    async def main() -> None:
+        async with hfg.running(chain(3)) as run:
+            await run.edit(commands.Replace("n1", TYPE), commands.Enclose(("n0", "n1"), "box"))
+            assert planned(run._engine) == planned_afresh(run._engine)
+            await run.undo()
+            assert planned(run._engine) == planned_afresh(run._engine)
+            await run.redo()
+            assert planned(run._engine) == planned_afresh(run._engine)
+
+    asyncio.run(main())

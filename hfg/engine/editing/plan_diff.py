@@ -124,6 +124,8 @@ class _Comparing:
                 self.swaps[change.old], self.swaps[change.new] = None, worker
                 if worker is not None:
                     swapped[worker] = change.new
+                if change.old in placed:
+                    placed[change.new] = None  # whose place it takes had been moved before
                 told |= {change.old: None, change.new: None}
             elif isinstance(change, NodeChange):
                 placed |= dict.fromkeys(self._within(change.node, change.inside, self.insides))
