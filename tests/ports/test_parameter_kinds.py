@@ -241,7 +241,8 @@ def test_a_function_says_the_same_in_its_annotations() -> None:
     assert (width.step, width.minimum, width.default, width.type) == (0.5, 0, None, float | None)
     assert not clip._type.is_shown("width", {"soft": False})
     assert clip._type.help_of("soft") == "with round edges"
-    with pytest.raises(ValueError, match=r'parameter "clip\.width" must be > 0, got -1\.0'):
+    # Annotated types are one to Python if they are equal, so it may be that somebody else's 0.0 is said.
+    with pytest.raises(ValueError, match=r'parameter "clip\.width" must be > 0(\.0)?, got -1\.0'):
         clip(width=-1.0)
 
 

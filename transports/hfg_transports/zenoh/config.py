@@ -41,7 +41,8 @@ def configuration(settings: Settings, mode: Mode, *, wait_s: float) -> dict[str,
         "listen/endpoints": listens(settings, mode),
         "connect/endpoints": targets(settings, mode),
         "connect/retry": _RETRY,
-        "transport/unicast/open_timeout": max(1000, int(wait_s * 1000)),
+        # Of one attempt: one whose bytes are swallowed is given up as soon as a neighbour would be, and tried again.
+        "transport/unicast/open_timeout": max(1000, int(settings.lease_s * 1000)),
         "transport/link/tx/lease": int(settings.lease_s * 1000),
         "transport/link/tx/queue/size": dict.fromkeys(_PRIORITIES, _BATCHES),
         # Declarations are not dropped: one to somebody who stands still would hold the loop for five seconds.
