@@ -56,6 +56,19 @@ def test_an_end_that_came_first_is_taken_before_a_call_that_what_it_cost_sets_of
     assert perform(build, order_of("sink"))[:2] == ["end", "reset"]
 
 
+@pytest.mark.rule("F9", "P9")
+def test_what_the_first_operator_gives_at_the_end_is_taken_before_what_the_next_one_gives(perform: Any) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, sink = graph.add(Script(count=0), name="source"), graph.add(Greeter(), name="sink")
+        at_last = [ops.ignore_elements(), ops.default_if_empty(8)]
+        graph.connect(source.ports.events["out.sent"], sink.value, through=at_last)
+        graph.connect(source.ports.events["processed"], sink.ports.slots["reset"], through=at_last)
+        return graph
+
+    assert perform(build, order_of("sink"))[:2] == ["process", "reset"]
+
+
 class Slow(hfg.Node):
     """An async source without outputs, so that nothing but its firing keeps it from the next."""
 

@@ -574,6 +574,7 @@ class ReferenceMachine(Editing):
             if line.operators is not None and not line.completed:
                 line.completed = True
                 line.operators.complete()
+                self.note_places()
         self.settle()
 
     def end_events(self) -> None:

@@ -350,6 +350,7 @@ class Sending(State):
             if line.edge.source.owner == station.leaf.index and line.operators is not None and not line.completed:
                 line.completed = True
                 line.operators.complete()
+                self.note_places()  # what came out of one enables before what comes out of the next (F9)
 
     def in_order_of_outputs(self, station: Station) -> list[Line]:
         """The synchronous edges of a node: outputs as declared, then parameters, each in order of connecting."""
