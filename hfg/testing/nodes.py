@@ -574,18 +574,18 @@ class Unsteady(hfg.Node):
 
 
 class Stubborn(hfg.Node):
-    """Fails as often for a token as its value says, without waiting."""
+    """Fails as often for a token as its value says, without waiting.
+
+    What it counts it knows through all its lives: with a `setup()` to forget it, which takes its time in a thread, the
+    reset of a subgraph would be no single moment.
+    """
 
     value = hfg.Input(int)
     out = hfg.Output(int)
 
-    def setup(self) -> None:
-        """Nothing was tried so far."""
-        self.tries: dict[tuple[float, int, int], int] = {}
-
     def process(self, value: hfg.Token[int]) -> int:
         """Fail, or answer."""
-        tries = _one_more(self.tries, value)
+        tries = _one_more(self.__dict__.setdefault("tries", {}), value)
         if tries <= value.value % 3:
             raise ConnectionError(f"try {tries} of {value.value}")
         return value.value + tries
