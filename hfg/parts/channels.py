@@ -26,6 +26,7 @@ from hfg.parts.inheriting import Arrived, Where
 from hfg.parts.messages import Hears, Joins, Message, Sees, Shares, Speaks, pack, unpack
 from hfg.parts.part import Part
 from hfg.parts.rings import Borrowing, Lending, segment_of
+from hfg.ports.outputs import OutputPort
 from hfg.token import Token
 from hfg.transport import Delivery, Position, Session
 
@@ -333,6 +334,9 @@ class _Outgoing:
             lambda: machine.unfinished,
             partial(self._say, edge.target),
         )
+        port = edge.edge.source.port
+        if isinstance(port, OutputPort):
+            port._loan_from(self._lending.loan)
 
     def seen(self, message: Sees) -> None:
         """The consumer has opened it, or cannot."""

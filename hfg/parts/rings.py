@@ -8,6 +8,8 @@ go the ordinary way. A slot is given back when the link is done with its token. 
 
 from __future__ import annotations
 
+import math
+import threading
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
@@ -16,7 +18,8 @@ import msgspec
 import numpy as np
 
 from hfg.encoding import ArrayHead, Lease, TokenCodec
-from hfg.errors import SharedMemoryError
+from hfg.encoding.arrays import array_problem
+from hfg.errors import SharedMemoryError, UsageError
 from hfg.logs import Log
 from hfg.parts.messages import Sees, Shares
 from hfg.sharedmemory import Reader, Ring, RingCounts, segment_name, sweep, unavailable
@@ -101,6 +104,7 @@ class Lending:
         self._slots = window + _SPARE
         self._unfinished = unfinished
         self._say = say
+        self._thread = threading.get_ident()
         self._lane = 0
         self._is_seen = False
         self._is_refused = unavailable() is not None
@@ -113,6 +117,21 @@ class Lending:
         """How many large arrays went the ordinary way, and why."""
         found = RingCounts() if self.ring is None else self.ring.counts
         return LendingCounts(self._early, found.without_slot, found.too_large)
+
+    def loan(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> np.ndarray[Any, Any] | None:
+        """Give an array of the ring to be filled; None if there is none, or no slot is free."""
+        size = math.prod(shape) * dtype.itemsize
+        if self._is_refused or size < _SMALLEST:
+            return None
+        if self.ring is None and threading.get_ident() == self._thread:  # what it says to the consumer it says there
+            self._make(size)
+        ring = self.ring
+        if ring is None or size > ring.slot_size or array_problem(dtype) is not None:
+            return None
+        try:
+            return ring.loan(shape, dtype)
+        except UsageError:  # closed at this very moment, for the run is over
+            return None
 
     def encode(self, codec: TokenCodec[Any], token: Token[Any]) -> tuple[bytes, bytes]:
         """Make bytes of a token, whose large arrays go into the ring; `sent` is called when the link has it."""

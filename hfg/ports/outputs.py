@@ -7,8 +7,10 @@ and `automatic`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Generic, Self, TypeVar, overload
+from typing import Any, ClassVar, Generic, Self, TypeAlias, TypeVar, overload
 
+import numpy as np
+import numpy.typing as npt
 from typing_extensions import TypeForm
 
 from hfg.ports.automatic import sent_name
@@ -22,10 +24,14 @@ __all__ = ["Output", "OutputPort"]
 T = TypeVar("T")
 
 
+Loaner: TypeAlias = "Callable[[tuple[int, ...], np.dtype[Any]], np.ndarray[Any, Any] | None]"
+"""Gives an array that lies where it can be sent without being copied, or None if it has none."""
+
+
 class OutputPort(Port, Source[T]):
     """The output of one node."""
 
-    __slots__ = ("_emit", "_inner")
+    __slots__ = ("_emit", "_inner", "_loaner")
 
     kind: ClassVar[Kind] = "output"
     _inner: InnerTarget[T]
@@ -34,6 +40,7 @@ class OutputPort(Port, Source[T]):
         super().__init__(node, name, type)
         # Whoever runs the node puts its own function here: (value, activity, stamp) -> None.
         self._emit: Callable[[Any, int | None, float | None], None] = self._refuse
+        self._loaner: Loaner | None = None
 
     def send(self, value: T | Token[T] | None, *, activity: int | None = None, stamp: float | None = None) -> None:
         """Write what leaves when the firing is over, with all outputs together (rule F3).
@@ -49,6 +56,22 @@ class OutputPort(Port, Source[T]):
           UsageError: the output was already written in this firing, or this is no firing.
         """
         self._emit(value, activity, stamp)
+
+    def loan(self, shape: int | tuple[int, ...], dtype: npt.DTypeLike = np.float64) -> np.ndarray[Any, Any]:
+        """Give an array to fill and to send here; what is in it at first is nobody's.
+
+        Where the output leads to another process of this host and the array is large, it lies in the memory that both
+        share, and so is not copied; else it is an ordinary one, as from `numpy.empty`. Once it was sent it cannot be
+        written to any more.
+        """
+        size, kind = (shape,) if isinstance(shape, int) else tuple(shape), np.dtype(dtype)
+        loaned = None if self._loaner is None else self._loaner(size, kind)
+        return np.empty(size, kind) if loaned is None else loaned
+
+    def _loan_from(self, loaner: Loaner) -> None:
+        """Be given what `loan` asks; where an output leads to several processes, the first edge's."""
+        if self._loaner is None:
+            self._loaner = loaner
 
     @property
     def sent(self) -> EventPort[T]:

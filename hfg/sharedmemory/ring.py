@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import mmap
 import os
+import threading
 import weakref
 from typing import Any, Final
 
@@ -115,6 +116,7 @@ class Ring:
         self._generations = memoryview(self._mapped)[WORDS : WORDS + 8 * slots].cast("Q")
         self._slots = [_Slot() for _ in range(slots)]
         self._next = 0
+        self._turns = threading.RLock()  # nodes of thread groups loan while the loop sends; the same thread may collect
         self._loans: dict[int, tuple[int, int]] = {}  # by id of the array: slot and address
         self._lanes: dict[int, _Lane] = {}
         self._admitted = 0
@@ -161,7 +163,6 @@ class Ring:
         Raises:
           SharedMemoryError: no array of this shape and dtype can be in a slot.
         """
-        self._must_be_open()
         kind = np.dtype(dtype)
         size = math.prod(shape) * kind.itemsize
         if array_problem(kind) is not None or size > self.slot_size:
@@ -169,11 +170,13 @@ class Ring:
                 f"an array of {kind}, {' x '.join(map(str, shape))}, does not fit a slot of {self.slot_size} bytes of "
                 f'"{self.name}"'
             )
-        number = self._find()
-        if number is None:
-            return None
-        self.counts.loaned += 1
-        return self._array(number, shape, kind)
+        with self._turns:
+            self._must_be_open()
+            number = self._find()
+            if number is None:
+                return None
+            self.counts.loaned += 1
+            return self._array(number, shape, kind)
 
     def _find(self) -> int | None:
         """Give a free slot a new generation, in turn, so that what was given back last is used last."""
@@ -209,6 +212,10 @@ class Ring:
         A loaned array, or a contiguous part of one, stays where it is; another is copied into a free slot. It must not
         be written to any more. Every lease that was given is to be told as `done`.
         """
+        with self._turns:
+            return self._place(array)
+
+    def _place(self, array: np.ndarray[Any, Any]) -> Lease | None:
         self._must_be_open()
         root = array.base if isinstance(array.base, np.ndarray) else array
         loan = self._loans.get(id(root))
@@ -247,9 +254,10 @@ class Ring:
 
     def close(self) -> None:
         """Remove the segment; arrays and views of it stay readable where they are."""
-        if self._closed:
-            return
-        self._closed = True
+        with self._turns:
+            if self._closed:
+                return
+            self._closed = True
         for lane in list(self._lanes):
             self.dismiss(lane)
         remove(self.name)

@@ -60,10 +60,17 @@ def die(where: str) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-@hfg.node
-def frames(*, count: int = 20) -> Iterator[Frame]:
-    for number in range(count):
-        yield Frame(number, picture_of(number))
+class Frames(hfg.Node):
+    """Fills pictures where they are sent from."""
+
+    out = hfg.Output(Frame)
+    count = hfg.Parameter(20)
+
+    def process(self) -> Iterator[Frame]:
+        for number in range(self.count):
+            picture = self.out.loan((720, 1280, 3), np.uint8)
+            picture[:] = picture_of(number)
+            yield Frame(number, picture)
 
 
 @hfg.node
@@ -89,7 +96,7 @@ def main(count: int, keeps: bool, flip_dies_at: int, mark: str, judge_dies_at: i
     logging.basicConfig(level=logging.INFO)
     graph = hfg.Graph("pictures")
     graph.group("far", process=True)
-    source = graph.add(frames(count=count))
+    source = graph.add(Frames(count=count))
     middle = graph.add(flip(keeps=keeps, dies_at=flip_dies_at, mark=mark), group="far")
     last = graph.add(judge(dies_at=judge_dies_at))
     graph.connect(source.out, middle.frame)

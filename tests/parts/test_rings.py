@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+import hfg
 from hfg.encoding import TokenCodec
 from hfg.errors import EncodingError
 from hfg.parts.messages import Sees, Shares
@@ -44,7 +45,10 @@ class Edge:
         self.borrowing = Borrowing(self.run, self.sees.append)
 
     def send(self, size: int, number: int = 0) -> tuple[bytes, bytes]:
-        sent = self.lending.encode(self.codec, Token(np.full(size, number, np.uint8)))
+        return self.send_array(np.full(size, number, np.uint8))
+
+    def send_array(self, array: Array) -> tuple[bytes, bytes]:
+        sent = self.lending.encode(self.codec, Token(array))
         self.under_way += 1
         self.lending.sent()
         return sent
@@ -80,6 +84,47 @@ def test_small_arrays_make_no_ring_and_the_first_large_one_does(edge: Edge) -> N
     assert edge.shares == []
     edge.send(LARGE)
     assert [one.segment for one in edge.shares] == [segment_of(edge.run, 1, 0)]
+
+
+class Camera(hfg.Node):
+    """Sends nothing by itself."""
+
+    image = hfg.Output(Array)
+
+    def process(self) -> None:
+        return None
+
+
+@pytest.mark.rule("L4", "T1")
+def test_what_was_loaned_from_the_output_lies_where_it_is_sent_from(edge: Edge) -> None:
+    edge.send(LARGE)
+    edge.agree()
+    camera = Camera()
+    camera.image._loan_from(edge.lending.loan)
+    picture = camera.image.loan((2**8, 2**8), np.uint8)
+    picture[:] = 7
+    assert is_lent(sent := edge.send_array(picture))
+    assert edge.lending.ring is not None
+    assert (edge.lending.ring.counts.loaned, edge.lending.ring.counts.copied) == (1, 0)
+    assert (edge.see(sent) == 7).all()
+    with pytest.raises(ValueError, match="read-only"):
+        picture[0, 0] = 8
+
+
+@pytest.mark.rule("L4")
+def test_who_can_be_loaned_nothing_fills_an_ordinary_array(edge: Edge) -> None:
+    camera = Camera()
+    assert camera.image.loan(3).shape == (3,)
+    camera.image._loan_from(edge.lending.loan)
+    assert camera.image.loan((2, 2), np.uint8).shape == (2, 2)  # small ones are copied
+    assert edge.lending.ring is None
+    kept = [camera.image.loan((LARGE,), np.uint8) for _ in range(6)]  # more than there are slots
+    assert edge.lending.ring is not None
+    assert edge.lending.ring.counts.loaned == 4
+    assert camera.image.loan((2 * LARGE,), np.uint8).nbytes == 2 * LARGE  # larger than a slot
+    assert camera.image.loan((LARGE,), object).dtype == object
+    edge.lending.close()
+    assert [array.nbytes for array in [*kept, camera.image.loan((LARGE,), np.uint8)]] == [LARGE] * 7
 
 
 @pytest.mark.rule("L4")
