@@ -6,8 +6,11 @@ all rest and nothing is on its way, he asks each part whether that still holds (
 them go through the steps of rule R5 together. A part that has moved meanwhile breaks this off; it will rest again, and
 say so.
 
-A state machine: what it is told are method calls, what it wants done is what `ask` is called with, and the answers may
-come at any time and in any order. Knows no network and no engine.
+An edge that may lose signals can have lost some, and then its two ends never say the same. Where all rest and only that
+is between them, the whole looks again after a while; if nothing has come until then, what is missing counts as lost.
+
+A state machine: what it is told are method calls, what it wants done is what `ask` and `wait` are called with, and the
+answers may come at any time and in any order. Knows no network, no clock and no engine.
 """
 
 from __future__ import annotations
@@ -19,10 +22,12 @@ import msgspec
 
 __all__ = ["Account", "Agreement", "Answer", "Question", "Rest", "Step"]
 
-Step: TypeAlias = Literal["rests", "fullest", "grow", "held", "give_up", "complete", "end", "stuck", "finish"]
+Step: TypeAlias = Literal[
+    "missing", "lose", "rests", "fullest", "grow", "held", "give_up", "complete", "end", "stuck", "finish"
+]
 
 _STEPS: Final[tuple[Step, ...]] = ("rests", "fullest", "held", "give_up", "complete", "end", "stuck")
-"""What is asked of all parts, in this order (SEMANTICS "quiet"); `grow` and `finish` are asked for by the answers."""
+"""What is asked of all parts, in this order (SEMANTICS "quiet"); the others are asked for by the answers."""
 
 
 Account: TypeAlias = tuple[int, int, str, bool]
@@ -52,7 +57,8 @@ class Question(msgspec.Struct, frozen=True):
     Attributes:
       step: see `Step`.
       rest: the number of the rest that is meant.
-      value: for `grow` the label of the edge; for `finish` the reasons why the run has stalled.
+      value: for `lose` how many have left, by label of the edge; for `grow` the label of the edge; for `finish` the
+        reasons why the run has stalled.
     """
 
     step: Step
@@ -82,13 +88,25 @@ class Answer(msgspec.Struct, frozen=True):
 class Agreement:
     """Sees to it that what follows from quiet happens when the whole is quiet."""
 
-    def __init__(self, parts: Iterable[str], ask: Callable[[str, Question], None]) -> None:
+    def __init__(
+        self,
+        parts: Iterable[str],
+        ask: Callable[[str, Question], None],
+        *,
+        lossy: Iterable[str] = (),
+        wait: Callable[[], None] = lambda: None,
+    ) -> None:
         """Begin with parts that have not rested yet.
 
         Args:
           parts: their names.
           ask: brings a question to a part; its answer is to be given to `hear`.
+          lossy: the edges that may lose tokens, by label.
+          wait: has `look_again` called in a while.
         """
+        self._lossy = frozenset(lossy)
+        self._wait = wait
+        self._missed: dict[str, tuple[int, int]] = {}  # what all have agreed on to be missing, before the pause
         self._rests: dict[str, Rest | None] = dict.fromkeys(parts)
         self._ask = ask
         self._step: Step | None = None
@@ -99,8 +117,19 @@ class Agreement:
         """A part rests; what it said before holds no more."""
         self._rests[rest.part] = rest
         self._step = None
-        if self._balanced():
-            self._begin("rests")
+        self._look()
+
+    def _look(self) -> None:
+        missing = self._missing()
+        if missing is None or (missing and missing == self._missed):
+            return  # it is waited for already
+        self._missed = {}
+        self._begin("missing" if missing else "rests")
+
+    def look_again(self) -> None:
+        """A while has passed in which something that is missing might have come."""
+        if self._step is None and self._missed and self._missing() == self._missed:
+            self._begin("missing")
 
     def leave(self, part: str) -> None:
         """A part is gone, or begins anew: what it said does not count."""
@@ -128,6 +157,16 @@ class Agreement:
             self._ask(part, Question(step, number, value))
 
     def _decide(self, step: Step, answers: dict[str, Any]) -> None:
+        if step == "missing":
+            missing = self._missing() or {}
+            if missing == self._missed:
+                self._missed = {}
+                self._begin("lose", {label: count for label, (count, _) in missing.items()})
+            else:
+                self._step = None
+                self._missed = missing
+                self._wait()
+            return
         if step == "fullest":
             full = [(tuple(found), part) for part, found in answers.items() if found is not None]
             if full:
@@ -138,7 +177,7 @@ class Agreement:
         elif step == "stuck":
             self._begin("finish", [reason for reasons in answers.values() for reason in reasons])
             return
-        elif step == "finish":
+        elif step in ("finish", "lose"):
             self._step = None
             return
         elif step != "rests" and any(answers.values()):
@@ -146,13 +185,26 @@ class Agreement:
             return
         self._begin(_STEPS[_STEPS.index(step) + 1])
 
-    def _balanced(self) -> bool:
-        """Whether all rest, and nothing is on its way between them, not even that something was taken."""
+    def _missing(self) -> dict[str, tuple[int, int]] | None:
+        """How many have left and come on edges where some are missing, by label.
+
+        None: some parts do not rest, or something else is between them, be it only the word that something was taken.
+        """
         leaving: dict[str, Account] = {}
         coming: dict[str, Account] = {}
         for rest in self._rests.values():
             if rest is None:
-                return False
+                return None
             leaving |= rest.leaving
             coming |= rest.coming
-        return leaving == coming
+        if leaving.keys() != coming.keys():
+            return None
+        missing: dict[str, tuple[int, int]] = {}
+        for label, (count, done, hearing, speaking) in leaving.items():
+            came, _, heard, _ = coming[label]
+            if (count, done, hearing, speaking) == coming[label]:
+                continue
+            if label not in self._lossy or hearing != heard or came >= count:
+                return None
+            missing[label] = (count, came)
+        return missing

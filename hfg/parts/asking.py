@@ -2,7 +2,9 @@
 
 A question goes out as a `Call` and comes back as a `Result`. What goes on, such as a tap, has a `Call` that stands and
 `Seen` as long as it does. What stands, and what was set, is told to a part before its nodes are set up: whoever asks in
-`begin=` misses nothing, and a part that begins anew is as it was. Knows where each node lives. Stands on `crossing`.
+`begin=` misses nothing, and a part that begins anew is as it was. What a part was asked when it died is asked again if
+it only looks or waits; else it fails, for nobody knows whether it was done. Knows where each node lives. Stands on
+`crossing`.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from typing import Any, Final
 
 from hfg.engine.face.composition import Composition
 from hfg.engine.runtime import relays
-from hfg.errors import HfgError
+from hfg.errors import HfgError, RunError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, Cutting, FlatGraph
 from hfg.graph.flat.flat_graph import ROOT, FlatEdge
@@ -29,6 +31,8 @@ __all__ = ["Asking", "Homes", "Standing"]
 
 _LOGGER = Log("hfg.parts")
 _NOBODY: Final = 0  # the number of calls whose result nobody waits for
+_CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts")
+"""What a part that begins anew is asked again: done twice it is as if done once."""
 
 
 class Homes:
@@ -149,7 +153,7 @@ class Asking:
         self._over: set[str] = set()
         self._kept: dict[tuple[str, str], Call] = {}  # what a part that begins is to be told, by part and key
         self._early: dict[str, list[Call]] = {}  # what was asked for before the part was there
-        self._waiting: dict[int, tuple[str, asyncio.Future[Any]]] = {}
+        self._waiting: dict[int, tuple[str, Call, asyncio.Future[Any]]] = {}
         self._standing: dict[int, Standing] = {}
 
     # --- asking -----------------------------------------------------------------------------------------------------
@@ -158,9 +162,10 @@ class Asking:
         """Ask a part, and give what will hold its answer."""
         number = next(self._numbers)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._waiting[number] = part, future
+        call = Call(number, verb, arguments)
+        self._waiting[number] = part, call, future
         future.add_done_callback(lambda _: self._waiting.pop(number, None))
-        self._send(part, Call(number, verb, arguments))
+        self._send(part, call)
         return future
 
     def tell(self, part: str, verb: str, **arguments: Any) -> None:
@@ -238,7 +243,7 @@ class Asking:
             if message.failed is not None:
                 _LOGGER.warning("%s", self._error(part, message.failed))
             return
-        _, future = self._waiting.get(message.number, (part, None))
+        _, _, future = self._waiting.get(message.number, (part, None, None))
         if future is None or future.done():
             return
         if message.failed is None:
@@ -248,11 +253,17 @@ class Asking:
 
     def gone(self, part: str, error: HfgError) -> None:
         """A part answers no more; whether it begins anew is for others to say."""
+        was_open = part in self._open
         self._open.discard(part)
-        for name, future in list(self._waiting.values()):
-            if name == part and not future.done():
-                future.set_exception(error)
-                future.exception()  # it may be that nobody waits for it any more
+        for name, call, future in list(self._waiting.values()):
+            if name != part or future.done():
+                continue
+            if call.verb in _CHANGES_NOTHING:
+                if was_open:
+                    self._early.setdefault(part, []).append(call)
+                continue
+            future.set_exception(RunError(f"{error}; {_named(call)} may have been done or not: look, and ask again"))
+            future.exception()  # it may be that nobody waits for it any more
 
     def over(self, part: str) -> None:
         """The run is over in a part."""
@@ -268,8 +279,13 @@ class Asking:
         for part in self.others:
             self._open.discard(part)
             self.over(part)
-        for _, future in list(self._waiting.values()):
+        for _, _, future in list(self._waiting.values()):
             future.cancel()
 
     def _error(self, part: str, failed: Failed) -> HfgError:
         return as_error(failed, f"the process of group {part!r}")
+
+
+def _named(call: Call) -> str:
+    place = call.arguments.get("path") or call.arguments.get("node")
+    return f'"{call.verb}" of "{place}"' if place else f'"{call.verb}"'

@@ -304,10 +304,9 @@ class _Outgoing:
     def admit(self, life: int) -> None:
         """The consumer begins anew: it is sent what is not done, and told from where that is."""
         label, sender = self._edge.label, self._sender
-        stream = number = 0
         if isinstance(sender, LinkSender):
             sender.admit(name_of(self._edge.target), life)
-            stream, number = sender.machine.position
+        stream, number = sender.machine.position
         if self._lending is not None:
             self._lending.admit()
         done = self._part.outlets[label].sent - self._unfinished
@@ -372,6 +371,8 @@ class _Incoming:
         self._codec = TokenCodec[Any](edge.hint, what=f'the value of "{edge.edge.source.port.path}"')
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
+        self._waits_to_join = lives[edge.source] < lives[part.name]
+        self._before = 0  # tokens of former lives of the producer; of a lossy edge, where numbers tell what is lost
         self._receiver: LinkReceiver | BoundedReceiver
         if edge.guarantee == "exact":
             self._receiver = LinkReceiver(
@@ -384,18 +385,27 @@ class _Incoming:
                 producer=lives[edge.source],
             )
         else:
-            self._receiver = BoundedReceiver(session, key, arrived=self._arrived, producer=lives[edge.source])
+            # What comes is laid on the edge at once, and that drops by the edge's own policy.
+            self._receiver = BoundedReceiver(
+                session, key, arrived=self._arrived, capacity=_UNBOUNDED, producer=lives[edge.source]
+            )
 
     def _arrived(self) -> None:
         self._undecoded.extend(self._receiver.machine.take_all())
         self._decode()
 
     def _decode(self) -> None:
+        is_lossy = isinstance(self._receiver, BoundedReceiver)
+        if is_lossy and self._waits_to_join:
+            return  # what their numbers mean is not known yet
         tokens: list[Arrived] = []
         borrowing = self._borrowing
         view = None if borrowing is None else borrowing.view
         while self._undecoded:
             delivery = self._undecoded[0]
+            if is_lossy and not self._is_new(delivery.position.sequence, len(tokens)):
+                self._undecoded.popleft()  # it is late, and was counted as lost
+                continue
             metadata, value = delivery.token
             try:
                 token = self._codec.decode(metadata, value, view=view)
@@ -411,6 +421,13 @@ class _Incoming:
             tokens.append(((token.value, token.activity, token.stamp), where))
         if tokens:
             self._part.receive(self._edge.label, tokens)
+
+    def _is_new(self, number: int, held: int) -> bool:
+        """Whether it comes behind all that came; what it has left behind is lost."""
+        missing = self._before + number - 1 - self._part.inlets[self._edge.label].received - held
+        if missing > 0:
+            self._part.lose(self._edge.label, self._before + number - 1 - held)
+        return missing >= 0
 
     def taken(self, total: int) -> None:
         """See `Incoming`."""
@@ -433,13 +450,17 @@ class _Incoming:
         if isinstance(machine, ExactConsumer):
             stream, number = machine.accepted
         inlet = self._part.inlets[label]
+        self._before = inlet.received
         self._part.producer_returns(label, remembers=self._remembers)
         self._say(self._edge.source, Joins(label, inlet.received, stream, number, inlet.hearing))
 
     def join(self, message: Joins) -> None:
         """The producer says what former lives have done."""
         self._done += message.total
+        self._before = message.total - message.number
+        self._waits_to_join = False
         self._part.follow(self._edge.label, message.total, (message.stream, message.number))
+        self._decode()
 
     def share(self, run: str, lives: dict[str, int]) -> None:
         """Look at large arrays in shared memory, when the producer offers it."""

@@ -63,6 +63,7 @@ from hfg.transport import Session
 __all__ = ["Distribution", "Launched", "Launcher", "distribute"]
 
 _LOGGER = Log("hfg.parts")
+_PATIENCE_S = 1.0  # how long a signal that may be lost may be on its way, while nothing else moves
 _LEAVING_S = 7.0  # how long the others may take to tear down; one node may take five (X3)
 
 
@@ -134,7 +135,12 @@ class Distribution:
         self._launcher = launcher
         self._run = f"hfg/{uuid.uuid4().hex[:12]}"
         self._lives = dict.fromkeys(cutting.parts, FIRST_LIFE)
-        self._agreement = Agreement(cutting.parts, self._ask)
+        self._agreement = Agreement(
+            cutting.parts,
+            self._ask,
+            lossy=[edge.label for edge in cutting.edges if edge.guarantee == "bounded"],
+            wait=self._look_later,
+        )
         self._others = {name: _Other(name) for name in cutting.parts if name != MAIN}
         self._asking = Asking(flat, cutting, self._call)
         self._run_of_all: CutRun
@@ -253,6 +259,9 @@ class Distribution:
 
     def _rests(self, rest: Rest) -> None:
         self._loop.call_soon(self._agreement.rest, rest)
+
+    def _look_later(self) -> None:
+        self._loop.call_later(_PATIENCE_S, self._agreement.look_again)
 
     def _ask(self, part: str, question: Question) -> None:
         if part == MAIN:

@@ -97,6 +97,7 @@ class Part:
         }
         self._outgoing: dict[str, Outgoing] = {}
         self._incoming: dict[str, Incoming] = {}
+        self._lossy = frozenset(label for label, kept in keeps.items() if not kept)
         self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
         self._speaking = dict.fromkeys(self.outlets, True)
         self._said: list[tuple[str, bool, int]] = []
@@ -141,6 +142,16 @@ class Part:
                 for positions in self.positions.values():
                     positions.extend([where for _, where in later])
             inlet.lay()
+        if self._said:
+            self._listen()
+        self.engine.kick()
+
+    def lose(self, label: str, total: int) -> None:
+        """Of so many tokens that have left for here, those that have not come are lost: the edge may lose some."""
+        self._is_at_rest = False
+        inlet = self.inlets[label]
+        inlet.lose(max(total - inlet.received, 0))
+        inlet.lay()
         if self._said:
             self._listen()
         self.engine.kick()
@@ -293,10 +304,22 @@ class Part:
             Rest(
                 self.name,
                 self._numbered,
-                {label: _account(one, one.sent, one.taken) for label, one in self.outlets.items()},
-                {label: _account(one, one.received, max(one.done, one.orphans)) for label, one in self.inlets.items()},
+                {label: self._account(one, one.sent, one.taken) for label, one in self.outlets.items()},
+                {
+                    label: self._account(one, one.received, max(one.done, one.orphans))
+                    for label, one in self.inlets.items()
+                },
             )
         )
+
+    def _account(self, end: Outlet | Inlet, count: int, done: int) -> Account:
+        """Give what the two ends of an edge have to agree on.
+
+        Of one whose consumer has ended all tokens are drained; and nobody is told what becomes of those that may be
+        lost.
+        """
+        settled = end.hearing == "over" or end.label in self._lossy
+        return (count, count if settled else done, end.hearing, end.speaking)
 
     def answer(self, question: Question) -> Answer:
         """Do what follows from quiet, if the part still rests."""
@@ -308,8 +331,10 @@ class Part:
     def _do(self, question: Question) -> Any:
         engine = self.engine
         match question.step:
-            case "rests":
+            case "rests" | "missing":
                 return None
+            case "lose":
+                return self._lose(question.value)
             case "fullest":
                 edge = quiet.smallest_full(engine.core)
                 return None if edge is None else (edge.capacity, edge.index, edge.label)
@@ -328,6 +353,17 @@ class Part:
             case "finish":
                 return self._finish(question.value)
 
+    def _lose(self, missing: dict[str, int]) -> None:
+        for label, total in missing.items():
+            if label in self.inlets:
+                self.lose(label, total)
+            elif label in self.outlets:
+                end = self.outlets[label].last_word()
+                if end is not None:
+                    self._is_at_rest = False
+                    self._outgoing[label].send([end])
+                    self.engine.kick()
+
     def _grow(self, label: str) -> None:
         for edge in self.engine.core.edges:
             if edge.label == label and isinstance(edge, EventEdge):
@@ -342,11 +378,6 @@ class Part:
     def finish(self, outcome: str, error: HfgError | None) -> None:
         """End the run of this part."""
         self.engine.finish(outcome, error)
-
-
-def _account(end: Outlet | Inlet, count: int, done: int) -> Account:
-    """Give what the two ends of an edge have to agree on; whose consumer has ended, all of whose tokens are drained."""
-    return (count, count if end.hearing == "over" else done, end.hearing, end.speaking)
 
 
 def _is_synchronous(edge: CutEdge) -> bool:

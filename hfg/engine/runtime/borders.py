@@ -22,7 +22,7 @@ from hfg.engine.rules.sending import enqueue, put_outputs
 from hfg.engine.rules.wiring import reaches
 from hfg.engine.runtime.engine import Engine
 from hfg.ports.edges import EventEdge, SyncEdge
-from hfg.token import Token
+from hfg.token import END, Token
 
 __all__ = ["Hearing", "Inlet", "Outlet"]
 
@@ -84,6 +84,16 @@ class Outlet:
         self.sent += len(tokens)
         self.left += len(tokens)
         return tokens
+
+    def last_word(self) -> Token[Any] | None:
+        """Give END once more if it was sent and is lost, where signals may be: it may not (F13)."""
+        edge = self._edge
+        if self._keeps or type(edge) is not EventEdge or not edge.end_sent:
+            return None
+        self.sent += 1
+        self.taken += 1
+        self.left += 1
+        return Token(END, 0, self._engine.core.now())
 
     @property
     def finished(self) -> int:
@@ -193,6 +203,12 @@ class Inlet:
 
     def skip(self, count: int) -> None:
         """So many have come that are not for this life: what belongs to them was done by a former one."""
+        self.received += count
+        for _ in range(count):
+            self._edge.count_dropped()
+
+    def lose(self, count: int) -> None:
+        """So many have left and will never come: the edge may lose some, and counts them."""
         self.received += count
         for _ in range(count):
             self._edge.count_dropped()
