@@ -193,8 +193,10 @@ class Failure(NamedTuple):
     """What the event `failed` of a node carries: enough to answer for it, or to try again (rule X1).
 
     Attributes:
-      error: what went wrong; the exception is its `__cause__`.
+      error: what went wrong; the exception is its `__cause__`. In another process than that of the node there is no
+        exception, but its text in the sentence, and where it was raised in the notes.
       taken: what the firing had taken, value by name of the input; empty if no firing failed but a hook or an operator.
+        In another process without those whose declared type cannot cross, which the notes name.
     """
 
     error: NodeError

@@ -22,6 +22,7 @@ from hfg.errors import EncodingError, RunError, TransportError
 from hfg.graph.flat import CutEdge
 from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
+from hfg.parts.failing import codec_of
 from hfg.parts.inheriting import Arrived, Where
 from hfg.parts.messages import Hears, Joins, Message, Sees, Shares, Speaks, pack, unpack
 from hfg.parts.part import Part
@@ -49,6 +50,11 @@ def _most_under_way(edge: CutEdge) -> int:
     let go what the larger queue took in.
     """
     return _UNBOUNDED if edge.edge.is_event_edge else edge.window
+
+
+def _codec_of(edge: CutEdge) -> TokenCodec[Any]:
+    port = edge.edge.source.port
+    return codec_of(port, edge.hint, f'the value of "{port.path}"')
 
 
 class Channel:
@@ -220,7 +226,7 @@ class _Outgoing:
         self._say = say
         self._loop = asyncio.get_running_loop()
         self._most = _most_under_way(edge)
-        self._codec = TokenCodec[Any](edge.hint, what=f'the value of "{edge.edge.source.port.path}"')
+        self._codec = _codec_of(edge)
         self._waits_to_join = lives[part.name] > lives[edge.target]
         self._known: Where = (0, 0)  # the last that had come from former lives
         self._lending: Lending | None = None
@@ -368,7 +374,7 @@ class _Incoming:
         self._say = say
         self._done = 0
         self._remembers = remembers
-        self._codec = TokenCodec[Any](edge.hint, what=f'the value of "{edge.edge.source.port.path}"')
+        self._codec = _codec_of(edge)
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
         self._waits_to_join = lives[edge.source] < lives[part.name]

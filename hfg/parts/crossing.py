@@ -16,7 +16,9 @@ from hfg.engine.observing.encoding import text
 from hfg.errors import EncodingError, HfgError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
+from hfg.parts.failing import codec_of
 from hfg.parts.messages import Parcel, Passed, PlainEvent, Sight
+from hfg.ports import Port
 from hfg.token import Token
 from hfg.trace import (
     EventTriggered,
@@ -45,11 +47,11 @@ class Crossing:
 
     def __init__(self, flat: FlatGraph) -> None:
         self._graph: Graph = flat.graph
-        self._hints: dict[str, Any] = {}
+        self._ports: dict[str, Port] = {}
         for one in flat.walk():
             for edge in one.edges:
                 is_made_over = bool(edge.through) or edge.source.kind == "observable"
-                self._hints[edge.label] = (edge.target if is_made_over else edge.source).port.type
+                self._ports[edge.label] = (edge.target if is_made_over else edge.source).port
         self._codecs: dict[str, TokenCodec[Any] | None] = {}
 
     # --- exactly ----------------------------------------------------------------------------------------------------
@@ -61,7 +63,7 @@ class Crossing:
           EncodingError: they cannot cross.
         """
         try:
-            return TokenCodec(hint, what=f'the value of "{path}"')
+            return codec_of(self._port(path), hint, f'the value of "{path}"')
         except EncodingError as error:
             raise EncodingError(
                 f'"{path}" is in another process, and its values cannot go there: {error}; declare what it carries'
@@ -139,14 +141,15 @@ class Crossing:
     def _codec_at(self, place: str) -> TokenCodec[Any] | None:
         if place not in self._codecs:
             try:
-                self._codecs[place] = TokenCodec(self._hint(place), what=f'the value of "{place}"')
+                port = self._port(place)
+                self._codecs[place] = codec_of(port, port.type, f'the value of "{place}"')
             except HfgError:
                 self._codecs[place] = None  # of no type that can cross
         return self._codecs[place]
 
-    def _hint(self, place: str) -> Any:
-        """What passes there; an edge that is not drawn brings signals from outside into the slot behind its arrow."""
-        if place in self._hints:
-            return self._hints[place]
+    def _port(self, place: str) -> Port:
+        """Give the port by which it comes there; for an edge that is not drawn, that behind the arrow of its label."""
+        if place in self._ports:
+            return self._ports[place]
         port: Any = self._graph[place.rpartition(" -> ")[2]]
-        return port.type
+        return port  # type: ignore[no-any-return]

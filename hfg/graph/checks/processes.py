@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hfg.encoding import wire_problem
+from hfg.errors import Failure
 from hfg.graph.flat.cutting import MAIN, cut
 from hfg.graph.flat.flat_graph import FlatGraph
 from hfg.problem import Problem
@@ -19,6 +20,8 @@ def process_borders(flat: FlatGraph) -> Iterator[Problem]:
     cutting = cut(flat)
     yield from cutting.findings
     for edge in cutting.edges:
+        if edge.hint is Failure:
+            continue  # which is told as sentences, with what can cross of the values
         reason = wire_problem(edge.hint)
         if reason is not None:
             where = f'group "{edge.target}"' if edge.target != MAIN else "the main process"
