@@ -11,14 +11,14 @@ from collections import deque
 
 import msgspec
 
-from hfg.errors import MessageTooLarge, UsageError
+from hfg.errors import UsageError
 from hfg.links.frames import (
-    LONGEST_METADATA,
     OtherVersion,
     Outgoing,
     Tokens,
     Unreadable,
     batches,
+    checked,
     read_from_producer,
     values_of,
     write,
@@ -74,16 +74,7 @@ class BoundedProducer:
         Raises:
           MessageTooLarge: the value is too large for the transport, or its metadata for a header.
         """
-        metadata, value = token
-        if type(value) is memoryview and (value.ndim != 1 or value.itemsize != 1):
-            value = value.cast("B")
-            token = (metadata, value)
-        if len(value) > self._largest_token or len(metadata) > LONGEST_METADATA:
-            raise MessageTooLarge(
-                f"a token of {len(value)} bytes and {len(metadata)} of metadata cannot be sent: the transport carries "
-                f"{self._largest_token} and {LONGEST_METADATA} at once"
-            )
-        self._unsent.append(token)
+        self._unsent.append(checked(token, self._largest_token))
         self._next += 1
         return self._next - 1
 
@@ -169,6 +160,10 @@ class BoundedConsumer:
         taken = list(self._waiting)
         self._waiting.clear()
         return taken
+
+    def forget_overflow(self) -> None:
+        """Who consumes has heard that a token was too many."""
+        self.overflowed = False
 
     def believe(self, epoch: int) -> None:
         """Listen to that life of the producer only, whatever else is heard."""

@@ -8,10 +8,11 @@ what is small about each, the payload is their values. All limits are here. Stan
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Final, NamedTuple, TypeAlias
+from typing import Annotated, Final, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
+from hfg.errors import MessageTooLarge
 from hfg.transport import Buffer, EncodedToken
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Tokens",
     "Unreadable",
     "batches",
+    "checked",
     "read_from_consumer",
     "read_from_producer",
     "values_of",
@@ -141,6 +143,7 @@ class Status(msgspec.Struct, array_like=True, frozen=True, gc=False, tag=_TAG + 
 
 FromProducer: TypeAlias = Tokens | Probe
 FromConsumer: TypeAlias = Status
+Frame = TypeVar("Frame", FromProducer, FromConsumer)
 
 _encoder: Final = msgspec.msgpack.Encoder()
 _read_producers: Final[msgspec.msgpack.Decoder[FromProducer]] = msgspec.msgpack.Decoder(FromProducer)
@@ -157,10 +160,7 @@ def read_from_producer(header: Buffer) -> FromProducer:
     Raises:
       Unreadable: it is no such frame.
     """
-    try:
-        return _read_producers.decode(header)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise _what_is_wrong(header) from error
+    return _read(_read_producers, header)
 
 
 def read_from_consumer(header: Buffer) -> FromConsumer:
@@ -169,8 +169,12 @@ def read_from_consumer(header: Buffer) -> FromConsumer:
     Raises:
       Unreadable: it is no such frame.
     """
+    return _read(_read_consumers, header)
+
+
+def _read(decoder: msgspec.msgpack.Decoder[Frame], header: Buffer) -> Frame:
     try:
-        return _read_consumers.decode(header)
+        return decoder.decode(header)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise _what_is_wrong(header) from error
 
@@ -182,6 +186,24 @@ def _what_is_wrong(header: Buffer) -> Unreadable:
     if start in range(16, 128) and start // 16 != VERSION:
         return OtherVersion(f"frames of version {start // 16} of the link protocol; this is version {VERSION}")
     return Unreadable("no frame of the link protocol")
+
+
+def checked(token: EncodedToken, largest: int) -> EncodedToken:
+    """Give a token as it can be sent: its value in plain bytes, whose number is their length.
+
+    Raises:
+      MessageTooLarge: it is larger than a transport carries, or its metadata than a header holds.
+    """
+    metadata, value = token
+    if type(value) is memoryview and (value.ndim != 1 or value.itemsize != 1):
+        value = value.cast("B")
+        token = (metadata, value)
+    if len(value) > largest or len(metadata) > LONGEST_METADATA:
+        raise MessageTooLarge(
+            f"a token of {len(value)} bytes and {len(metadata)} of metadata cannot be sent: the transport carries "
+            f"{largest} and {LONGEST_METADATA} at once"
+        )
+    return token
 
 
 def values_of(frame: Tokens, payload: Buffer) -> list[Buffer]:

@@ -1,9 +1,11 @@
 """What the producer of an exact link knows of one of its consumers.
 
-Stands on nothing; the producer alone changes it.
+Changed by its own methods alone, each of which says what has happened. Stands on `frames`.
 """
 
 from __future__ import annotations
+
+from hfg.links.frames import Status
 
 __all__ = ["Peer"]
 
@@ -27,6 +29,7 @@ class Peer:
     """
 
     __slots__ = (
+        "_shortest_s",
         "accepted",
         "done",
         "expected",
@@ -50,13 +53,20 @@ class Peer:
         self.last_serial = 0
         self.owed = True
         self.since = float("-inf")
-        self.patience_s = patience_s
+        self.patience_s = self._shortest_s = patience_s
 
     def believes(self, incarnation: int) -> bool:
         """Whether a word of that life of it counts."""
         if self.expected is not None:
             return incarnation == self.expected
         return incarnation >= self.incarnation and incarnation > 0
+
+    def believe(self, incarnation: int) -> None:
+        """No other life of it counts from now on."""
+        self.expected = incarnation
+        if self.incarnation != incarnation:
+            self.begin(incarnation)
+            self.owe()
 
     def begin(self, incarnation: int) -> None:
         """It has come back: what it had accepted and not done is gone with its former life."""
@@ -76,6 +86,45 @@ class Peer:
 
     def move_to(self, done: int) -> None:
         """The numbers go on from elsewhere."""
+        self.give_up(done)
+        self.owe()
+
+    def give_up(self, done: int) -> None:
+        """Nothing up to there is wanted by it any more, nor need it be told."""
         self.done = done
         self.fall_out()
+        self.owed = False
+
+    def learn(self, status: Status) -> bool:
+        """It says what it has, what is done and what it lacks; give whether that is news."""
+        news = status.accepted > self.accepted or status.done > self.done or status.limit > self.limit
+        self.accepted = max(self.accepted, status.accepted)
+        self.limit = max(self.limit, status.limit)
+        if status.seen >= self.last_serial and self.accepted < self.sent:
+            self.sent = self.accepted  # it has seen what was sent last, and lacks these
+        self.sent = max(self.sent, self.accepted)
+        self.done = max(self.done, status.done)
+        if news:
+            self.ask_soon()
+        return news
+
+    def owe(self) -> None:
+        """It is to be probed at once."""
         self.owed = True
+
+    def ask_soon(self) -> None:
+        """Something new was heard of it: the next silence is not taken for a long one."""
+        self.patience_s = self._shortest_s
+
+    def carry(self, last: int, serial: int, now: float) -> None:
+        """It was sent all up to that number, the last of it by that datagram."""
+        self.sent = max(self.sent, last)
+        self.last_serial = serial
+        self.since = now
+
+    def probed(self, now: float, slowest_s: float) -> None:
+        """It is asked; if it was silent, the next time later."""
+        if not self.owed:
+            self.patience_s = min(2 * self.patience_s, slowest_s)
+        self.owed = False
+        self.since = now

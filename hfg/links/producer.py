@@ -16,9 +16,8 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from hfg.errors import MessageTooLarge, UsageError
+from hfg.errors import UsageError
 from hfg.links.frames import (
-    LONGEST_METADATA,
     LONGEST_NAME,
     OtherVersion,
     Outgoing,
@@ -27,6 +26,7 @@ from hfg.links.frames import (
     Tokens,
     Unreadable,
     batches,
+    checked,
     read_from_consumer,
     write,
 )
@@ -188,16 +188,7 @@ class ExactProducer:
         number = self._next
         if number > self._limit:
             raise self._why_not()
-        metadata, value = token
-        if type(value) is memoryview and (value.ndim != 1 or value.itemsize != 1):
-            value = value.cast("B")
-            token = (metadata, value)
-        if len(value) > self._largest_token or len(metadata) > LONGEST_METADATA:
-            raise MessageTooLarge(
-                f"a token of {len(value)} bytes and {len(metadata)} of metadata cannot be sent: the transport carries "
-                f"{self._largest_token} and {LONGEST_METADATA} at once"
-            )
-        self._kept.append(token)
+        self._kept.append(checked(token, self._largest_token))
         self._next = number + 1
         if number <= self._released or not self._peers:  # done before: a relay that began anew comes to it again
             self._free()
@@ -245,10 +236,7 @@ class ExactProducer:
             peer = self._peers[consumer] = Peer(consumer, done, self._probe_s)
             self._admitted = True  # once all are, what an outbox kept may turn out to be wanted by none
         if incarnation is not None:
-            peer.expected = incarnation
-            if peer.incarnation != incarnation:
-                peer.begin(incarnation)
-                peer.owed = True
+            peer.believe(incarnation)
 
     def dismiss(self, consumer: str) -> None:
         """Wait for a consumer no longer."""
@@ -294,7 +282,7 @@ class ExactProducer:
         if status.incarnation != peer.incarnation:
             self.counts.restarts += peer.incarnation > 0
             peer.begin(status.incarnation)
-            peer.patience_s = self._probe_s
+            peer.ask_soon()
         if status.epoch > self.epoch:  # a fact for whoever supervises this producer, who may know that it is forged
             self.counts.fenced += 1
             self.newer_epoch = max(self.newer_epoch, status.epoch)
@@ -302,15 +290,14 @@ class ExactProducer:
             self._acknowledge(peer, status)
         elif status.epoch == self.epoch and status.stream > self._stream and self._inherits:
             self.counts.superseded += self._next - 1 - peer.done
-            peer.move_to(self._next - 1)
-            peer.owed = False  # nothing of this stream is wanted there
+            peer.give_up(self._next - 1)
             self._free()
         elif status.epoch == self.epoch and status.stream > self._stream:
             self.counts.refused += 1
         elif peer.in_step:
             self.counts.late += 1
         else:
-            peer.owed = True
+            peer.owe()
 
     def _acknowledge(self, peer: Peer, status: Status) -> None:
         """A word on this very stream: what it has, what is done, what it lacks."""
@@ -320,19 +307,10 @@ class ExactProducer:
             return
         if not peer.in_step:
             if status.accepted < peer.done:  # its ledger is behind its own word: it is told from where it can go on
-                peer.owed = True
+                peer.owe()
                 return
             peer.step_in(status.accepted)
-        news = status.accepted > peer.accepted or status.done > peer.done or status.limit > peer.limit
-        peer.accepted = max(peer.accepted, status.accepted)
-        peer.limit = max(peer.limit, status.limit)
-        if status.seen >= peer.last_serial and peer.accepted < peer.sent:
-            peer.sent = peer.accepted  # it has seen what was sent last, and lacks these
-        peer.sent = max(peer.sent, peer.accepted)
-        if status.done > peer.done:
-            peer.done = status.done
-        if news:
-            peer.patience_s = self._probe_s
+        if peer.learn(status):
             self._free()
 
     def _free(self) -> None:
@@ -389,10 +367,7 @@ class ExactProducer:
                     self._transmit(out, None, first, last, ready, now)
         for peer in self._peers.values():
             if peer.owed or (peer.done < self._next - 1 and now >= peer.since + peer.patience_s):
-                if not peer.owed:
-                    peer.patience_s = min(2 * peer.patience_s, self._slowest_probe_s)
-                peer.owed = False
-                peer.since = now
+                peer.probed(now, self._slowest_probe_s)
                 out.append(self._probe(peer))
         return out
 
@@ -413,9 +388,7 @@ class ExactProducer:
             first += len(metadata)
             self.counts.datagrams += 1
         for peer in peers:
-            peer.sent = max(peer.sent, last)
-            peer.last_serial = self._serial
-            peer.since = now
+            peer.carry(last, self._serial, now)
 
     def _probe(self, peer: Peer) -> Outgoing:
         self._serial += 1

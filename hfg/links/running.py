@@ -66,6 +66,43 @@ class _Batch:
         self._function()
 
 
+class _Turns:
+    """Those who wait at an end of a link, in the order in which they came; each wakes the next."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self.waiting: deque[asyncio.Future[None]] = deque()
+        self._loop = loop
+
+    async def wait(self, *, again: bool = False) -> None:
+        """Wait for one's turn; who had it and could not use it is the first in line again."""
+        turn: asyncio.Future[None] = self._loop.create_future()
+        if again:
+            self.waiting.appendleft(turn)
+        else:
+            self.waiting.append(turn)
+        try:
+            await turn
+        except BaseException:
+            if turn in self.waiting:
+                self.waiting.remove(turn)
+            else:
+                self.wake()  # it was its turn: somebody else's now
+            raise
+
+    def wake(self) -> None:
+        """It is the next one's turn."""
+        while self.waiting:
+            turn = self.waiting.popleft()
+            if not turn.done():
+                turn.set_result(None)
+                return
+
+    def wake_all(self) -> None:
+        """There will be no more turns."""
+        while self.waiting:
+            self.wake()
+
+
 class LinkSender:
     """The sending end of an exact link at work.
 
@@ -96,13 +133,13 @@ class LinkSender:
         self._one: dict[str, Publisher] = {}
         self._subscription: Closing = session.subscribe(_back(name), self._receive)
         self._timer: asyncio.TimerHandle | None = None
-        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._turns = _Turns(self._loop)
         self._closed = False
 
     @property
     def free(self) -> bool:
         """Whether `send_nowait` would take a token."""
-        return self.machine.free and not self._waiting
+        return self.machine.free and not self._turns.waiting
 
     @property
     def released(self) -> int:
@@ -123,45 +160,26 @@ class LinkSender:
 
     async def send(self, token: EncodedToken, position: Position | None = None) -> int:
         """The same, but wait while the window is full."""
-        if self._waiting or not (self.machine.free if position is None else self.machine.takes(position)):
+        if self._turns.waiting or not (self.machine.free if position is None else self.machine.takes(position)):
             await self._wait(position)
         number = self.send_nowait(token, position)
-        if self._waiting:
-            self._wake()
+        self._turns.wake()
         return number
 
     async def wait_finished(self) -> None:
         """Wait until all that was sent is done."""
         while self.machine.unfinished:
             await self._wait(None, until_finished=True)
-        self._wake()
+        self._turns.wake()
 
     async def _wait(self, position: Position | None, *, until_finished: bool = False) -> None:
-        """In the order of the calls; each wakes the next."""
-        turn: asyncio.Future[None] = self._loop.create_future()
-        self._waiting.append(turn)
-        try:
-            while True:
-                self._check_open()
-                await turn
-                self._check_open()
-                if self.machine.unfinished == 0 if until_finished else self.machine.takes(position):
-                    break
-                turn = self._loop.create_future()
-                self._waiting.appendleft(turn)
-        except BaseException:
-            if turn in self._waiting:
-                self._waiting.remove(turn)
-            else:
-                self._wake()  # it was its turn: somebody else's now
-            raise
-
-    def _wake(self) -> None:
-        while self._waiting:
-            turn = self._waiting.popleft()
-            if not turn.done():
-                turn.set_result(None)
-                return
+        """In the order of the calls."""
+        self._check_open()
+        await self._turns.wait()
+        self._check_open()
+        while self.machine.unfinished if until_finished else not self.machine.takes(position):
+            await self._turns.wait(again=True)
+            self._check_open()
 
     def _check_open(self) -> None:
         if self._closed:
@@ -213,7 +231,7 @@ class LinkSender:
             self._told = released
             if self._on_released is not None:
                 self._on_released()
-        self._wake()
+        self._turns.wake()
 
     def _flush(self, *, rung: bool = False) -> None:
         if self._closed:
@@ -253,8 +271,7 @@ class LinkSender:
         self._subscription.close()
         for publisher in (self._all, *self._one.values()):
             publisher.close()
-        while self._waiting:
-            self._wake()
+        self._turns.wake_all()
 
 
 class _Receiver:
@@ -267,7 +284,7 @@ class _Receiver:
         self._loop = asyncio.get_running_loop()
         self._session = session
         self._on_arrived = arrived
-        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._turns = _Turns(self._loop)
         self._subscriptions: list[Closing] = [session.subscribe(_to_all(name), self._receive)]
         self._closed = False
 
@@ -282,25 +299,16 @@ class _Receiver:
           TransportError: the link is closed, from this end or the other, and no token is left.
         """
         while True:
-            token = None if self._waiting else self.machine.take()
+            token = None if self._turns.waiting else self.machine.take()
             if token is not None:
                 return token
             if self._closed or self._is_over():
                 raise TransportError(f'link "{self.name}" is closed')
-            turn: asyncio.Future[None] = self._loop.create_future()
-            self._waiting.append(turn)
-            try:
-                await turn
-            except BaseException:
-                if turn in self._waiting:
-                    self._waiting.remove(turn)
-                else:
-                    self._wake()
-                raise
+            await self._turns.wait()
             token = self.machine.take()
             if token is not None:
                 if self.machine.waiting:
-                    self._wake()
+                    self._turns.wake()
                 return token
 
     async def __aiter__(self) -> AsyncIterator[Delivery]:
@@ -323,8 +331,7 @@ class _Receiver:
             self._closed = True
             for one in self._subscriptions:
                 one.close()
-            while self._waiting:
-                self._wake()
+            self._turns.wake_all()
 
     def _is_over(self) -> bool:
         return False
@@ -336,14 +343,7 @@ class _Receiver:
         if self.machine.waiting or self._is_over():
             if self._on_arrived is not None:
                 self._on_arrived()
-            self._wake()
-
-    def _wake(self) -> None:
-        while self._waiting:
-            turn = self._waiting.popleft()
-            if not turn.done():
-                turn.set_result(None)
-                return
+            self._turns.wake()
 
 
 class LinkReceiver(_Receiver):

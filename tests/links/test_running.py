@@ -66,7 +66,7 @@ def test_a_sender_that_is_cancelled_in_its_turn_gives_it_to_the_next() -> None:
         await sender.send((b"", b"first"))
         turns = [asyncio.create_task(sender.send((b"", b"%d" % number))) for number in range(2)]
         await receiver.take()
-        sender._wake = lambda wake=sender._wake: (wake(), turns[0].cancel())  # type: ignore[method-assign, misc, assignment]
+        sender._turns.wake = lambda wake=sender._turns.wake: (wake(), turns[0].cancel())  # type: ignore[method-assign, misc, assignment]
         receiver.done()
         await asyncio.sleep(1)
         assert turns[0].cancelled()

@@ -1,0 +1,79 @@
+"""What the publishing and the subscribing end have in common: who they are, and what they say about others.
+
+Stands on `offers`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+from hfg.encoding import TokenCodec
+from hfg.links.offers import Seen, introduce, read_introduction, read_name
+from hfg.transport import Presence, Session
+
+__all__ = ["MOST", "End"]
+
+MOST: Final = 1_000
+"""Publishers of one name, consumers of one publisher, and sentences about them, that are taken note of."""
+
+
+class News:
+    """Something has changed: whoever waits looks again."""
+
+    def __init__(self) -> None:
+        self._event = asyncio.Event()
+
+    def tell(self) -> None:
+        """It has."""
+        self._event.set()
+
+    async def wait(self) -> None:
+        """Wait until it has since the last time."""
+        await self._event.wait()
+        self._event.clear()
+
+
+class End:
+    """One of two ends that meet by a name.
+
+    Args:
+      session: of the transport, on the running loop.
+      name: by which the programs meet.
+      hint: the declared type of the values.
+      who: for people, whose end this is.
+      lossless: whether it takes part in what gets every value.
+      complain: told each sentence about somebody who does not fit, once.
+    """
+
+    def __init__(
+        self, session: Session, name: str, hint: Any, who: str, *, lossless: bool, complain: Callable[[str], None]
+    ) -> None:
+        said = introduce(hint, who, lossless=lossless)
+        mine = read_introduction(said)
+        assert mine is not None
+        self.name = name
+        self._session = session
+        self._hint = hint
+        self._said = said
+        self._mine = mine
+        self._complain = complain
+        self._told: set[str] = set()
+        self._codec = TokenCodec[Any](hint, what=f'a value of "{name}"')
+        self._id = secrets.token_hex(8)
+        self._closed = False
+        self._news = News()
+
+    def _seen(self, presences: list[Presence]) -> Iterator[tuple[Seen, Presence]]:
+        """Give what was heard, but for what is not said by ends like these."""
+        for one in presences:
+            seen = read_name(self.name, one.name)
+            if seen is not None:
+                yield seen, one
+
+    def _tell_once(self, sentence: str) -> None:
+        if sentence not in self._told and len(self._told) < MOST:
+            self._told.add(sentence)
+            self._complain(sentence)

@@ -1,0 +1,228 @@
+"""The publishing end of programs that meet by a name.
+
+Stands on `end` and `hfg.links.running`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, TypeAlias
+
+import msgspec
+
+from hfg.errors import TransportError
+from hfg.links.meeting.end import MOST, End
+from hfg.links.offers import key_of, read_introduction, unfit
+from hfg.links.running import BoundedSender, LinkSender
+from hfg.token import END, Token
+from hfg.transport import Closing, Presence, Session
+
+__all__ = ["Absent", "Publication", "PublicationCounts"]
+
+Absent: TypeAlias = Literal["pass", "wait"]
+
+
+class PublicationCounts(msgspec.Struct):
+    """What has happened at a publisher.
+
+    Attributes:
+      sent: values that somebody was there for.
+      passed: values that nobody was there for.
+      joined: consumers that have come.
+      left: those that have gone, whatever the reason.
+      refused: those that do not fit.
+      lost: values that were on their way to consumers that have gone.
+    """
+
+    sent: int = 0
+    passed: int = 0
+    joined: int = 0
+    left: int = 0
+    refused: int = 0
+    lost: int = 0
+
+
+class Publication(End):
+    """The publishing end.
+
+    Args:
+      session: of the transport, on the running loop.
+      name: by which the programs meet.
+      hint: the declared type of the values.
+      who: for people, whose end this is.
+      lossless: whether those who want every value are waited for; else nobody is.
+      window: how many values may be on their way to them.
+      absent: "pass": values go by while nobody is there; "wait": they wait until somebody comes, who also gets what the
+        last one that has gone had not done.
+      complain: told each sentence about somebody who does not fit, once.
+
+    Attributes:
+      counts: what has happened.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        name: str,
+        hint: Any,
+        *,
+        who: str,
+        lossless: bool = True,
+        window: int = 8,
+        absent: Absent = "pass",
+        complain: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        super().__init__(session, name, hint, who, lossless=lossless, complain=complain)
+        self.counts = PublicationCounts()
+        self._waits = absent == "wait"
+        self._number = 0
+        self._latest: Token[Any] | None = None
+        self._over = False
+        self._members: set[str] = set()  # who gets every value
+        self._left: list[str] = []  # who did, and whose place waits for an heir
+        self._listeners: set[str] = set()  # who gets what arrives
+        key = key_of(name, self._id)
+        self._exact = LinkSender(session, f"{key}/exact", epoch=1, window=window)
+        self._bounded = BoundedSender(session, f"{key}/bounded", epoch=1)
+        self._open: list[Closing] = [
+            session.answer(f"{key}/latest", self._tell_latest),
+            session.answer(f"{key}/finished", self._hear_finished),
+            session.watch(key_of(name), self._changed),
+            session.announce(f"{key}/offer", self._said),
+        ]
+
+    @property
+    def attended(self) -> bool:
+        """Whether somebody takes part."""
+        return bool(self._members or self._listeners)
+
+    async def send(self, value: object, stamp: float) -> None:
+        """Publish a value or marker; wait while those who get every value have no room for it.
+
+        Raises:
+          EncodingError: the value is not of the declared type, or too large.
+          TransportError: the publication is closed, or the value is too large for the transport.
+        """
+        self._number += 1
+        token = self._latest = Token(value, 0, stamp, self._number)
+        while self._waits and not self.attended:
+            self._need_open()
+            await self._news.wait()
+        self._need_open()
+        if not self.attended:
+            self.counts.passed += 1
+            return
+        encoded = self._codec.encode(token)
+        if self._members:
+            await self._exact.send(encoded)
+        if self._listeners:
+            self._bounded.send_nowait(encoded)
+        self.counts.sent += 1
+
+    async def end(self, stamp: float) -> None:
+        """Say that nothing more comes, and wait until all who get every value have done with it."""
+        self._over = True
+        if self.attended or self._waits:
+            await self.send(END, stamp)
+        self._latest = None
+        self._open.append(self._session.announce(f"{key_of(self.name, self._id)}/end"))
+        await self._exact.wait_finished()
+
+    async def close(self) -> None:
+        """Take part no more; who is still there sees that this end has gone."""
+        if self._closed:
+            return
+        self._closed = True
+        for one in reversed(self._open):  # the offer before the end, which says why it is gone
+            one.close()
+        await self._bounded.close()
+        self.counts.lost += self._exact.machine.unfinished
+        await self._exact.close()
+        self._news.tell()
+
+    def statistics(self) -> dict[str, int]:
+        """What has happened, in numbers."""
+        here = {"here": len(self._members) + len(self._listeners)}
+        return msgspec.structs.asdict(self.counts) | here | {"resent": self._exact.machine.counts.resent}
+
+    def _need_open(self) -> None:
+        if self._closed:
+            raise TransportError(f'"{self.name}" is published no more: its publisher is closed')
+
+    async def _tell_latest(self, question: bytes) -> bytes:
+        del question
+        if self._latest is None:
+            return b""
+        return msgspec.msgpack.encode(self._codec.encode(self._latest))
+
+    async def _hear_finished(self, consumer: bytes) -> bytes:
+        """Somebody has done the end itself, and goes: his last word on the link may get lost, this one does not."""
+        name = consumer.decode(errors="replace")
+        if self._over and name in self._members:
+            self._members.remove(name)
+            self.counts.left += 1
+            self._exact.dismiss(name)
+        return b""
+
+    # --- who comes and goes
+
+    def _changed(self, presences: list[Presence]) -> None:
+        for seen, one in self._seen(presences):
+            if seen.publisher != self._id:
+                if seen.what == "offer" and one.present:
+                    self._another(one)
+            elif seen.what == "join":
+                if one.present:
+                    self._join(seen.consumer, one.metadata)
+                else:
+                    self._leave(seen.consumer)
+        self._news.tell()
+
+    def _another(self, one: Presence) -> None:
+        other = read_introduction(one.metadata)
+        whose = "something that says nothing of itself" if other is None else other.who
+        self._tell_once(
+            f'"{self.name}" is published twice: here and by {whose}; each subscriber takes the first that it finds, so '
+            "give one of them another name or end it"
+        )
+
+    def _join(self, consumer: str, metadata: bytes) -> None:
+        if consumer in self._members or consumer in self._listeners:
+            return
+        theirs = read_introduction(metadata)
+        if theirs is None or len(self._members) + len(self._listeners) >= MOST:
+            self.counts.refused += 1
+            return
+        problem = unfit(self._hint, self._mine, theirs, here="publisher")
+        if problem:
+            self.counts.refused += 1
+            self._tell_once(f'"{self.name}" is not sent to {theirs.who}: {problem}')
+            return
+        self.counts.joined += 1
+        if not theirs.lossless:
+            self._listeners.add(consumer)
+            return
+        self._members.add(consumer)
+        if consumer in self._left:  # it was cut off, and its place is still there
+            self._left.remove(consumer)
+        elif self._left:
+            self._exact.admit(consumer, 1, after=0)  # all that its predecessors have not done
+            while self._left:
+                self._exact.dismiss(self._left.pop())
+        else:
+            self._exact.admit(consumer, 1)
+
+    def _leave(self, consumer: str) -> None:
+        if consumer in self._listeners:
+            self._listeners.remove(consumer)
+        elif consumer in self._members:
+            self._members.remove(consumer)
+            if self._waits and not self._members:
+                self._left.append(consumer)
+            else:
+                before = self._exact.machine.counts.given_up
+                self._exact.dismiss(consumer)
+                self.counts.lost += self._exact.machine.counts.given_up - before
+        else:
+            return
+        self.counts.left += 1
