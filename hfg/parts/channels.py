@@ -12,7 +12,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
@@ -24,7 +24,7 @@ from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
 from hfg.parts.failing import codec_of
 from hfg.parts.inheriting import Arrived, Where
-from hfg.parts.messages import Hears, Joins, Message, Sees, Shares, Speaks, pack, unpack
+from hfg.parts.messages import Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, pack, unpack
 from hfg.parts.part import Part
 from hfg.parts.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
@@ -162,20 +162,18 @@ class Carrier:
           inheriting: the parts whose tokens inherit positions.
           shares_memory: large arrays may go through shared memory.
         """
+        self._part = part
         self._links: dict[str, _Outgoing | _Incoming] = {}
         outgoing: dict[str, _Outgoing] = {}
         incoming: dict[str, _Incoming] = {}
+        world = _World(part, session, run, lives, say)
         for edge in edges:
-            key = f"{run}/edge/{edge.edge.index}"
             if edge.source == part.name:
-                self._links[edge.label] = outgoing[edge.label] = _Outgoing(part, session, key, lives, edge, say)
+                self._links[edge.label] = outgoing[edge.label] = _Outgoing(world, edge)
             else:
-                remembers = edge.source in inheriting
-                self._links[edge.label] = incoming[edge.label] = _Incoming(
-                    part, session, key, lives, edge, say, remembers
-                )
+                self._links[edge.label] = incoming[edge.label] = _Incoming(world, edge, edge.source in inheriting)
             if shares_memory and edge.guarantee == "exact":
-                self._links[edge.label].share(run, lives)
+                self._links[edge.label].share(world)
         self._outgoing, self._incoming = outgoing, incoming
         part.connect(outgoing, incoming)
         for other, life in lives.items():
@@ -188,19 +186,23 @@ class Carrier:
             if link.other == other:
                 link.admit(life)
 
-    def join(self, message: Joins) -> None:
-        """An older life of another part says where an edge goes on."""
-        link = self._links.get(message.label)
-        if link is not None:
-            link.join(message)
-
-    def share(self, message: Shares | Sees) -> None:
-        """The other end of an edge speaks of shared memory."""
-        if isinstance(message, Shares):
-            if message.label in self._incoming:
-                self._incoming[message.label].borrow(message)
-        elif message.label in self._outgoing:
-            self._outgoing[message.label].seen(message)
+    def hear(self, message: OfAnEdge) -> None:
+        """The other end of an edge has said something."""
+        label = message.label
+        match message:
+            case Speaks():
+                self._part.speak(label, message.speaking, message.total)
+            case Hears():
+                self._part.hear(label, message.hearing, message.total)  # type: ignore[arg-type]  # checked there
+            case Joins():
+                if label in self._links:
+                    self._links[label].join(message)
+            case Shares():
+                if label in self._incoming:
+                    self._incoming[label].borrow(message)
+            case Sees():
+                if label in self._outgoing:
+                    self._outgoing[label].seen(message)
 
     async def close(self) -> None:
         """End all links."""
@@ -208,33 +210,48 @@ class Carrier:
             await link.close()
 
 
-class _Outgoing:
+class _World(NamedTuple):
+    """What all near ends of a part know alike; see `Carrier`."""
+
+    part: Part
+    session: Session
+    run: str
+    lives: dict[str, int]
+    say: Callable[[str, Message], None]
+
+
+class _NearEnd:
+    """What is alike at both ends of an edge between parts.
+
+    Attributes:
+      other: the part at its far end.
+    """
+
+    def __init__(self, world: _World, edge: CutEdge, other: str) -> None:
+        self.other = other
+        self._part = world.part
+        self._edge = edge
+        self._key = f"{world.run}/edge/{edge.edge.index}"
+        self._codec = _codec_of(edge)
+        self._tell = partial(world.say, other)
+
+
+class _Outgoing(_NearEnd):
     """The near end of the link of an edge that leaves."""
 
-    def __init__(
-        self,
-        part: Part,
-        session: Session,
-        key: str,
-        lives: dict[str, int],
-        edge: CutEdge,
-        say: Callable[[str, Message], None],
-    ) -> None:
-        self.other = edge.target
-        self._part = part
-        self._edge = edge
-        self._say = say
+    def __init__(self, world: _World, edge: CutEdge) -> None:
+        super().__init__(world, edge, edge.target)
+        part, lives = world.part, world.lives
         self._loop = asyncio.get_running_loop()
         self._most = _most_under_way(edge)
-        self._codec = _codec_of(edge)
         self._waits_to_join = lives[part.name] > lives[edge.target]
         self._known: Where = (0, 0)  # the last that had come from former lives
         self._lending: Lending | None = None
         self._sender: LinkSender | BoundedSender
         if edge.guarantee == "exact":
             self._sender = sender = LinkSender(
-                session,
-                key,
+                world.session,
+                self._key,
                 epoch=lives[part.name],
                 window=self._most,
                 released=self._released,
@@ -242,7 +259,7 @@ class _Outgoing:
             )
             sender.admit(name_of(edge.target), lives[edge.target])
         else:
-            self._sender = BoundedSender(session, key, epoch=lives[part.name])
+            self._sender = BoundedSender(world.session, self._key, epoch=lives[part.name])
 
     def room(self) -> int:
         """See `Outgoing`."""
@@ -299,7 +316,7 @@ class _Outgoing:
 
     def speaks(self, speaking: bool, total: int) -> None:
         """See `Outgoing`."""
-        self._say(self._edge.target, Speaks(self._edge.label, speaking, total))
+        self._tell(Speaks(self._edge.label, speaking, total))
 
     def _released(self) -> None:
         if self._lending is not None:
@@ -316,7 +333,7 @@ class _Outgoing:
         if self._lending is not None:
             self._lending.admit()
         done = self._part.outlets[label].sent - self._unfinished
-        self._say(self._edge.target, Joins(label, done, stream, number - self._unfinished))
+        self._tell(Joins(label, done, stream, number - self._unfinished))
         self._waits_to_join = False
         self._part.consumer_returns(label)
 
@@ -326,18 +343,18 @@ class _Outgoing:
         self._waits_to_join = False
         self._part.precede(self._edge.label, message.total, message.hearing)  # type: ignore[arg-type]  # checked there
 
-    def share(self, run: str, lives: dict[str, int]) -> None:
+    def share(self, world: _World) -> None:
         """Put large arrays into shared memory from now on, if the consumer can open it."""
         edge, sender = self._edge, self._sender
         assert isinstance(sender, LinkSender)
         machine = sender.machine
         self._lending = Lending(
-            run,
-            segment_of(run, lives[edge.source], edge.edge.index),
+            world.run,
+            segment_of(world.run, world.lives[edge.source], edge.edge.index),
             edge.label,
             edge.window,
             lambda: machine.unfinished,
-            partial(self._say, edge.target),
+            self._tell,
         )
         port = edge.edge.source.port
         if isinstance(port, OutputPort):
@@ -355,26 +372,14 @@ class _Outgoing:
             self._lending.close()
 
 
-class _Incoming:
+class _Incoming(_NearEnd):
     """The near end of the link of an edge that comes in."""
 
-    def __init__(
-        self,
-        part: Part,
-        session: Session,
-        key: str,
-        lives: dict[str, int],
-        edge: CutEdge,
-        say: Callable[[str, Message], None],
-        remembers: bool,
-    ) -> None:
-        self.other = edge.source
-        self._part = part
-        self._edge = edge
-        self._say = say
+    def __init__(self, world: _World, edge: CutEdge, remembers: bool) -> None:
+        super().__init__(world, edge, edge.source)
+        part, lives = world.part, world.lives
         self._done = 0
         self._remembers = remembers
-        self._codec = _codec_of(edge)
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
         self._waits_to_join = lives[edge.source] < lives[part.name]
@@ -382,8 +387,8 @@ class _Incoming:
         self._receiver: LinkReceiver | BoundedReceiver
         if edge.guarantee == "exact":
             self._receiver = LinkReceiver(
-                session,
-                key,
+                world.session,
+                self._key,
                 consumer=name_of(part.name),
                 incarnation=lives[part.name],
                 arrived=self._arrived,
@@ -393,7 +398,7 @@ class _Incoming:
         else:
             # What comes is laid on the edge at once, and that drops by the edge's own policy.
             self._receiver = BoundedReceiver(
-                session, key, arrived=self._arrived, capacity=_UNBOUNDED, producer=lives[edge.source]
+                world.session, self._key, arrived=self._arrived, capacity=_UNBOUNDED, producer=lives[edge.source]
             )
 
     def _arrived(self) -> None:
@@ -443,7 +448,7 @@ class _Incoming:
 
     def hears(self, hearing: Hearing, total: int) -> None:
         """See `Incoming`."""
-        self._say(self._edge.source, Hears(self._edge.label, hearing, total))
+        self._tell(Hears(self._edge.label, hearing, total))
 
     def admit(self, life: int) -> None:
         """The producer begins anew: what it has sent until now is told to it."""
@@ -458,7 +463,7 @@ class _Incoming:
         inlet = self._part.inlets[label]
         self._before = inlet.received
         self._part.producer_returns(label, remembers=self._remembers)
-        self._say(self._edge.source, Joins(label, inlet.received, stream, number, inlet.hearing))
+        self._tell(Joins(label, inlet.received, stream, number, inlet.hearing))
 
     def join(self, message: Joins) -> None:
         """The producer says what former lives have done."""
@@ -468,9 +473,9 @@ class _Incoming:
         self._part.follow(self._edge.label, message.total, (message.stream, message.number))
         self._decode()
 
-    def share(self, run: str, lives: dict[str, int]) -> None:
+    def share(self, world: _World) -> None:
         """Look at large arrays in shared memory, when the producer offers it."""
-        self._borrowing = Borrowing(run, partial(self._say, self._edge.source))
+        self._borrowing = Borrowing(world.run, self._tell)
 
     def borrow(self, message: Shares) -> None:
         """The producer offers it."""

@@ -11,9 +11,9 @@ import contextlib
 import logging
 import sys
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 
@@ -28,85 +28,38 @@ from hfg.parts.asking import Asking
 from hfg.parts.channels import Carrier, Channel, name_of
 from hfg.parts.failing import as_error
 from hfg.parts.inheriting import inheriting
-from hfg.parts.lives import LIMIT, WITHIN_S, Deaths
+from hfg.parts.lives import LIMIT, WITHIN_S
 from hfg.parts.messages import (
     Ask,
-    Begin,
     Call,
     Close,
     Closed,
     Ended,
     Failed,
     Finish,
-    Hears,
-    Joins,
     Logged,
     Message,
+    OfAnEdge,
     Open,
     Opened,
     Reborn,
     Rests,
     Result,
     Seen,
-    Sees,
-    Shares,
-    Speaks,
     Told,
 )
+from hfg.parts.other import Launcher, Other
 from hfg.parts.part import Part
 from hfg.parts.rings import sweep_run, sweep_runs
 from hfg.parts.run import Counts, CutRun
 from hfg.parts.sieve import sieve
 from hfg.parts.worker import FIRST_LIFE
-from hfg.transport import Session
 
-__all__ = ["Distribution", "Launched", "Launcher", "distribute"]
+__all__ = ["Distribution", "distribute"]
 
 _LOGGER = Log("hfg.parts")
 _PATIENCE_S = 1.0  # how long a signal that may be lost may be on its way, while nothing else moves
 _LEAVING_S = 7.0  # how long the others may take to tear down; one node may take five (X3)
-
-
-class Launched(Protocol):
-    """One other part, wherever it runs."""
-
-    async def wait(self) -> str:
-        """Wait until it is gone; give a sentence about how, as in 'process 1234 was killed by SIGKILL'."""
-
-    def begins(self) -> None:
-        """Its nodes are set up and let go: from now on it may be expected to answer."""
-
-    async def end(self) -> None:
-        """See to it that it is gone, whatever it does."""
-
-
-class Launcher(Protocol):
-    """Begins the other parts, and gives the session over which they are spoken to.
-
-    Attributes:
-      shares_memory: whether large arrays between parts may go through shared memory.
-    """
-
-    shares_memory: bool
-
-    async def open(self) -> Session:
-        """Give the session of the main part."""
-
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Launched:
-        """Begin a part, which then serves (see `worker`).
-
-        Args:
-          run: by which name all parts know the run.
-          part: its name.
-          host: where; "" is here.
-          lives: which life this is of it, and which of the main part.
-
-        Raises:
-          HfgError: it cannot be begun; nothing is left of it.
-        """
-
-    async def close(self) -> None:
-        """End the session, and whatever else was begun."""
 
 
 class Distribution:
@@ -141,7 +94,7 @@ class Distribution:
             lossy=[edge.label for edge in cutting.edges if edge.guarantee == "bounded"],
             wait=self._look_later,
         )
-        self._others = {name: _Other(name) for name in cutting.parts if name != MAIN}
+        self._others = {name: Other(name) for name in cutting.parts if name != MAIN}
         self._asking = Asking(flat, cutting, self._call)
         self._run_of_all: CutRun
         self._part: Part
@@ -192,18 +145,17 @@ class Distribution:
         for other in self._others.values():
             await other.opened
 
-    def _channel_to(self, other: _Other) -> Channel:
+    def _channel_to(self, other: Other) -> Channel:
         lives = (FIRST_LIFE, self._lives[other.name])
         return Channel(self._session, self._run, MAIN, other.name, lives, partial(self._hear, other))
 
-    async def _launch(self, other: _Other) -> None:
+    async def _launch(self, other: Other) -> None:
         """Begin the process of a part and have it set up its nodes; it says when that is done."""
         name = other.name
         lives = (self._lives[name], FIRST_LIFE)
         host = self._cutting.parts[name].groups[name].host
-        other.launched = await self._launcher.launch(self._run, name, host, lives)
-        other.watch(partial(self._gone, other))
-        other.is_told = True
+        launched = await self._launcher.launch(self._run, name, host, lives)
+        other.live(launched, partial(self._gone, other))
         calls = self._asking.open(name)
         shares = self._launcher.shares_memory
         self._say(name, Open(self._text, self._options, dict(self._lives), _known_packages(), shares, calls))
@@ -212,12 +164,7 @@ class Distribution:
         """All are set up: let them go, behind which the main part goes."""
         self._has_begun = True
         for other in self._others.values():
-            self._let_go(other)
-
-    def _let_go(self, other: _Other) -> None:
-        self._say(other.name, Begin())
-        if other.launched is not None:
-            other.launched.begins()
+            other.let_go()
 
     # --- what is said -----------------------------------------------------------------------------------------------
 
@@ -228,7 +175,11 @@ class Distribution:
         if self._others[part].is_there:
             self._say(part, call)
 
-    def _hear(self, other: _Other, message: Message) -> None:
+    def _hear(self, other: Other, message: Message) -> None:
+        if isinstance(message, OfAnEdge):
+            assert self._carrier is not None
+            self._carrier.hear(message)
+            return
         match message:
             case Opened():
                 other.answer(None if message.failed is None else self._error(message.failed, other))
@@ -236,16 +187,6 @@ class Distribution:
                 self._agreement.rest(message.rest)
             case Told():
                 self._agreement.hear(message.answer)
-            case Shares() | Sees():
-                if self._carrier is not None:
-                    self._carrier.share(message)
-            case Speaks():
-                self._part.speak(message.label, message.speaking, message.total)
-            case Hears():
-                self._part.hear(message.label, message.hearing, message.total)  # type: ignore[arg-type]
-            case Joins():
-                assert self._carrier is not None
-                self._carrier.join(message)
             case Ended():
                 self._ended_there(other, message)
             case Logged():
@@ -271,7 +212,7 @@ class Distribution:
 
     # --- the end ----------------------------------------------------------------------------------------------------
 
-    def _error(self, failed: Failed, other: _Other) -> HfgError:
+    def _error(self, failed: Failed, other: Other) -> HfgError:
         return as_error(failed, f"the process of group {other.name!r}")
 
     def _ended_here(self) -> None:
@@ -280,15 +221,14 @@ class Distribution:
             if other.is_there:
                 self._say(name, Finish(self._part.engine.outcome))
 
-    def _ended_there(self, other: _Other, message: Ended) -> None:
+    def _ended_there(self, other: Other, message: Ended) -> None:
         """Another part is over, for a reason of its own, or because it was told: so are all."""
         error = None if message.failed is None else self._error(message.failed, other)
         self._part.finish(message.outcome, error)
         self._asking.over(other.name)
 
-    def _gone(self, other: _Other, how: str) -> None:
+    def _gone(self, other: Other, how: str) -> None:
         """A process has ended that was not told to: another takes its place."""
-        other.is_told = False
         self._agreement.leave(other.name)
         self._asking.gone(other.name, RunError(f'the process of group "{other.name}" is gone: {how}'))
         if not self._has_begun:
@@ -307,9 +247,9 @@ class Distribution:
             self._asking.over(other.name)
             return
         _LOGGER.warning('the process of group "%s" is gone: %s; another begins in %g s', other.name, how, pause_s)
-        other.returning = self._loop.create_task(self._bring_back(other, pause_s), name=f"hfg return of {other.name}")
+        other.come_back(self._bring_back(other, pause_s))
 
-    async def _bring_back(self, other: _Other, pause_s: float) -> None:
+    async def _bring_back(self, other: Other, pause_s: float) -> None:
         """Begin another life of a part, while all others wait for it as they do for one that is slow (L3)."""
         await asyncio.sleep(pause_s)
         name = other.name
@@ -329,7 +269,7 @@ class Distribution:
             self._part.finish("failed", error)
             self._asking.over(name)
             return
-        self._let_go(other)
+        other.let_go()
         if self._part.engine.core.over:  # meanwhile, when nobody could tell it
             self._say(name, Finish(self._part.engine.outcome))
 
@@ -455,107 +395,3 @@ def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeReport]]) -> Ed
         untaken=source.untaken if edge.guarantee == "exact" else target.untaken,
         grown=source.grown,
     )
-
-
-class _Other:
-    """Another part, as the main one sees it.
-
-    Attributes:
-      name: of its group.
-      launched: what runs it.
-      opened: done when it is set up.
-      closed: done when it has reported, or is gone.
-      report: what it has said at the end.
-      deaths: of its processes.
-      is_told: there is a process that hears what is said, and knows of other parts what was true when it began.
-      returning: what begins its next life.
-    """
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.launched: Launched | None = None
-        self.opened: asyncio.Future[None]
-        self.closed: asyncio.Future[None]
-        self.report: Closed | None = None
-        self.deaths = Deaths()
-        self.is_told = False
-        self.returning: asyncio.Task[None] | None = None
-        self._channel: Channel
-        self._watching: asyncio.Task[None] | None = None
-        self._leaves = False
-        self._gone = False
-
-    def begin(self, channel: Channel) -> None:
-        """By this it is spoken to."""
-        loop = asyncio.get_running_loop()
-        self._channel = channel
-        self.opened = loop.create_future()
-        self.closed = loop.create_future()
-
-    def watch(self, gone: Callable[[str], None]) -> None:
-        """Be told when it is gone without having been asked to leave."""
-        launched = self.launched
-        assert launched is not None
-
-        async def watch() -> None:
-            how = await launched.wait()
-            self._gone = True
-            if not self.closed.done():
-                self.closed.set_result(None)
-            if not self._leaves:
-                gone(how)
-
-        self._watching = asyncio.create_task(watch(), name=f"hfg process of {self.name}")
-
-    @property
-    def is_there(self) -> bool:
-        """Whether it was begun, and is not gone."""
-        return self.launched is not None and not self._gone
-
-    def say(self, message: Message) -> None:
-        """Say something to it."""
-        self._channel.send(message)
-
-    def answer(self, error: HfgError | None) -> None:
-        """It is set up, or will not be."""
-        if not self.opened.done():
-            if error is None:
-                self.opened.set_result(None)
-            else:
-                self.opened.set_exception(error)
-                self.opened.exception()  # it may be that nobody waits for it any more
-
-    async def bury(self) -> None:
-        """See to it that nothing is left of a life that is over."""
-        if self.launched is not None:
-            await self.launched.end()
-            self.launched = None
-        self._gone = False
-        await self._channel.close()
-
-    async def stay_away(self) -> None:
-        """Begin no other life."""
-        if self.returning is not None:
-            self.returning.cancel()
-            await asyncio.wait({self.returning})
-
-    def leaves(self) -> None:
-        """It is told to leave: from here on it may be gone."""
-        self._leaves = True
-
-    def close(self, report: Closed) -> None:
-        """It has reported, and leaves."""
-        self.report = report
-        if not self.closed.done():
-            self.closed.set_result(None)
-
-    async def end(self) -> None:
-        """See to it that nothing is left of it."""
-        self._leaves = True
-        if self.launched is not None:
-            await self.launched.end()
-        if self._watching is not None:
-            self._watching.cancel()
-            await asyncio.wait({self._watching})
-        if self.launched is not None or hasattr(self, "_channel"):
-            await self._channel.close()

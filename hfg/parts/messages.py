@@ -49,6 +49,7 @@ __all__ = [
     "Joins",
     "Logged",
     "Message",
+    "OfAnEdge",
     "Open",
     "Opened",
     "Parcel",
@@ -354,6 +355,9 @@ class Sees(msgspec.Struct, frozen=True, tag=True):
     lane: int
     refused: str = ""
 
+
+OfAnEdge: TypeAlias = Speaks | Hears | Joins | Shares | Sees
+"""What the two ends of an edge between parts tell each other."""
 
 Message: TypeAlias = (
     Open

@@ -113,7 +113,7 @@ class Part:
             if worker.scope is None and not any(worker.all_out_edges())
         ]
         self._leaving = False
-        engine.agreement = self._nothing_moves
+        engine.leave_quiet_to(self._nothing_moves)
         engine.callbacks.pumped.append(self._pumped)
 
     @property
@@ -223,7 +223,7 @@ class Part:
         self._is_at_rest = False
         inlet = self.inlets[label]
         if not remembers:
-            inlet.orphans = inlet.received
+            inlet.orphan()
         self._said = [said for said in self._said if said[0] != label]
         if not inlet.speaking:
             inlet.speak(True)
@@ -247,7 +247,7 @@ class Part:
 
     def _moved(self, inlet: Inlet) -> None:
         if not self.inherits:
-            inlet.done = inlet.taken
+            inlet.settle(inlet.taken)
             self._incoming[inlet.label].taken(inlet.taken)
 
     def _settle(self) -> None:
@@ -265,8 +265,7 @@ class Part:
             ]
         for label, inlet in self.inlets.items():
             done = min([inlet.taken, *(self._origin[label] + count for count in ends)])
-            if done > inlet.done:
-                inlet.done = done
+            if inlet.settle(done):
                 self._incoming[label].taken(done)
 
     def _wake(self) -> None:
@@ -305,10 +304,7 @@ class Part:
                 self.name,
                 self._numbered,
                 {label: self._account(one, one.sent, one.taken) for label, one in self.outlets.items()},
-                {
-                    label: self._account(one, one.received, max(one.done, one.orphans))
-                    for label, one in self.inlets.items()
-                },
+                {label: self._account(one, one.received, one.settled) for label, one in self.inlets.items()},
             )
         )
 

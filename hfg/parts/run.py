@@ -79,7 +79,7 @@ class CutRun(Run):
         self._heard: dict[EventPort[Any], Standing] = {}
         self._listeners: list[Listener] = []
         self._tracing: Standing | None = None
-        composition.pausing.hit = self._hit
+        composition.pausing.when_hit(self._hit)
         for listener in composition.consumers.listeners:
             self._listen(listener)
         for node in self._homes.far_nodes():
@@ -267,9 +267,7 @@ class CutRun(Run):
         point = Breakpoint(what, path, self._remove)
 
         def seen(part: str, told: Seen) -> None:
-            point.hits += 1
-            if told.tokens:
-                point.token = self._asking.crossing.see(path, told.tokens[-1])
+            point.was_hit(self._asking.crossing.see(path, told.tokens[-1]) if told.tokens else None)
             self._pausing.pause(point.path)
             self._pause_others(but=part)
 
@@ -299,7 +297,7 @@ class CutRun(Run):
         def seen(part: str, told: Seen) -> None:
             before = counted.get(part, 0)
             counted[part] = max(told.count, before)  # a part that has begun anew counts anew
-            buffer.seen += max(told.count - before - len(told.tokens), 0)
+            buffer.miss(max(told.count - before - len(told.tokens), 0))
             for parcel in told.tokens:
                 buffer.put(crossing.see(path, parcel))
             self._asking.tell(part, "more", number=standing.number)

@@ -54,7 +54,7 @@ class Serving:
         self._say = say
         self._tasks: set[asyncio.Task[None]] = set()
         self._watching: dict[int, _Watching] = {}
-        composition.pausing.hit = self._hit
+        composition.pausing.when_hit(self._hit)
         self._hits: dict[Breakpoint, int] = {}
         self._verbs: dict[str, Callable[..., Any]] = {
             "trigger": self._trigger,
@@ -146,12 +146,12 @@ class Serving:
 
     def _trace(self, number: int) -> None:
         watching = self._watching[number] = _Tracing(number, self._crossing, self._say)
-        watching.leave = self._composition.consumers.add(watching.take)
+        watching.begun(self._composition.consumers.add(watching.take))
 
     def _tap(self, number: int, place: str, size: int) -> None:
         watching = self._watching[number] = _Tapping(number, self._crossing, self._say, place, size)
         try:
-            watching.leave = self._composition.taps.look(place, watching)
+            watching.begun(self._composition.taps.look(place, watching))
         except HfgError:
             del self._watching[number]
             raise
@@ -164,7 +164,7 @@ class Serving:
     def _break_at(self, number: int, place: str) -> None:
         point = self.run.break_at(place)
         watching = self._watching[number] = _Watching()
-        watching.leave = partial(self._remove, point)
+        watching.begun(partial(self._remove, point))
         self._hits[point] = number
 
     def _remove(self, point: Breakpoint) -> None:
@@ -188,14 +188,18 @@ def _failed(error: Exception) -> Failed:
 
 
 class _Watching:
-    """Something that somebody outside looks at.
-
-    Attributes:
-      leave: ends it.
-    """
+    """Something that somebody outside looks at."""
 
     def __init__(self) -> None:
-        self.leave: Callable[[], object] = lambda: None
+        self._end: Callable[[], object] = lambda: None
+
+    def begun(self, end: Callable[[], object]) -> None:
+        """It goes on, until that is called."""
+        self._end = end
+
+    def leave(self) -> None:
+        """End it."""
+        self._end()
 
     def flush(self) -> None:
         """Say what has come by."""

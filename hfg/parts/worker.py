@@ -30,17 +30,13 @@ from hfg.parts.messages import (
     Closed,
     Ended,
     Finish,
-    Hears,
-    Joins,
     Logged,
     Message,
+    OfAnEdge,
     Open,
     Opened,
     Reborn,
     Rests,
-    Sees,
-    Shares,
-    Speaks,
     Told,
 )
 from hfg.parts.part import Part
@@ -181,21 +177,15 @@ class Worker:
     # --- what is said -----------------------------------------------------------------------------------------------
 
     def _obey(self, part: Part, message: Message) -> None:
+        if isinstance(message, OfAnEdge):
+            assert self._carrier is not None
+            self._carrier.hear(message)
+            return
         match message:
             case Begin():
                 part.composition.lifetime.begin()
             case Ask():
                 self._say(MAIN, Told(part.answer(message.question)))
-            case Speaks():
-                part.speak(message.label, message.speaking, message.total)
-            case Hears():
-                part.hear(message.label, message.hearing, message.total)  # type: ignore[arg-type]  # checked there
-            case Joins():
-                if self._carrier is not None:
-                    self._carrier.join(message)
-            case Shares() | Sees():
-                if self._carrier is not None:
-                    self._carrier.share(message)
             case Finish():
                 part.finish(message.outcome, None)
             case Call():

@@ -68,6 +68,20 @@ class Breakpoint:
         """It pauses the run no more; a run that it has paused stays so. Does nothing the second time."""
         self._remove(self)
 
+    def was_hit(self, token: Token[Any] | None = None) -> None:
+        """It has paused the run, on that token if it looks at tokens."""
+        self.hits += 1
+        if token is not None:
+            self.token = token
+
+    def follow(self, place: Any) -> None:
+        """What it stands at was put in place of what it stood at (R4)."""
+        self.place = place
+
+    def rename(self, path: str) -> None:
+        """What it stands at is called otherwise."""
+        self.path = path
+
     def __repr__(self) -> str:
         return f'<Breakpoint at "{self.path}", {self.hits} hits>'
 
@@ -78,7 +92,6 @@ class Pausing:
     Attributes:
       paused: no new firing or call starts.
       why: what paused the run: "pause", or the path of the breakpoint that was hit.
-      hit: told of a breakpoint that has paused this part of a run, so that the others hold still too.
     """
 
     def __init__(self, engine: Engine, consumers: _Trace) -> None:
@@ -86,7 +99,7 @@ class Pausing:
         self._consumers = consumers
         self.paused = False
         self.why = ""
-        self.hit: Callable[[Breakpoint], None] | None = None
+        self._on_hit: Callable[[Breakpoint], None] = lambda _: None
         self._stepping = False
         self._waiters: list[asyncio.Future[None]] = []  # for a pause, or for what is under way to be over
         self._at_nodes: dict[Worker, Breakpoint] = {}
@@ -279,6 +292,10 @@ class Pausing:
         """All that are set."""
         return [*self._at_nodes.values(), *self._at_edges]
 
+    def when_hit(self, told: Callable[[Breakpoint], None]) -> None:
+        """Be told of breakpoints that have paused this part of a run, so that the others hold still too."""
+        self._on_hit = told
+
     def break_at(self, place: Any, when: Callable[[Token[Any]], object] | None) -> Breakpoint:
         """See `Run.break_at`."""
         if when is not None and not callable(when):
@@ -328,8 +345,7 @@ class Pausing:
                 point.remove()
                 return
             if hit:
-                point.token = event.token
-                self._hit(point)
+                self._hit(point, event.token)
 
         self._at_edges[point] = self._consumers.add(look)
         return point
@@ -341,7 +357,7 @@ class Pausing:
         """The graph was edited: breakpoints are where they were; those at nodes that are gone are removed (R4)."""
         near = {point for point in self.breakpoints if is_near(point.place, edited.nodes)}
         for point in near:
-            point.place = behind(point.place, edited.swapped)
+            point.follow(behind(point.place, edited.swapped))
             if is_gone(point.place):
                 self.remove(point)
         for worker, point in self._at_nodes.items():
@@ -354,7 +370,7 @@ class Pausing:
     def _is_called(self, point: Breakpoint, path: str) -> None:
         if self.why == point.path:
             self.why = path
-        point.path = path
+        point.rename(path)
 
     def remove(self, point: Breakpoint) -> None:
         """Take a breakpoint away."""
@@ -381,11 +397,10 @@ class Pausing:
 
         return stop_first
 
-    def _hit(self, point: Breakpoint) -> None:
-        point.hits += 1
+    def _hit(self, point: Breakpoint, token: Token[Any] | None = None) -> None:
+        point.was_hit(token)
         self.pause(point.path)
-        if self.hit is not None:
-            self.hit(point)
+        self._on_hit(point)
 
 
 def _path(place: Any, labels: Sequence[str]) -> str:

@@ -134,6 +134,10 @@ class _Buffer:
         self.kept.append(token)
         self.more.set()
 
+    def miss(self, count: int) -> None:
+        """So many have passed where nobody could keep them."""
+        self.seen += count
+
     def end(self) -> None:
         """No more will pass."""
         self.over.set()

@@ -161,8 +161,6 @@ class Inlet:
       label: of the edge.
       received: how many tokens have come, as its two ends count them: through all lives of both.
       taken: how many of them their consumer has taken.
-      done: how many of them are done in the part, with all that came of them.
-      orphans: of how many the producer has died and left nobody who waits for them to be done.
       speaking: whether their producer is enabled, as far as is known here.
     """
 
@@ -185,8 +183,8 @@ class Inlet:
         self.label: str = worker.port_name
         self.received = 0
         self.taken = 0
-        self.done = 0
-        self.orphans = 0
+        self._done = 0  # of those, in the part, with all that came of them
+        self._orphans = 0  # of so many the producer has died and left nobody who waits for them to be done
 
         def step(worker: Worker) -> None:
             worker.dequeued()
@@ -199,7 +197,23 @@ class Inlet:
         """A former life has done so many."""
         self.received += total
         self.taken += total
-        self.done += total
+        self._done += total
+
+    @property
+    def settled(self) -> int:
+        """For how many nobody waits any more: they are done, or who has sent them is dead."""
+        return max(self._done, self._orphans)
+
+    def settle(self, done: int) -> bool:
+        """So many are done in the part, with all that came of them; give whether more than before."""
+        if done <= self._done:
+            return False
+        self._done = done
+        return True
+
+    def orphan(self) -> None:
+        """The producer has died and left nobody who waits for what has come."""
+        self._orphans = self.received
 
     def skip(self, count: int) -> None:
         """So many have come that are not for this life: what belongs to them was done by a former one."""

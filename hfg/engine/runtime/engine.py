@@ -101,8 +101,6 @@ class Engine:
       holds: people outside who may still bring something (R5).
       readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
       read_out: those whose END somebody has read.
-      agreement: in a part of a graph that is cut, told that nothing moves here any more: what follows from that is
-        for the whole to say, by the methods that `quiet` calls otherwise.
     """
 
     def __init__(self, flat: FlatGraph, settings: Settings) -> None:
@@ -132,7 +130,7 @@ class Engine:
         self.senders: list[Worker] = []  # feeds for which somebody outside has a token, once for each
         self._told_unread: set[str] = set()
         self._quiet_waiters: list[asyncio.Future[None]] = []
-        self.agreement: Callable[[], None] | None = None
+        self._agreement: Callable[[], None] | None = None
         self.ended_how: tuple[str, HfgError | None] | None = None
         self.moving_since: float | None = None
         self.ending: asyncio.Event = asyncio.Event()
@@ -471,8 +469,8 @@ class Engine:
         core = self.core
         if any(not feed.outputs.missing for feed in self.senders):
             return  # a token is about to come
-        if self.agreement is not None:
-            self.agreement()
+        if self._agreement is not None:
+            self._agreement()
             return
         if quiet.grow(core) or core.timers or self.is_held_open():
             return
@@ -480,6 +478,13 @@ class Engine:
             return
         stalled = quiet.stall(core)
         self.finish("done" if stalled is None else "stalled", stalled)
+
+    def leave_quiet_to(self, agreement: Callable[[], None]) -> None:
+        """Here runs a part of a graph that is cut: when nothing moves in it any more, only tell that.
+
+        What follows is for the whole to say, by the methods that `quiet` calls otherwise.
+        """
+        self._agreement = agreement
 
     def is_held_open(self) -> bool:
         """Tell those who wait for quiet, and say whether somebody outside may still bring or take something (R5)."""

@@ -1,0 +1,173 @@
+"""Another part of a run, as the main one sees it: what runs it, whether it is there, and what it has said at the end.
+
+Whoever can begin processes, here or on other hosts, is a `Launcher`. Stands on `channels` and `lives`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Any, Protocol
+
+from hfg.errors import HfgError
+from hfg.parts.channels import Channel
+from hfg.parts.lives import Deaths
+from hfg.parts.messages import Begin, Closed, Message
+from hfg.transport import Session
+
+__all__ = ["Launched", "Launcher", "Other"]
+
+
+class Launched(Protocol):
+    """One other part, wherever it runs."""
+
+    async def wait(self) -> str:
+        """Wait until it is gone; give a sentence about how, as in 'process 1234 was killed by SIGKILL'."""
+
+    def begins(self) -> None:
+        """Its nodes are set up and let go: from now on it may be expected to answer."""
+
+    async def end(self) -> None:
+        """See to it that it is gone, whatever it does."""
+
+
+class Launcher(Protocol):
+    """Begins the other parts, and gives the session over which they are spoken to.
+
+    Attributes:
+      shares_memory: whether large arrays between parts may go through shared memory.
+    """
+
+    shares_memory: bool
+
+    async def open(self) -> Session:
+        """Give the session of the main part."""
+
+    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Launched:
+        """Begin a part, which then serves (see `worker`).
+
+        Args:
+          run: by which name all parts know the run.
+          part: its name.
+          host: where; "" is here.
+          lives: which life this is of it, and which of the main part.
+
+        Raises:
+          HfgError: it cannot be begun; nothing is left of it.
+        """
+
+    async def close(self) -> None:
+        """End the session, and whatever else was begun."""
+
+
+class Other:
+    """Another part, as the main one sees it.
+
+    Attributes:
+      name: of its group.
+      opened: done when it is set up.
+      closed: done when it has reported, or is gone.
+      report: what it has said at the end.
+      deaths: of its processes.
+      is_told: there is a process that hears what is said, and knows of other parts what was true when it began.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._launched: Launched | None = None
+        self.opened: asyncio.Future[None]
+        self.closed: asyncio.Future[None]
+        self.report: Closed | None = None
+        self.deaths = Deaths()
+        self.is_told = False
+        self._returning: asyncio.Task[None] | None = None
+        self._channel: Channel
+        self._watching: asyncio.Task[None] | None = None
+        self._leaves = False
+        self._gone = False
+
+    def begin(self, channel: Channel) -> None:
+        """By this it is spoken to."""
+        loop = asyncio.get_running_loop()
+        self._channel = channel
+        self.opened = loop.create_future()
+        self.closed = loop.create_future()
+
+    def live(self, launched: Launched, gone: Callable[[str], None]) -> None:
+        """Something runs it from now on; `gone` is told when that is gone without having been asked to leave."""
+        self._launched = launched
+
+        async def watch() -> None:
+            how = await launched.wait()
+            self._gone = True
+            if not self.closed.done():
+                self.closed.set_result(None)
+            if not self._leaves:
+                self.is_told = False
+                gone(how)
+
+        self._watching = asyncio.create_task(watch(), name=f"hfg process of {self.name}")
+        self.is_told = True
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it was begun, and is not gone."""
+        return self._launched is not None and not self._gone
+
+    def let_go(self) -> None:
+        """Its nodes are set up: they begin."""
+        self.say(Begin())
+        if self._launched is not None:
+            self._launched.begins()
+
+    def say(self, message: Message) -> None:
+        """Say something to it."""
+        self._channel.send(message)
+
+    def answer(self, error: HfgError | None) -> None:
+        """It is set up, or will not be."""
+        if not self.opened.done():
+            if error is None:
+                self.opened.set_result(None)
+            else:
+                self.opened.set_exception(error)
+                self.opened.exception()  # it may be that nobody waits for it any more
+
+    async def bury(self) -> None:
+        """See to it that nothing is left of a life that is over."""
+        if self._launched is not None:
+            await self._launched.end()
+            self._launched = None
+        self._gone = False
+        await self._channel.close()
+
+    def come_back(self, returning: Coroutine[Any, Any, None]) -> None:
+        """Begin its next life by that."""
+        self._returning = asyncio.get_running_loop().create_task(returning, name=f"hfg return of {self.name}")
+
+    async def stay_away(self) -> None:
+        """Begin no other life."""
+        if self._returning is not None:
+            self._returning.cancel()
+            await asyncio.wait({self._returning})
+
+    def leaves(self) -> None:
+        """It is told to leave: from here on it may be gone."""
+        self._leaves = True
+
+    def close(self, report: Closed) -> None:
+        """It has reported, and leaves."""
+        self.report = report
+        if not self.closed.done():
+            self.closed.set_result(None)
+
+    async def end(self) -> None:
+        """See to it that nothing is left of it."""
+        self._leaves = True
+        if self._launched is not None:
+            await self._launched.end()
+        if self._watching is not None:
+            self._watching.cancel()
+            await asyncio.wait({self._watching})
+        if self._launched is not None or hasattr(self, "_channel"):
+            await self._channel.close()
