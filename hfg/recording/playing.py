@@ -223,38 +223,25 @@ def _replace(
 ) -> Playing:
     flat = flatten(graph)
     nodes = {node.path: node for node in flat.nodes}
-    of_node: dict[str, dict[str, str]] = {}
-    missing: list[str] = []
-    for port, channel in recorded.items():
-        about = channel.metadata
-        path, name, kind = (
-            about.get("node", port.rpartition(".")[0]),
-            about.get("port", ""),
-            about.get("kind", "output"),
-        )
-        if kind not in ("output", "event"):
-            continue
-        there = nodes.get(path)
-        place = "" if about.get("source") == "true" and name == "processed" else sent_of(name) or name
-        if there is None or (place and place not in there.node._type.outputs and place not in there.node._type.events):
-            missing.append(port)
-        else:
-            of_node.setdefault(path, {})[port] = place
+    of_node, missing = _ports_of_nodes(recorded, nodes)
     if not of_node:
         raise UsageError(
             f'graph "{graph.name}" has none of the ports that were recorded in {file} ({_listed(recorded)}): say which '
             'feeds which, as in --map "camera.out=detect.image" or ports={"camera.out": "detect.image"}'
         )
-    chosen, kept = _first_of(of_node, nodes, flat, spoke, beside)
+    choice = _Choice(of_node, nodes, flat)
+    chosen = choice.choose(spoke, beside)
     if not chosen:
         raise UsageError(f"nothing passed the ports that were recorded in {file}, so there is nothing to play")
-    done = Playing()
-    done.recomputed = [
-        port for path, names in of_node.items() if path not in chosen for port, name in names.items() if name
-    ]
+    kept = choice.kept()
+    done = Playing(rest=_idle(chosen, flat, kept))
     edit: list[commands.Command] = []
-    for path in chosen:
-        node, names = nodes[path].node, of_node[path]
+    for path, names in of_node.items():
+        ports = [port for port, name in names.items() if name]
+        if path not in chosen:
+            done.recomputed += ports
+            continue
+        node = nodes[path].node
         hints = {port: _hint(node._type, recorded[port].metadata) for port in names}
         edit += [
             commands.Disconnect(edge.source.path, edge.target.path)
@@ -262,17 +249,43 @@ def _replace(
             if edge.target.path not in kept
         ]
         edit.append(commands.Replace(path, _stand_in(node, file, names, hints, how)))
-        done.played |= {port: port for port, name in names.items() if name}
-        done.silent += [
-            f"{path}.{name}"
-            for name in node._type.outputs
-            if name not in names.values() and any(edge.label.startswith(f"{path}.{name} ") for edge in flat.edges)
-        ]
-    done.rest = _idle(chosen, flat, kept)
+        done.played |= dict(zip(ports, ports, strict=True))
+        done.silent += _silent(path, node, names, flat)
     edit += [commands.Disable(path) for path in done.rest]
     graph.edit(*edit)
     done.silent += [port for port in missing if port.rpartition(".")[0] in chosen]
     return done
+
+
+def _ports_of_nodes(recorded: dict[str, Any], nodes: Mapping[str, Any]) -> tuple[dict[str, dict[str, str]], list[str]]:
+    """Which port of which node each recorded port is; "" for what says that a source has fired.
+
+    Returns:
+      these, by path of the node and of the recorded port, and the recorded ports that no node here has
+    """
+    of_node: dict[str, dict[str, str]] = {}
+    missing: list[str] = []
+    for port, channel in recorded.items():
+        about = channel.metadata
+        path, name = about.get("node", port.rpartition(".")[0]), about.get("port", "")
+        if about.get("kind", "output") not in ("output", "event"):
+            continue
+        there = nodes.get(path)
+        place = "" if about.get("source") == "true" and name == "processed" else sent_of(name) or name
+        if there is None or (place and place not in there.node._type.outputs and place not in there.node._type.events):
+            missing.append(port)
+        else:
+            of_node.setdefault(path, {})[port] = place
+    return of_node, missing
+
+
+def _silent(path: str, node: Node, names: Mapping[str, str], flat: Any) -> list[str]:
+    """Outputs of a played node that were not recorded, though edges lead away from them."""
+    return [
+        f"{path}.{name}"
+        for name in node._type.outputs
+        if name not in names.values() and any(edge.label.startswith(f"{path}.{name} ") for edge in flat.edges)
+    ]
 
 
 def _hint(kind: NodeType, about: Mapping[str, str]) -> Any:
@@ -283,57 +296,84 @@ def _hint(kind: NodeType, about: Mapping[str, str]) -> Any:
     return Any if spec is None or spec.type is None else spec.type
 
 
-def _first_of(
-    of_node: dict[str, dict[str, str]], nodes: dict[str, Any], flat: Any, spoke: Set[str], beside: Set[str]
-) -> tuple[list[str], set[str]]:
+class _Choice:
     """Of the recorded nodes those to play.
 
     These are sources, those that have sent signals in no firing and no slot call though nothing else than slots moves
     them, and whoever comes first behind what is not known: sources that were not recorded, what comes from outside,
     ports that were left out. All others do again what they did.
-
-    Returns:
-      their paths, and the paths of those parameters of sources whose edges stay, for what they send is the same again
     """
-    chosen = [
-        path
-        for path, names in of_node.items()
-        if nodes[path].node._type.is_source or (nodes[path].node._type.process_kind == "none" and beside & set(names))
-    ]
-    leaving: dict[str, list[Any]] = {}
-    unknown: list[Any] = []  # edges of which nobody knows what passes
-    for edge in flat.edges:
-        if edge.source.node < 0:
-            unknown += [edge] if edge.source.kind != "event" else []  # `start` is known
-            continue
-        leaving.setdefault(flat.nodes[edge.source.node].path, []).append(edge)
-    for path, node in nodes.items():
-        if node.node._type.is_source and path not in of_node:
-            unknown += leaving.get(path, ())
-        elif path in chosen:
-            unknown += [edge for edge in leaving.get(path, ()) if not _is_played(edge.source, of_node[path])]
-    tainted: set[int] = set()
-    while unknown:
-        edge = unknown.pop()
-        if edge.index in tainted:
-            continue
-        tainted.add(edge.index)
-        path = flat.nodes[edge.target.node].path if edge.target.node >= 0 else ""
-        if not path or path in chosen:
-            continue
-        played = path in of_node and bool(spoke & set(of_node[path]))
-        if played:
-            chosen.append(path)
-        unknown += [one for one in leaving.get(path, ()) if not (played and _is_played(one.source, of_node[path]))]
-    kept = {
-        edge.target.port.path
-        for edge in flat.edges
-        if edge.target.kind == "parameter"
-        and edge.index not in tainted
-        and flat.nodes[edge.target.node].path in chosen
-        and flat.nodes[edge.target.node].node._type.is_source
-    }
-    return [path for path in of_node if path in chosen], kept
+
+    def __init__(self, of_node: dict[str, dict[str, str]], nodes: Mapping[str, Any], flat: Any) -> None:
+        self._of_node = of_node
+        self._nodes = nodes
+        self._flat = flat
+        self._chosen: set[str] = set()
+        self._tainted: set[int] = set()  # edges of which nobody knows what passes
+        self._leaving: dict[str, list[Any]] = {path: [] for path in nodes}
+        for edge in flat.edges:
+            if edge.source.node >= 0:
+                self._leaving[self._path(edge.source)].append(edge)
+
+    def _path(self, end: Any) -> str:
+        return str(self._flat.nodes[end.node].path) if end.node >= 0 else ""
+
+    def _kind(self, path: str) -> NodeType:
+        kind: NodeType = self._nodes[path].node._type
+        return kind
+
+    def choose(self, spoke: Set[str], beside: Set[str]) -> list[str]:
+        """Give their paths, in the order of the recording.
+
+        Args:
+          spoke: recorded ports that something has passed.
+          beside: those that something has passed in no firing and no slot call.
+        """
+        for path, names in self._of_node.items():
+            kind = self._kind(path)
+            if kind.is_source or (kind.process_kind == "none" and beside & set(names)):
+                self._chosen.add(path)
+        unknown = self._unknown_from_the_beginning()
+        while unknown:
+            edge = unknown.pop()
+            if edge.index not in self._tainted:
+                self._tainted.add(edge.index)
+                unknown += self._unknown_behind(self._path(edge.target), spoke)
+        return [path for path in self._of_node if path in self._chosen]
+
+    def _unknown_from_the_beginning(self) -> list[Any]:
+        outside = [edge for edge in self._flat.edges if edge.source.node < 0]
+        unknown = [edge for edge in outside if edge.source.kind != "event"]  # `start` is known
+        for path, leaving in self._leaving.items():
+            if path in self._chosen:
+                unknown += self._unplayed(path)
+            elif path not in self._of_node and self._kind(path).is_source:
+                unknown += leaving
+        return unknown
+
+    def _unknown_behind(self, path: str, spoke: Set[str]) -> list[Any]:
+        """Something unknown comes to a node: give the edges of which nobody knows what passes for that."""
+        if not path or path in self._chosen:
+            return []
+        if not spoke & set(self._of_node.get(path, ())):
+            return self._leaving[path]
+        self._chosen.add(path)
+        return self._unplayed(path)
+
+    def _unplayed(self, path: str) -> list[Any]:
+        return [edge for edge in self._leaving[path] if not _is_played(edge.source, self._of_node[path])]
+
+    def kept(self) -> set[str]:
+        """The paths of those parameters of played sources whose edges stay, for what they send is the same again."""
+        return {
+            edge.target.port.path
+            for edge in self._flat.edges
+            if edge.target.kind == "parameter" and edge.index not in self._tainted and self._is_source(edge.target)
+        }
+
+    def _is_source(self, end: Any) -> bool:
+        path = self._path(end)
+        return path in self._chosen and self._kind(path).is_source
 
 
 def _is_played(source: Any, names: Mapping[str, str]) -> bool:

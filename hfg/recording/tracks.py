@@ -56,6 +56,8 @@ class Step(msgspec.Struct):
       waits: it is over later than it begins, if only in the same moment.
       call: the number of the slot call that it is; 0: none.
       told: `processed` has told of it.
+
+    Methods named `take_` say whether a record belongs to it, which has it by that.
     """
 
     began: float
@@ -69,6 +71,50 @@ class Step(msgspec.Struct):
     waits: bool = False
     call: int = 0
     told: bool = False
+
+    @property
+    def _is_last_word(self) -> bool:
+        return self.ends or self.last
+
+    def take_the_end(self) -> bool:
+        """It was told that the node has ended."""
+        self.ends = self._is_last_word
+        return self.ends
+
+    def take_signal(self, record: Record) -> bool:
+        """An event was triggered."""
+        if not self.call or record.told.get("call") != self.call:
+            return False
+        self.signals.append(record)
+        return True
+
+    def take_sent(self, record: Record) -> bool:
+        """An event says what an output has sent; the outputs of a firing leave before that is told."""
+        if not self.fires or self.told:
+            return False
+        self.sent[record.port] = record.token
+        return True
+
+    def take_processed(self) -> bool:
+        """An event says that a firing is over."""
+        if not self.sent or self.told or self._is_last_word:
+            return False
+        self.told = True
+        return True
+
+    def take_output(self, record: Record) -> bool:
+        """A token has left by an output."""
+        if not self.fires or self.told:
+            return False
+        if record.token.value is END and self._is_last_word:
+            if record.told.get("waited"):
+                self.when, self.waits = record.when, True
+            self.ends = True
+            return True
+        if record.port in self.sent or record.when != self.when or self.ends:
+            return False
+        self.sent[record.port] = record.token
+        return True
 
 
 class Track:
@@ -144,32 +190,14 @@ class Track:
     def _goes_on(self, step: Step, kind: str, record: Record, *, amid: bool) -> bool:
         """Whether a record belongs to the step that is being read, which has it by that."""
         if kind == "end":
-            step.ends = step.ends or step.last
-            return step.ends
-        if kind == "sent":  # the outputs of a firing leave before that is told
-            if not step.fires or not self._has_outputs or step.told or amid:
-                return False
-            step.sent[record.port] = record.token
-            return True
+            return step.take_the_end()
         if kind == "event":
-            if not step.call or record.told.get("call") != step.call:
-                return False
-            step.signals.append(record)
-            return True
-        if kind == _PROCESSED and step.sent and self._has_outputs and not (amid or step.last or step.ends or step.told):
-            step.told = True
-            return True
-        if kind != "output" or not step.fires or amid or step.told:
+            return step.take_signal(record)
+        if amid:
             return False
-        if record.token.value is END and (step.ends or step.last):
-            if record.told.get("waited"):
-                step.when, step.waits = record.when, True
-            step.ends = True
-            return True
-        if record.port in step.sent or record.when != step.when or step.ends:
-            return False
-        step.sent[record.port] = record.token
-        return True
+        if kind == "output":
+            return step.take_output(record)
+        return self._has_outputs and (step.take_sent(record) if kind == "sent" else step.take_processed())
 
     def _firing(
         self, kind: str, record: Record, before: float, signals: list[Record], sent: dict[str, Token[Any]]
