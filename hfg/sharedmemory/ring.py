@@ -46,14 +46,37 @@ class RingCounts(msgspec.Struct):
 
 
 class _Slot:
-    """One slot, as its producer knows it."""
+    """One slot, as its producer knows it.
+
+    Attributes:
+      generation: what lies in it now; leases of others are of no use.
+      sendings: that are not done.
+      is_viewed: by an array of this process.
+    """
 
     __slots__ = ("generation", "is_viewed", "sendings")
 
     def __init__(self) -> None:
         self.generation = 0
-        self.sendings = 0  # that are not done
-        self.is_viewed = False  # by an array of this process
+        self.sendings = 0
+        self.is_viewed = False
+
+    def renew(self) -> int:
+        """Something else will lie in it; give its generation."""
+        self.generation += 1
+        return self.generation
+
+    def view(self, viewed: bool) -> None:
+        """An array of this process lies there now, or is gone."""
+        self.is_viewed = viewed
+
+    def sent(self) -> None:
+        """What lies in it goes to consumers, once more."""
+        self.sendings += 1
+
+    def done(self) -> None:
+        """One of those is done with everywhere."""
+        self.sendings -= 1
 
 
 class _Lane:
@@ -185,7 +208,7 @@ class Ring:
             if not self._is_free(number):
                 continue
             slot, old = self._slots[number], self._slots[number].generation
-            slot.generation = self._generations[number] = old + 1
+            self._generations[number] = slot.renew()
             # Who takes a slot says so before it looks at the generation, and here it is the other way round: a late
             # lease is seen by one of the two.
             if any(lane.holds(number, old) for lane in self._lanes.values()):
@@ -196,7 +219,7 @@ class Ring:
 
     def _array(self, number: int, shape: tuple[int, ...], dtype: np.dtype[Any]) -> np.ndarray[Any, Any]:
         made: np.ndarray[Any, Any] = np.ndarray(shape, dtype, self._mapped, PAGE + number * self.slot_size)
-        self._slots[number].is_viewed = True
+        self._slots[number].view(True)
         self._loans[id(made)] = number, _address(made)
         # All views of it, and views of views, have it as their base, so it is gone when the last of them is.
         weakref.finalize(made, self._forget, id(made), number).atexit = False
@@ -204,7 +227,7 @@ class Ring:
 
     def _forget(self, identity: int, number: int) -> None:
         del self._loans[identity]
-        self._slots[number].is_viewed = False
+        self._slots[number].view(False)
 
     def place(self, array: np.ndarray[Any, Any]) -> Lease | None:
         """Give the lease by which consumers view an array; None: it goes the ordinary way, and the counts say why.
@@ -237,7 +260,7 @@ class Ring:
             np.copyto(np.ndarray(array.shape, array.dtype, self._mapped, PAGE + number * self.slot_size), array)
             self.counts.copied += 1
         slot = self._slots[number]
-        slot.sendings += 1
+        slot.sent()
         self.counts.placed += 1
         return Lease(self.name, number, slot.generation, offset)
 
@@ -250,7 +273,7 @@ class Ring:
         slot = self._slots[lease.slot] if lease.segment == self.name and lease.slot < len(self._slots) else None
         if slot is None or slot.generation != lease.generation or not slot.sendings:
             raise UsageError(f'{lease} is no lease of "{self.name}" that is still out')
-        slot.sendings -= 1
+        slot.done()
 
     def close(self) -> None:
         """Remove the segment; arrays and views of it stay readable where they are."""
