@@ -22,9 +22,8 @@ from yaml.events import (
     SequenceStartEvent,
 )
 
-__all__ = ["DEEPEST", "LARGEST", "MOST", "Located", "parse", "plain"]
+__all__ = ["DEEPEST", "MOST", "Located", "parse", "plain"]
 
-LARGEST: Final = 32 * 2**20  # bytes
 MOST: Final = 2_000_000  # values, those that aliases repeat counted again
 DEEPEST: Final = 200
 

@@ -1,7 +1,7 @@
 """Makes a document of the text of a graph file, and finds everything that is wrong with its shape at once.
 
 What a document may hold is read from its structs. Whoever builds a graph of it later finds the lines in `Read.lines`.
-Stands on `parsing` and `document`.
+Stands on `opening`, `parsing` and `document`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from msgspec import inspect
 
 from hfg.files.document import SUFFIX, VERSION, Document, EdgeDocument, NodeDocument, OperatorDocument
 from hfg.files.findings import Findings, Key, Lines, graph_path
-from hfg.files.parsing import LARGEST, Located, parse, plain
+from hfg.files.opening import bytes_of, text_in
+from hfg.files.parsing import Located, parse, plain
 
 __all__ = ["Read", "read_bytes", "read_file"]
 
@@ -43,41 +44,20 @@ class Read(NamedTuple):
 
 def read_file(path: Path, file: str, findings: Findings) -> Read | None:
     """Read a file; None if nothing of use is in it, and then a finding says why."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-    except IsADirectoryError:
-        findings.add(file, 0, "", f"this is a folder; name a file in it that ends in {SUFFIX}")
-    except FileNotFoundError:
-        findings.add(file, 0, "", f"there is no such file{_nearby(path)}")
-    except OSError as error:
-        findings.add(file, 0, "", f"it cannot be read ({error.strerror}); see who may read it")
-    except ValueError as error:  # a name with a zero in it
-        findings.add(file, 0, "", f"it cannot be read ({error}); correct its name")
-    else:
-        return read_bytes(data, file, findings)
-    return None
-
-
-def _nearby(path: Path) -> str:
-    try:
-        names = [one.name.removesuffix(SUFFIX) for one in path.parent.iterdir() if one.name.endswith(SUFFIX)]
-    except OSError:
-        names = []
-    near = difflib.get_close_matches(path.name.removesuffix(SUFFIX), names, n=1)
-    return f'; did you mean "{near[0]}{SUFFIX}"?' if near else "; see where it is, and whether its name is right"
+    data = bytes_of(path, file, findings, SUFFIX)
+    return None if data is None else read_bytes(data, file, findings)
 
 
 def read_bytes(data: bytes, file: str, findings: Findings) -> Read | None:
     """Read what a file holds."""
-    if len(data) > LARGEST:
-        findings.add(file, 0, "", f"it is larger than {LARGEST // 2**20} MiB; put large data into files of its own")
-        return None
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        findings.add(file, line, "", "this is no text in UTF-8; a graph file is text, see docs/howto/files.md")
+    text = text_in(
+        data,
+        file,
+        findings,
+        small="put large data into files of its own",
+        text="a graph file is text, see docs/howto/files.md",
+    )
+    if text is None:
         return None
     found = parse(text, lambda line, sentence: findings.add(file, line, "", sentence))
     if found is None or found.value is None:

@@ -25,7 +25,8 @@ _GRAPH: Final = "csapex::Graph"
 _DEFAULT_RATE_HZ: Final = 60.0  # what CS::APEX limits every node to unless it says another rate
 _DEFAULT_THREAD, _PRIVATE_THREAD = 1, 0
 _COUNTS: Final = {"input count": "in", "output count": "out", "slot count": "slot", "event count": "event"}
-_OF_PORTS: Final = (*_COUNTS, "input names", "output names", "slot names", "event names")
+_NAMES: Final = ("input names", "output names", "slot names", "event names")
+_OF_PORTS: Final = (*_COUNTS, *_NAMES)
 _ITERATION: Final = ("iterate_containers", "iterated_containers")
 _NO_VALUE: Final = ("trigger", "progress", "null", "text", "output_progress", "output_text")
 _RELEASE: Final = {0: "pipelined", 1: "sequential"}
@@ -278,28 +279,14 @@ class _Converting:
         told.type = "subgraph"
         box = made.graph
         assert box is not None
-        assert node.graph is not None
-        counts = self.counts(node)
-        inner = next(one for one in self.levels if one.owner is node)
-        for kind, ports in (("in", box.inputs), ("out", box.outputs), ("slot", box.slots), ("event", box.events)):
-            used = [number for one, number in level.numbers[node.uuid] if one == kind]
-            most = max(counts.get(kind, 0), *(number + 1 for number in _relayed(inner, kind)), 0)
-            if kind not in counts and kind not in AUTOMATIC:
-                most = max(most, *(number + 1 for number in used), 0)
-            for number in range(most):
-                ports[f"{kind}_{number}"] = _ANY
+        self.own_ports(level, node, box)
         rule = TypeRule("the subgraph", list(box.inputs), list(box.outputs), list(box.slots), list(box.events))
         level.ports[node.uuid] = Ports(rule, level.numbers[node.uuid], {}, self.old)
-        for number, names in enumerate(("input names", "output names", "slot names", "event names")):
-            ports = (box.inputs, box.outputs, box.slots, box.events)[number]
-            if names in node.parameters and ports and node.parameters[names].value:
-                made.notes[names] = node.parameters[names].value[: len(ports)]
-        for event, slot in (("event_activation", "activation"), ("event_deactivation", "deactivation")):
-            if any(one.source == event for one in node.graph.connections):
-                box.slots[slot] = _ANY
-                outer = f"{level.names[node.uuid]}.{AUTOMATIC['event'][event == 'event_deactivation']}"
-                level.box.edges.append(EdgeDocument(outer, f"{level.names[node.uuid]}.{slot}", active=True))
-                told.differs(f"its {event} goes by a slot of its own")
+        for name, ports in zip(_NAMES, (box.inputs, box.outputs, box.slots, box.events), strict=True):
+            said = node.parameters.get(name)
+            if said is not None and said.value and ports:
+                made.notes[name] = said.value[: len(ports)]
+        self.activity(level, node, box, told)
         iterates = node.parameters.get("iterate_containers")
         if iterates is not None and iterates.value is True:
             self.iteration(node, made, told)
@@ -307,6 +294,28 @@ class _Converting:
             if name not in _OF_PORTS and name not in _ITERATION and said.kind not in _NO_VALUE:
                 told.differs(f'its parameter "{name}" ({said.value}) has no counterpart')
                 made.notes.setdefault("csapex", {})[name] = said.value
+
+    def own_ports(self, level: _Level, node: ApexNode, box: BoxDocument) -> None:
+        """As many as it says, or as connections inside and outside of it use."""
+        counts = self.counts(node)
+        inner = next(one for one in self.levels if one.owner is node)
+        for kind, ports in (("in", box.inputs), ("out", box.outputs), ("slot", box.slots), ("event", box.events)):
+            used = [*_relayed(inner, kind)]
+            if kind not in counts and kind not in AUTOMATIC:
+                used += [number for one, number in level.numbers[node.uuid] if one == kind]
+            for number in range(max([counts.get(kind, 0), *(number + 1 for number in used)])):
+                ports[f"{kind}_{number}"] = _ANY
+
+    def activity(self, level: _Level, node: ApexNode, box: BoxDocument, told: Converted) -> None:
+        """What its activity does inside comes by slots of its own."""
+        assert node.graph is not None
+        name = level.names[node.uuid]
+        for event, slot in (("event_activation", "activation"), ("event_deactivation", "deactivation")):
+            if any(one.source == event for one in node.graph.connections):
+                box.slots[slot] = _ANY
+                outer = f"{name}.{AUTOMATIC['event'][event == 'event_deactivation']}"
+                level.box.edges.append(EdgeDocument(outer, f"{name}.{slot}", active=True))
+                told.differs(f"its {event} goes by a slot of its own")
 
     def iteration(self, node: ApexNode, made: NodeDocument, told: Converted) -> None:
         assert made.graph is not None

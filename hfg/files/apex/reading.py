@@ -1,7 +1,7 @@
 """Reads a file of CS::APEX, `*.apex`, or a snippet, `*.apexs`, and finds everything that is wrong with its shape.
 
 Keys may come in any order and most may be missing; what a version before or after writes more is kept and not refused.
-Stands on the parsing of graph files and on `document`.
+Stands on the opening and parsing of graph files and on `document`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import Any, Final
 
 from hfg.files.apex.document import ApexConnection, ApexFile, ApexGraph, ApexNode, ApexParameter, ApexThread
 from hfg.files.findings import Findings
-from hfg.files.parsing import LARGEST, Located, parse, plain
+from hfg.files.opening import bytes_of, text_in
+from hfg.files.parsing import Located, parse, plain
 
 __all__ = ["SEPARATOR", "SUFFIXES", "read_file"]
 
@@ -27,30 +28,17 @@ _VALUES: Final[tuple[str, ...]] = ("int", "double", "bool", "string", "long")
 
 def read_file(path: Path, file: str, findings: Findings) -> ApexFile | None:
     """Read a file; None if nothing of use is in it, and then a finding says why."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-    except IsADirectoryError:
-        findings.add(file, 0, "", "this is a folder; name a file in it that ends in .apex")
-    except FileNotFoundError:
-        findings.add(file, 0, "", "there is no such file; see where it is, and whether its name is right")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        findings.add(file, 0, "", f"it cannot be read ({reason}); see who may read it, and its name")
-    else:
-        return _read_bytes(data, file, findings)
-    return None
-
-
-def _read_bytes(data: bytes, file: str, findings: Findings) -> ApexFile | None:
-    if len(data) > LARGEST:
-        findings.add(file, 0, "", f"it is larger than {LARGEST // 2**20} MiB; no graph of CS::APEX is that large")
+    data = bytes_of(path, file, findings, *SUFFIXES)
+    if data is None:
         return None
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        findings.add(file, line, "", "this is no text in UTF-8; a graph of CS::APEX is text, messages are not imported")
+    text = text_in(
+        data,
+        file,
+        findings,
+        small="no graph of CS::APEX is that large",
+        text="a graph of CS::APEX is text, messages are not imported",
+    )
+    if text is None:
         return None
     reader = _Reader(lambda line, sentence, where="": findings.add(file, line, where, sentence))
     count = len(findings.problems)
@@ -233,28 +221,35 @@ class _Reader:
             self.said(line, "the type of a parameter is a text; correct it", where)
             kind = "value"
         made = ApexParameter(kind)
-        if kind in _NO_VALUE:
-            return made
-        if kind == "color":
-            made.value = self.colour(entry.get("values"), where)
-        elif kind == "path":
-            made.value = self.value(entry, "value", str, "a text", where)
-        elif kind == "string_list":
-            made.value = [str(one.value) for one in self.items(entry.get("list"), "list")]
-        elif kind == "interval":
-            key = next((one for one in _VALUES[:2] if one in entry), None)
-            made.value = None if key is None else plain(entry[key])
-            if key is None or not _is_numbers(made.value, 2):
-                self.said(line, "an interval is two numbers, under int or double; correct it", where)
-        else:
-            key = next((one for one in _VALUES if one in entry), None)
-            made.value = None if key is None else self.scalar(entry[key], key, where)
+        if kind not in _NO_VALUE:
+            made.value = self.value_of(kind, entry, line, where)
         if kind == "set":
             made.text = str(entry["txt"].value) if "txt" in entry else ""
+        return made
+
+    def value_of(self, kind: str, entry: dict[str, Located], line: int, where: str) -> Any:
+        match kind:
+            case "color":
+                return self.colour(entry.get("values"), where)
+            case "path":
+                return self.value(entry, "value", str, "a text", where)
+            case "string_list":
+                return [str(one.value) for one in self.items(entry.get("list"), "list")]
+            case "interval":
+                return self.interval(entry, line, where)
+        key = next((one for one in _VALUES if one in entry), None)
+        value = None if key is None else self.scalar(entry[key], key, where)
         if kind == "bitset" and "values" in entry and isinstance(entry["values"].value, dict):
             masks = plain(entry["values"])
-            made.value = [one for one, mask in masks.items() if _is_int(mask) and (made.value or 0) & mask]
-        return made
+            return [one for one, mask in masks.items() if _is_int(mask) and (value or 0) & mask]
+        return value
+
+    def interval(self, entry: dict[str, Located], line: int, where: str) -> Any:
+        key = next((one for one in _VALUES[:2] if one in entry), None)
+        value = None if key is None else plain(entry[key])
+        if not _is_numbers(value, 2):
+            self.said(line, "an interval is two numbers, under int or double; correct it", where)
+        return value
 
     def scalar(self, said: Located, key: str, where: str) -> Any:
         value = said.value
