@@ -287,36 +287,45 @@ def _recipe(name: str, function: Callable[..., Any]) -> Recipe:
     for argument in inspect.signature(function).parameters.values():
         role = _role(argument, told)
         about = _sentence(told.words.get(argument.name) or f"{argument.name} of {name}")
-        own = _free(argument.name)
+        said = told.types.get(argument.name, "")
+        hint = hints.get(argument.name)
         if role in ("input", "optional"):
-            said = told.types.get(argument.name, "")
-            hint = hints.get(argument.name) or (Array if _ARRAYS.search(said.partition(",")[0]) else Any)
-            inputs.append((argument.name, Port(own, hint, about, role == "optional")))
+            inputs.append((argument.name, _port(argument, hint, said, about, optional=role == "optional")))
         elif role == "parameter":
-            default = REQUIRED if argument.default is argument.empty else argument.default
-            hint = hints.get(argument.name) or _of_default(_hint_of(told.types.get(argument.name, "")), default)
-            settings.append((argument.name, Setting(own, hint, default, about)))
+            settings.append((argument.name, _setting(argument, hint, said, about)))
     if inputs and all(port.optional for _, port in inputs):  # without any it would be a source without end
         inputs[0] = (inputs[0][0], replace(inputs[0][1], optional=False))
     inputs.sort(key=lambda one: one[1].optional)
-    names = [name for name, _ in told.results if name]
-    several = len(names) > 1 and len(names) == len(told.results) and "return" not in hints
-    taken = {port.name for _, port in inputs} | {setting.name for _, setting in settings}
-    outputs = (
-        tuple(Port(_result_name(one, taken), Any, _sentence(words or one)) for one, words in told.results)
-        if several
-        else (Port("out", hints.get("return", Any), _sentence(told.results[0][1] if told.results else "the result")),)
-    )
     return Recipe(
         name=name,
         about=_sentence(told.about or f"Call {getattr(function, '__module__', '')}.{name}"),
         more=("Fires once for each set of inputs.",),
         inputs=tuple(port for _, port in inputs),
         settings=tuple(setting for _, setting in settings),
-        outputs=outputs,
+        outputs=_outputs(told, hints, {port.name for _, port in inputs} | {one.name for _, one in settings}),
         raises={"Exception": "whatever the function raises."},
         call=_caller(function, inputs, settings),
     )
+
+
+def _port(argument: inspect.Parameter, hint: Any, said: str, about: str, *, optional: bool) -> Port:
+    """Make an input of an argument, by its annotation or what its docstring says."""
+    hint = hint or (Array if _ARRAYS.search(said.partition(",")[0]) else Any)
+    return Port(_free(argument.name), hint, about, optional)
+
+
+def _setting(argument: inspect.Parameter, hint: Any, said: str, about: str) -> Setting:
+    """Make a parameter of an argument, in the same way."""
+    default = REQUIRED if argument.default is argument.empty else argument.default
+    return Setting(_free(argument.name), hint or _of_default(_hint_of(said), default), default, about)
+
+
+def _outputs(told: _Told, hints: Mapping[str, Any], taken: set[str]) -> tuple[Port, ...]:
+    """One, or as many as the docstring gives names to where the annotation does not say what comes back."""
+    results = told.results
+    if len(results) > 1 and all(name for name, _ in results) and "return" not in hints:
+        return tuple(Port(_result_name(name, taken), Any, _sentence(words or name)) for name, words in results)
+    return (Port("out", hints.get("return", Any), _sentence(results[0][1] if results else "the result")),)
 
 
 def _hints(function: Any) -> dict[str, Any]:

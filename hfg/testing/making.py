@@ -6,7 +6,7 @@ Hypothesis chooses so that it can shrink; a seeded generator chooses fast.
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -132,6 +132,26 @@ _INNER = [
     "Sieve",
     "Tally",
 ]
+_INNER_WHERE: list[tuple[Callable[[Allowed], bool], list[str]]] = [
+    (lambda allowed: allowed.failures, ["Failing"] * 2),
+    (lambda allowed: allowed.waiting, ["slow_double", "Waiting"]),
+    (lambda allowed: allowed.waiting and allowed.events, ["AsyncRelay"]),
+    (lambda allowed: allowed.events, ["Relay", "Relay", "Doubter"]),
+    (lambda allowed: allowed.parameters, ["Scaled"]),
+    (lambda allowed: allowed.readiness, ["OnlyTwice"]),
+    (lambda allowed: allowed.retries, ["Unsteady"] * 3 + ["Stubborn"] * 2),
+    (lambda allowed: allowed.tasks, ["Tends"] * 4 + ["Beats"] * 3),
+    (lambda allowed: allowed.endings and not allowed.plain, ["LastWord", "LastWord", "Hums"]),
+    (lambda allowed: allowed.iteration and not allowed.plain, ["EachOfEach"]),
+    (lambda allowed: allowed.tuned, ["Tuned"] * 6),
+    (lambda allowed: allowed.clinging and not allowed.plain, ["Clings"]),
+]
+"""More of them; a kind that stands there several times is chosen as often."""
+
+_BEFORE = {"EachOfEach": "listed"}
+_BEHIND = {"EachOfEach": "summed", "Hums": "add", "LastWord": "add"}
+"""What such a node is made with: it needs a consumer, or a producer, of its own."""
+
 _PLAIN = ["double", "add", "add", "some", "some", "sink", "either", "with_default", "parted", "Sends", "mood", "calm"]
 _PLAIN_WHERE_CODE_WAITS = ["restless", "calling"]
 _PLAIN_WHERE_CODE_FAILS = ["picky", "picky", "gives_up"]
@@ -202,34 +222,24 @@ class _Making:
     def make_nodes(self) -> None:
         choose, allowed = self.choose, self.allowed
         sources = ["script", "Script"] + (["ascript"] if allowed.waiting else [])
-        inner = list(_INNER)
-        inner += ["Failing"] * 2 if allowed.failures else []
-        inner += ["slow_double", "Waiting", "AsyncRelay"] if allowed.waiting else []
-        inner += ["Relay", "Relay", "Doubter"] if allowed.events else []
-        inner += ["Scaled"] if allowed.parameters else []
-        inner += ["OnlyTwice"] if allowed.readiness else []
-        inner += ["Unsteady"] * 3 + ["Stubborn"] * 2 if allowed.retries else []
-        inner += ["Tends"] * 4 + ["Beats"] * 3 if allowed.tasks else []
-        inner += ["LastWord", "LastWord", "Hums"] if allowed.endings and not allowed.plain else []
-        inner += ["EachOfEach"] if allowed.iteration and not allowed.plain else []
-        inner += ["Tuned"] * 6 if allowed.tuned else []
-        inner += ["Clings"] if allowed.clinging and not allowed.plain else []
-        if not allowed.events:
-            inner = [name for name in inner if name != "AsyncRelay"]
         count = choose.number(2, allowed.max_nodes)
-        plain = self._plain_kinds()
+        inner, plain = self._inner_kinds(), self._plain_kinds()
         for number in range(count):
             if allowed.sources and (number == 0 or choose.chance(self._seldom(20))):
                 kind = choose.one_of(sources)
             else:
                 kind = choose.one_of(plain if allowed.plain and not choose.chance(15) else inner)
-            if kind == "EachOfEach":
-                self.nodes.append(NodePlan(f"n{number}before", "listed"))
+            if kind in _BEFORE:
+                self.nodes.append(NodePlan(f"n{number}before", _BEFORE[kind]))
             self.nodes.append(NodePlan(f"n{number}", kind, self._parameters(kind), self._options(kind)))
-            if kind == "EachOfEach":
-                self.nodes.append(NodePlan(f"n{number}behind", "summed"))
-            if kind in ("Hums", "LastWord"):
-                self.nodes.append(NodePlan(f"n{number}behind", "add"))
+            if kind in _BEHIND:
+                self.nodes.append(NodePlan(f"n{number}behind", _BEHIND[kind]))
+
+    def _inner_kinds(self) -> list[str]:
+        kinds = list(_INNER)
+        for is_allowed, more in _INNER_WHERE:
+            kinds += more if is_allowed(self.allowed) else []
+        return kinds
 
     def _plain_kinds(self) -> list[str]:
         allowed = self.allowed

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import operator
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Annotated, Any, Final
 
@@ -19,15 +19,16 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from hfg.images import Color, Gray, Image, Rows, wrong_image
+from hfg.images import Color, Gray, Image, Rows
 from hfg.nodes._making import Port, Recipe, Setting, port_name
 from hfg.nodes.cv import _overrides as overrides
+from hfg.nodes.cv._calling import Calling, Inlet, Knob
 from hfg.nodes.cv._docs import Documentation, read
 from hfg.nodes.cv._overrides import Say
 from hfg.nodes.cv._stub import Argument, Overload, overloads
 from hfg.nodes.cv._words import ABOUT, APEX, CATEGORIES, NO_NODES, OUTPUTS, OVERLOADS
 from hfg.ports.specs import REQUIRED
-from hfg.types import Array, Pixels, array_facts, describe_value
+from hfg.types import Array, Pixels, array_facts
 
 __all__ = ["Measured", "ResultKind", "chosen", "measured", "names", "recipe", "refused"]
 
@@ -133,35 +134,14 @@ def _say(function: str, argument: Argument) -> Say:
     return own or overrides.COMMON.get(argument.name, Say())
 
 
-class _Inlet(typing.NamedTuple):
-    """An input with what becomes of its value."""
-
-    port: Port
-    argument: str
-    say: Say
-    copied: bool
-    asked_for: bool  # OpenCV wants to be given None where there is nothing
-    is_image: bool
-    is_points: bool
-
-
-class _Knob(typing.NamedTuple):
-    """A parameter with what becomes of its value; with `own` None is what OpenCV itself takes."""
-
-    setting: Setting
-    argument: str
-    say: Say
-    own: bool
-
-
 def recipe(name: str, seen: Measured | None = None) -> Recipe:
     """Make the recipe for the function that OpenCV calls so; `seen` takes the place of what the table says of it."""
     seen = measured().get(name, Measured()) if seen is None else seen
     function = getattr(cv2, name)
     overload = chosen(name)
     told = read(function, (one.name for one in overload.arguments))
-    inlets: list[_Inlet] = []
-    knobs: list[_Knob] = []
+    inlets: list[Inlet] = []
+    knobs: list[Knob] = []
     given: dict[str, Any] = {}
     for argument in overload.arguments:
         say = _say(name, argument)
@@ -192,7 +172,16 @@ def recipe(name: str, seen: Measured | None = None) -> Recipe:
             "TypeError": "an input is of another kind than is declared.",
             "ValueError": _refusals(name),
         },
-        call=_caller(name, function, inlets, knobs, given, seen),
+        call=Calling(
+            name,
+            function,
+            inlets,
+            knobs,
+            given,
+            deadly=frozenset(seen.deadly),
+            results=_split_returns(overload.returns),
+            is_single=len(told.outputs) <= 1,
+        ),
     )
 
 
@@ -202,7 +191,7 @@ def _refusals(name: str) -> str:
     return f"an input is empty{own}, or OpenCV refuses the values; the message says why."
 
 
-def _sure(results: Sequence[ResultKind], inlets: Sequence[_Inlet]) -> Sequence[ResultKind]:
+def _sure(results: Sequence[ResultKind], inlets: Sequence[Inlet]) -> Sequence[ResultKind]:
     """Take off what was the same each time only because the samples were: pictures of a type that is said by hand."""
     facts = [array_facts(inlet.port.hint) for inlet in inlets if not inlet.is_image]
     if not any(
@@ -233,7 +222,7 @@ def _entry(name: str, told: Documentation) -> str:
     return text if text.endswith((".", "!", "?", "...")) else f"{text}."
 
 
-def _inlet(argument: Argument, say: Say, told: Documentation, seen: Measured) -> _Inlet:
+def _inlet(argument: Argument, say: Say, told: Documentation, seen: Measured) -> Inlet:
     is_image = say.hint is None
     hint = say.hint or _image_hint(seen)
     if argument.type in _LISTS and say.hint is None and say.convert is None:  # which makes a list of one image
@@ -243,7 +232,7 @@ def _inlet(argument: Argument, say: Say, told: Documentation, seen: Measured) ->
     written = argument.name in told.outputs or argument.name == "dst"
     copied = written and not argument.optional and argument.type in _ARRAYS
     port = Port(port_name(argument.name), hint, _entry(argument.name, told), optional)
-    return _Inlet(port, argument.name, say, copied, not argument.optional, is_image, _is_points(hint))
+    return Inlet(port, argument.name, say, copied, not argument.optional, is_image, _is_points(hint))
 
 
 def _is_points(hint: Any) -> bool:
@@ -253,14 +242,14 @@ def _is_points(hint: Any) -> bool:
     return typing.get_origin(hint) in (list, Annotated) and _is_points(typing.get_args(hint)[0])
 
 
-def _knob(function: str, argument: Argument, say: Say, told: Documentation) -> _Knob:
+def _knob(function: str, argument: Argument, say: Say, told: Documentation) -> Knob:
     hint = say.hint if say.hint is not None else _VALUES[argument.type]
     default = say.default
     own = default is REQUIRED and argument.optional
     if own:
         default, hint = None, hint | None
     setting = Setting(port_name(argument.name), hint, default, _entry(argument.name, told))
-    return _Knob(setting, argument.name, say, own)
+    return Knob(setting, argument.name, say, own)
 
 
 def _image_hint(found: Measured) -> Any:
@@ -319,103 +308,3 @@ def _result_hint(kind: str, seen: ResultKind) -> Any:
         return npt.NDArray[scalar]  # type: ignore[valid-type]
     layout = Pixels() if seen.channels is None else Pixels(seen.channels)
     return Annotated[npt.NDArray[scalar], layout]  # type: ignore[valid-type]
-
-
-_FARTHEST: Final = 32767
-"""Coordinates beyond this are refused: OpenCV draws with numbers of 16 bits and would count for minutes."""
-
-
-def _caller(
-    name: str,
-    function: Callable[..., Any],
-    inlets: Sequence[_Inlet],
-    knobs: Sequence[_Knob],
-    given: Mapping[str, Any],
-    seen: Measured,
-) -> Callable[..., Any]:
-    """Make what runs one firing: it checks, converts, calls, and tells what OpenCV refuses."""
-    kinds = _split_returns(chosen(name).returns)
-    single = len(read(function, (one.name for one in chosen(name).arguments)).outputs) <= 1
-    lists = {place for place, kind in enumerate(kinds) if kind.startswith("Sequence[")}  # OpenCV gives tuples
-    deadly = frozenset(seen.deadly)
-    needs = overrides.NEEDS.get(name)
-    node = port_name(name)
-
-    def call(*values: Any, **parameters: Any) -> Any:
-        arguments = dict(given)
-        inputs: dict[str, Any] = {}
-        for inlet, value in zip(inlets, values, strict=True):
-            if value is None and inlet.port.optional:
-                if inlet.asked_for:
-                    arguments[inlet.argument] = None
-                continue
-            wrong = wrong_image(value, inlet.port.hint)
-            if wrong is not None:
-                raise TypeError(f'input "{inlet.port.name}" of {node}: {wrong}')
-            _need_sound(node, inlet, value, deadly)
-            inputs[inlet.argument] = value
-            arguments[inlet.argument] = np.copy(value) if inlet.copied else value
-        if needs is not None:
-            wrong = needs.wrong(inputs, {knob.argument: parameters[knob.setting.name] for knob in knobs})
-            if wrong is not None:
-                raise ValueError(f"{node}: {wrong}")
-        for inlet in inlets:
-            if inlet.say.convert is not None and inlet.argument in inputs:
-                arguments[inlet.argument] = inlet.say.convert(arguments[inlet.argument], inputs)
-        for knob in knobs:
-            value = parameters[knob.setting.name]
-            if value is None and knob.own:
-                continue
-            arguments[knob.argument] = value if knob.say.convert is None else knob.say.convert(value, inputs)
-        try:
-            result = function(**arguments)
-        except cv2.error as error:
-            shown = ", ".join(f"{port} {describe_value(value)}" for port, value in inputs.items())
-            raise ValueError(f"cv2.{name} refuses {shown}: {_reason(error)}") from None
-        if single:
-            return _listed(result, kinds[0]) if 0 in lists else result
-        if not lists:
-            return result
-        return tuple(_listed(one, kinds[place]) if place in lists else one for place, one in enumerate(result))
-
-    return call
-
-
-def _listed(found: Any, kind: str) -> list[Any]:
-    """Make a list of what OpenCV gives as a tuple or an array; boxes are tuples."""
-    if kind in ("Sequence[Rect]", "Sequence[Point]"):
-        return [tuple(int(number) for number in one) for one in found]
-    return [int(one) for one in found] if kind == "Sequence[int]" else list(found)
-
-
-def _need_sound(node: str, inlet: _Inlet, value: Any, deadly: frozenset[tuple[str, int]]) -> None:
-    """Refuse what is of the declared type and yet harms OpenCV.
-
-    Raises:
-      ValueError: an array is empty, or a point is far outside of any picture.
-      TypeError: this kind of pixel with this number of channels ends the process.
-    """
-    for array in value if isinstance(value, list) else (value,):
-        if not isinstance(array, np.ndarray):
-            continue
-        if array.size == 0:
-            raise ValueError(f'input "{inlet.port.name}" of {node} is empty: {describe_value(array)}')
-        if inlet.is_image:
-            channels = array.shape[2] if array.ndim == 3 else 1
-            if deadly and (array.dtype.name, channels) in deadly:
-                raise TypeError(
-                    f'input "{inlet.port.name}" of {node}: {describe_value(array)} ends the process in this version of '
-                    "OpenCV; convert it first"
-                )
-        elif inlet.is_points and array.size < 100_000 and _is_far(array):
-            raise ValueError(f'input "{inlet.port.name}" of {node} has a point that is not within {_FARTHEST} pixels')
-
-
-def _is_far(points: Any) -> bool:
-    return not bool((np.abs(points.astype(np.float64)) <= _FARTHEST).all())  # NaN is far, too
-
-
-def _reason(error: cv2.error) -> str:
-    """Take places in the source and decoration off OpenCV's message."""
-    text = str(getattr(error, "err", "") or error)
-    return " ".join(text.replace("> ", " ").split()).rstrip(" .")
