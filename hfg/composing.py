@@ -26,11 +26,13 @@ def _record(*arguments: Any, **options: Any) -> Any:
     return record(*arguments, **options)
 
 
-def _distribute(graph: Graph, flat: FlatGraph, options: Mapping[str, Any], virtual: bool) -> Distribution:
+def _distribute(
+    graph: Graph, flat: FlatGraph, options: Mapping[str, Any], virtual: bool, settings: str | None
+) -> Distribution:
     """Stand behind `Composition.distribute`; who has no processes imports nothing of what they need."""
     from hfg.parts.distribution import distribute
 
-    return distribute(graph, flat, options, virtual=virtual)
+    return distribute(graph, flat, options, virtual=virtual, settings=settings)
 
 
 Composition.distribute = staticmethod(_distribute)

@@ -133,6 +133,10 @@ class Session(Protocol):
     """
 
     @property
+    def host(self) -> str:
+        """What this computer is called there; the agent of a host has the same name."""
+
+    @property
     def largest_message(self) -> int:
         """The most bytes of header and payload together."""
 

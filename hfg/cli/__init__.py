@@ -4,6 +4,8 @@
     run         hfg run TARGET      run a graph to its end
     tap         hfg tap TARGET PATH run it and print what passes a port
     top         hfg top             watch a graph that runs in another process
+    agent       hfg agent           lets this host run parts of graphs
+    runs        hfg ps, deploy, logs, restart, stop    agents and runs of a realm; deployed: the process of one
     check       hfg check TARGET    look for mistakes without running
     draw        hfg draw TARGET     show what a graph looks like
     convert     hfg convert TARGET  write it as a graph file

@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hfg.cli import check, convert, draw, info, keys, new, nodes, play, record, run, show, tap, top
+from hfg.cli import agent, check, convert, draw, info, keys, new, nodes, play, record, run, runs, show, tap, top
 from hfg.cli.interrupt import Interrupt
 from hfg.errors import FileError, HfgError, TargetError
 
@@ -39,6 +39,12 @@ app.command("record")(record.record)
 app.command("play")(play.play)
 app.command("info")(info.info)
 app.command("top")(top.top)
+app.command("agent")(agent.agent)
+app.command("deploy")(runs.deploy)
+app.command("ps")(runs.ps)
+app.command("logs")(runs.logs)
+app.command("restart")(runs.restart)
+app.command("stop")(runs.stop)
 app.add_typer(new.new, name="new")
 app.add_typer(keys.keys, name="keys")
 

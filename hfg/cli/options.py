@@ -16,6 +16,7 @@ __all__ = [
     "ClockOption",
     "DebugOption",
     "ParamOption",
+    "SettingsOption",
     "TargetArgument",
     "UntilOption",
 ]
@@ -66,6 +67,10 @@ AllowOption = Annotated[
         metavar="PACKAGE",
         help="A package whose node types a graph file may import, too; may be given several times.",
     ),
+]
+SettingsOption = Annotated[
+    str | None,
+    typer.Option(metavar="FILE", help="Settings of the realm (TOML): where agents and other hosts are found."),
 ]
 DebugOption = Annotated[
     bool, typer.Option("--debug", help="Check values against port types; show hfg's own frames in tracebacks.")

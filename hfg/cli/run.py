@@ -27,6 +27,7 @@ from hfg.cli.options import (
     ClockOption,
     DebugOption,
     ParamOption,
+    SettingsOption,
     TargetArgument,
     UntilOption,
 )
@@ -51,6 +52,7 @@ def run(
     param: ParamOption = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
+    settings: SettingsOption = None,
     policy: Annotated[str | None, typer.Option(help="Which node is next: fifo, priority, random ...")] = None,
     seed: Annotated[int | None, typer.Option(help="Of the policy random.")] = None,
     trace: Annotated[
@@ -85,7 +87,14 @@ def run(
         live_table(table and not json and clock is Clock.real) as live,
     ):
         interrupt.before_leaving.append(live.leave)
-        options = {"until_s": until, "debug": debug, "policy": policy, "seed": seed, "trace": write}
+        options = {
+            "until_s": until,
+            "debug": debug,
+            "policy": policy,
+            "seed": seed,
+            "trace": write,
+            "settings": settings,
+        }
 
         def begin(run: Run) -> None:
             output.when_broken = partial(asyncio.get_running_loop().call_soon_threadsafe, run.stop)

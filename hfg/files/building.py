@@ -49,7 +49,7 @@ from hfg.graph.structure.refusals import raise_refusals
 from hfg.graph.structure.subgraph import Subgraph, inside
 from hfg.nodetype import Node
 
-__all__ = ["box_of_file", "build", "load"]
+__all__ = ["box_of_file", "build", "load", "modules_of"]
 
 _OPTIONS: Final = tuple(name for name in NODE_OPTIONS if name != "iterate_over")
 _EDGE_OPTIONS: Final = ("active", "capacity", "overflow", "capacity_limit", "buffer")
@@ -259,6 +259,15 @@ def _nodes(box: BoxDocument, key: Key) -> Iterator[tuple[Key, NodeDocument]]:
             yield (*key, "nodes", name), node
             if node.graph is not None:
                 waiting.append(((*key, "nodes", name, "graph"), node.graph))
+
+
+def modules_of(document: Document) -> dict[str, str]:
+    """Give the modules that a graph needs for its nodes and operators, each with the first place that does."""
+    found: dict[str, str] = {}
+    for key, text, is_type in _references(document, ()):
+        if not is_type:
+            found.setdefault(text.partition(":")[0], graph_path(key).removesuffix(".type"))
+    return found
 
 
 def _references(document: Document, key: Key) -> Iterator[tuple[Key, str, bool]]:

@@ -7,6 +7,9 @@ channels      messages and tokens on a session of a transport; rings: large arra
 worker        a part that somebody else has begun; process: the process around it
 serving       what somebody outside asks of a part, from its side; asking, run: from that of the main part
 crossing      what is brought in and seen, as data; sieve: which side of an edge tells of it
+realm         agents and runs on other hosts: how they are found, and what one asks them
+agent         begins parts on its host; hosting: the processes it does that with, and what these write
+abroad        launching by agents; standing: a run that others hear of and steer
 distribution  the whole, as the main part sees it; launching: where the others are begun
 local         all parts on one event loop, without links
 """

@@ -172,7 +172,7 @@ class Carrier:
                 self._links[edge.label] = outgoing[edge.label] = _Outgoing(world, edge)
             else:
                 self._links[edge.label] = incoming[edge.label] = _Incoming(world, edge, edge.source in inheriting)
-            if shares_memory and edge.guarantee == "exact":
+            if shares_memory and edge.within_host and edge.guarantee == "exact":
                 self._links[edge.label].share(world)
         self._outgoing, self._incoming = outgoing, incoming
         part.connect(outgoing, incoming)

@@ -9,17 +9,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import os
 import sys
 import uuid
 from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from hfg.engine import Run
 from hfg.engine.face.composition import Composition
 from hfg.engine.observing.report import EdgeReport, Report
-from hfg.errors import HfgError, RunError
+from hfg.errors import HfgError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph, cut
 from hfg.logs import Log
@@ -50,9 +53,11 @@ from hfg.parts.messages import (
 )
 from hfg.parts.other import Launcher, Other
 from hfg.parts.part import Part
+from hfg.parts.realm import PartIs
 from hfg.parts.rings import sweep_run, sweep_runs
 from hfg.parts.run import Counts, CutRun
 from hfg.parts.sieve import sieve
+from hfg.parts.standing import Standing
 from hfg.parts.worker import FIRST_LIFE
 
 __all__ = ["Distribution", "distribute"]
@@ -70,7 +75,15 @@ class Distribution:
     """
 
     def __init__(
-        self, flat: FlatGraph, cutting: Cutting, text: str, options: Mapping[str, Any], launcher: Launcher
+        self,
+        flat: FlatGraph,
+        cutting: Cutting,
+        text: str,
+        options: Mapping[str, Any],
+        launcher: Launcher,
+        *,
+        modules: Mapping[str, str] | None = None,
+        name: str = "",
     ) -> None:
         """Prepare it; nothing has begun yet.
 
@@ -80,13 +93,16 @@ class Distribution:
           text: the graph, as a file would have it.
           options: of the run, for the other parts.
           launcher: begins these.
+          modules: that they will import, each with a place in the graph that needs it.
+          name: what the run is called, if somebody has given it one.
         """
         self.flat: FlatGraph = cutting.parts[MAIN]
         self._cutting = cutting
         self._text = text
         self._options = dict(options)
         self._launcher = launcher
-        self._run = f"hfg/{uuid.uuid4().hex[:12]}"
+        self._modules = dict(modules or {})
+        self._run = f"hfg/{name or uuid.uuid4().hex[:12]}"
         self._lives = dict.fromkeys(cutting.parts, FIRST_LIFE)
         self._agreement = Agreement(
             cutting.parts,
@@ -96,8 +112,9 @@ class Distribution:
         )
         self._others = {name: Other(name) for name in cutting.parts if name != MAIN}
         self._asking = Asking(flat, cutting, self._call)
-        self._run_of_all: CutRun
+        self._run_of_all: Run
         self._part: Part
+        self._standing: Standing | None = None
         self._carrier: Carrier | None = None
         self._is_open = False
         self._has_begun = False
@@ -112,9 +129,10 @@ class Distribution:
         composition.consumers.leave_out(sieve(MAIN, self._cutting.edges))
         composition.engine.callbacks.finished.append(self._ended_here)
 
-    def face(self, graph: Graph) -> CutRun:
+    def face(self, graph: Graph) -> Run:
         """Give what one can do with the whole."""
-        self._run_of_all = CutRun(graph, self._part.composition, self._asking)
+        composition = self._part.composition
+        self._run_of_all = CutRun(graph, composition, self._asking) if self._others else Run(graph, composition)
         return self._run_of_all
 
     async def open(self) -> None:
@@ -125,6 +143,9 @@ class Distribution:
         """
         self._is_open = True
         self._session = session = await self._launcher.open()
+        await self._launcher.prepare({name: self._host(name) for name in self._others}, self._modules)
+        if self._launcher.is_in_realm:
+            self._standing = Standing(session, self._run, self._run_of_all, self._parts, self._restart)
         edges = list(self._cutting.edges_of(MAIN))
         if self._launcher.shares_memory:
             sweep_runs()
@@ -145,6 +166,9 @@ class Distribution:
         for other in self._others.values():
             await other.opened
 
+    def _host(self, part: str) -> str:
+        return self._cutting.parts[part].groups[part].host
+
     def _channel_to(self, other: Other) -> Channel:
         lives = (FIRST_LIFE, self._lives[other.name])
         return Channel(self._session, self._run, MAIN, other.name, lives, partial(self._hear, other))
@@ -153,8 +177,7 @@ class Distribution:
         """Begin the process of a part and have it set up its nodes; it says when that is done."""
         name = other.name
         lives = (self._lives[name], FIRST_LIFE)
-        host = self._cutting.parts[name].groups[name].host
-        launched = await self._launcher.launch(self._run, name, host, lives)
+        launched = await self._launcher.launch(self._run, name, self._host(name), lives)
         other.live(launched, partial(self._gone, other))
         calls = self._asking.open(name)
         shares = self._launcher.shares_memory
@@ -237,7 +260,7 @@ class Distribution:
             self._part.finish("failed", error)
             self._asking.over(other.name)
             return
-        pause_s = other.deaths.died(self._loop.time())
+        pause_s = other.died()
         if pause_s is None:
             often = f"it died {LIMIT + 1} times within {WITHIN_S:g} s and is not begun again"
             self._part.finish(
@@ -248,6 +271,22 @@ class Distribution:
             return
         _LOGGER.warning('the process of group "%s" is gone: %s; another begins in %g s', other.name, how, pause_s)
         other.come_back(self._bring_back(other, pause_s))
+
+    async def _restart(self, name: str) -> None:
+        """Somebody asks for another process of a part."""
+        other = self._others.get(name)
+        if other is None:
+            there = ", ".join(f'"{one}"' for one in self._others) or "none"
+            raise UsageError(f'the run has no group "{name}" with a process of its own; it has {there}')
+        await other.restart()  # what follows is as when it dies
+
+    def _parts(self) -> list[PartIs]:
+        """Tell of all parts, the main one first."""
+        here = self._session.host
+        told = [PartIs("", here, os.getpid(), "running", 0, self._part.engine.elapsed())]
+        for name, one in self._others.items():
+            told.append(PartIs(name, self._host(name) or here, one.process, one.state, one.restarts, one.up_s))
+        return told
 
     async def _bring_back(self, other: Other, pause_s: float) -> None:
         """Begin another life of a part, while all others wait for it as they do for one that is slow (L3)."""
@@ -291,6 +330,8 @@ class Distribution:
         self._asking.close()
         if self._carrier is not None:
             await self._carrier.close()
+        if self._standing is not None:
+            self._standing.close()
         if self._launcher.shares_memory:
             sweep_run(self._run)  # of processes that were killed
         await self._launcher.close()
@@ -310,7 +351,9 @@ class Distribution:
         lost = report.lost_activity
         halves: dict[str, dict[str, EdgeReport]] = {MAIN: report.edges}
         goes_on = report.outcome == "running"
-        said: Mapping[str, Counts] = self._run_of_all.counts() if goes_on else {}
+        said: Mapping[str, Counts] = {}
+        if goes_on and isinstance(self._run_of_all, CutRun):
+            said = self._run_of_all.counts()
         for other in self._others.values():
             found = said.get(other.name) if goes_on else other.report
             if found is None:
@@ -340,24 +383,50 @@ class Distribution:
         )
 
 
-def distribute(graph: Graph, flat: FlatGraph, options: Mapping[str, Any], *, virtual: bool) -> Distribution:
-    """Prepare the run of a graph that has groups with processes.
+def distribute(
+    graph: Graph, flat: FlatGraph, options: Mapping[str, Any], *, virtual: bool, settings: str | None = None
+) -> Distribution:
+    """Prepare the run of a graph that has groups with processes, or that others are to hear of.
 
     In virtual time its parts share the loop, for the clocks of processes are real.
+
+    Args:
+      graph: that is to run.
+      flat: the same.
+      options: of the run, for the other parts.
+      virtual: whether it runs in virtual time.
+      settings: the file that says in which realm it runs; "" for the default, None for none but what its hosts need.
 
     Raises:
       FileError: it cannot be told to another process.
       TransportError: there is nothing to speak to one with.
     """
     from hfg.files import text_of
+    from hfg.files.building import modules_of
     from hfg.files.describing import describe
+    from hfg.parts.abroad import AgentLauncher, deployed_as
     from hfg.parts.launching import LoopLauncher, ProcessLauncher
 
     cutting = cut(flat)
-    if len(cutting.parts) == 1:  # groups without nodes
-        return Distribution(flat, cutting, "", options, LoopLauncher())
-    text = text_of(describe(graph, same_program=True))
-    return Distribution(flat, cutting, text, options, LoopLauncher() if virtual else ProcessLauncher())
+    launcher: Launcher
+    if virtual or (len(cutting.parts) == 1 and settings is None):  # groups without nodes
+        launcher = LoopLauncher()
+    elif settings is not None or any(flat.groups[part].host for part in cutting.parts if part != MAIN):
+        launcher = AgentLauncher(ProcessLauncher({"settings": str(Path(settings).resolve())} if settings else {}))
+    else:
+        launcher = ProcessLauncher()
+    if len(cutting.parts) == 1:
+        return Distribution(flat, cutting, "", options, launcher, name=deployed_as.get() or "")
+    document = describe(graph, same_program=True)
+    return Distribution(
+        flat,
+        cutting,
+        text_of(document),
+        options,
+        launcher,
+        modules=modules_of(document),
+        name=deployed_as.get() or "",
+    )
 
 
 def _log(part: str, logged: Logged) -> None:

@@ -14,6 +14,7 @@ import shutil
 import signal
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,7 +28,7 @@ from hfg.parts.transports import transport
 from hfg.parts.worker import Worker
 from hfg.transport import Buffer, Session
 
-__all__ = ["BEAT_S", "STARTS_S", "Begun", "LoopLauncher", "ProcessLauncher", "build_graph"]
+__all__ = ["BEAT_S", "STARTS_S", "Begun", "LoopLauncher", "PartProcess", "ProcessLauncher", "beat_of", "build_graph"]
 
 BEAT_S: Final = 0.5
 """How often a process says that its event loop goes round."""
@@ -97,6 +98,7 @@ class LoopLauncher:
     """Begins parts on the running loop, over the transport in memory: in virtual time, and to look at."""
 
     shares_memory = False
+    is_in_realm = False
 
     def __init__(self, **settings: Any) -> None:
         """Begin nothing yet.
@@ -113,6 +115,9 @@ class LoopLauncher:
         self._session = await self._transport.open(**self._settings)
         return self._session
 
+    async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
+        """See `Launcher`: all of it is here."""
+
     async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> _Task:
         """See `Launcher`."""
         session = await self._transport.open(**self._settings)
@@ -125,9 +130,10 @@ class LoopLauncher:
 
 
 class _Task:
-    """A part on the same loop."""
+    """A part on the same loop; it has no process."""
 
     def __init__(self, session: Session, worker: Worker, part: str) -> None:
+        self.process = 0
         self._session = session
         self._task = asyncio.create_task(worker.serve(), name=f"hfg part {part}")
 
@@ -160,34 +166,40 @@ class _Task:
 
 
 class ProcessLauncher:
-    """Begins parts as processes of this host."""
+    """Begins parts as processes of this host.
+
+    Args:
+      settings: of the sessions by which they meet; None: where nobody but they can meet.
+    """
 
     shares_memory = True
+    is_in_realm = False
 
-    def __init__(self) -> None:
-        """Begin nothing yet."""
+    def __init__(self, settings: dict[str, Any] | None = None) -> None:
         self._transport = transport("zenoh")
+        self._said = settings
         self._folder: Path | None = None
         self._session: Session | None = None
 
     async def open(self) -> Session:
         """See `Launcher`: nobody but this user reaches the socket at which the parts meet."""
-        self._folder = Path(tempfile.mkdtemp(prefix="hfg-"))
+        if self._said is None:
+            self._folder = Path(tempfile.mkdtemp(prefix="hfg-"))
         self._session = await self._transport.open(**self._settings)
         return self._session
 
     @property
     def _settings(self) -> dict[str, Any]:
+        if self._said is not None:
+            return self._said
         assert self._folder is not None
         return {"realm": self._folder.name, "meet": [f"unixsock-stream/{self._folder}/meet"]}
 
-    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> _Process:
+    async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
+        """See `Launcher`: what is here can be imported here."""
+
+    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> PartProcess:
         """See `Launcher`."""
-        if host:
-            raise UsageError(
-                f'group "{part}" is for host "{host}", and nobody here knows its agent: run "hfg agent" there and '
-                "`hfg deploy` the graph"
-            )
         assert self._session is not None
         begun = Begun(
             run,
@@ -200,11 +212,11 @@ class ProcessLauncher:
             _targets(),
             sys.path,
             parent=os.getpid(),
-            folder=str(self._folder),
-            beat=f"{run}/beat/{name_of(part)}/{lives[0]}",
+            folder="" if self._folder is None else str(self._folder),
+            beat=beat_of(run, part, lives[0]),
             level=logging.getLogger("hfg").getEffectiveLevel(),
         )
-        process = await _Process.begin(part, begun)
+        process = await PartProcess.begin(part, begun)
         process.watch(self._session, begun.beat)
         return process
 
@@ -214,6 +226,11 @@ class ProcessLauncher:
             await self._session.close()
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def beat_of(run: str, part: str, life: int) -> str:
+    """Give the key on which a process says that its event loop goes round."""
+    return f"{run}/beat/{name_of(part)}/{life}"
 
 
 def _patience_s() -> float:
@@ -240,11 +257,18 @@ def _targets() -> dict[str, str]:
     return {name: module.__file__ for name, module in found.items() if module.__file__ is not None}
 
 
-class _Process:
-    """A part in a process of its own."""
+class PartProcess:
+    """A part in a process of its own; also the main part, where an agent runs it.
+
+    Attributes:
+      process: its id.
+      output: what it writes, where somebody has asked for it.
+    """
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
-        self.process = process
+        self.process = process.pid
+        self.output = process.stdout
+        self._process = process
         self._ended = asyncio.ensure_future(process.wait())
         self._patience_s = STARTS_S
         self._silent_s = 0.0
@@ -276,12 +300,20 @@ class _Process:
             if self._silent_s > self._patience_s:
                 self._why_killed = f", for its event loop has not gone round for {self._silent_s:g} s"
                 with contextlib.suppress(ProcessLookupError):
-                    self.process.kill()
+                    self._process.kill()
                 return
 
     @classmethod
-    async def begin(cls, part: str, begun: Begun) -> _Process:
-        """Begin it; its output goes where that of this process goes.
+    async def begin(
+        cls, part: str, begun: msgspec.Struct, *, module: str = "hfg.parts.process", keeps_output: bool = False
+    ) -> PartProcess:
+        """Begin it.
+
+        Args:
+          part: the name of its group, which a list of processes shows.
+          begun: what it is told on its standard input, which stays open.
+          module: what it runs.
+          keeps_output: what it writes is to be read from `output`; else it goes where that of this process goes.
 
         Raises:
           TransportError: it cannot be begun.
@@ -290,9 +322,11 @@ class _Process:
             process = await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-m",
-                "hfg.parts.process",
+                module,
                 part,
                 stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE if keeps_output else None,
+                stderr=asyncio.subprocess.STDOUT if keeps_output else None,
                 process_group=0,  # Ctrl-C is for the main program, which ends this one
             )
         except OSError as error:
@@ -308,16 +342,16 @@ class _Process:
         code = await asyncio.shield(self._ended)
         if code < 0:
             with contextlib.suppress(ValueError):
-                return f"process {self.process.pid} was ended by {signal.Signals(-code).name}{self._why_killed}"
-        return f"process {self.process.pid} has ended with code {code}"
+                return f"process {self.process} was ended by {signal.Signals(-code).name}{self._why_killed}"
+        return f"process {self.process} has ended with code {code}"
 
     async def end(self) -> None:
         """See `Launched`: it goes by itself, or is made to."""
-        assert self.process.stdin is not None
+        assert self._process.stdin is not None
         if self._listening is not None:
             self._listening.cancel()
-        self.process.stdin.close()
-        for how in (None, self.process.terminate, self.process.kill):
+        self._process.stdin.close()
+        for how in (None, self._process.terminate, self._process.kill):
             if how is not None and not self._ended.done():
                 with contextlib.suppress(ProcessLookupError):
                     how()

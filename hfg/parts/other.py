@@ -6,10 +6,10 @@ Whoever can begin processes, here or on other hosts, is a `Launcher`. Stands on 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, Protocol
 
-from hfg.errors import HfgError
+from hfg.errors import HfgError, UsageError
 from hfg.parts.channels import Channel
 from hfg.parts.lives import Deaths
 from hfg.parts.messages import Begin, Closed, Message
@@ -19,7 +19,13 @@ __all__ = ["Launched", "Launcher", "Other"]
 
 
 class Launched(Protocol):
-    """One other part, wherever it runs."""
+    """One other part, wherever it runs.
+
+    Attributes:
+      process: the id of its process; 0 if it has none.
+    """
+
+    process: int
 
     async def wait(self) -> str:
         """Wait until it is gone; give a sentence about how, as in 'process 1234 was killed by SIGKILL'."""
@@ -35,13 +41,26 @@ class Launcher(Protocol):
     """Begins the other parts, and gives the session over which they are spoken to.
 
     Attributes:
-      shares_memory: whether large arrays between parts may go through shared memory.
+      shares_memory: whether large arrays between parts of one host may go through shared memory.
+      is_in_realm: whether others can hear of the run on that session, and steer it.
     """
 
     shares_memory: bool
+    is_in_realm: bool
 
     async def open(self) -> Session:
         """Give the session of the main part."""
+
+    async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
+        """See whether all that will be needed is there; nothing has been begun yet.
+
+        Args:
+          hosts: where each part is to be; "" is here.
+          modules: that will be imported there, each with a place in the graph that needs it.
+
+        Raises:
+          TransportError: something is not.
+        """
 
     async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Launched:
         """Begin a part, which then serves (see `worker`).
@@ -69,6 +88,8 @@ class Other:
       closed: done when it has reported, or is gone.
       report: what it has said at the end.
       deaths: of its processes.
+      state: "starting", "running", or "returning": it is gone, and begins anew.
+      restarts: how often it has begun anew.
       is_told: there is a process that hears what is said, and knows of other parts what was true when it began.
     """
 
@@ -79,6 +100,10 @@ class Other:
         self.closed: asyncio.Future[None]
         self.report: Closed | None = None
         self.deaths = Deaths()
+        self.state = "starting"
+        self.restarts = 0
+        self._since = 0.0
+        self._is_restarted = False
         self.is_told = False
         self._returning: asyncio.Task[None] | None = None
         self._channel: Channel
@@ -96,6 +121,7 @@ class Other:
     def live(self, launched: Launched, gone: Callable[[str], None]) -> None:
         """Something runs it from now on; `gone` is told when that is gone without having been asked to leave."""
         self._launched = launched
+        self._since = asyncio.get_running_loop().time()
 
         async def watch() -> None:
             how = await launched.wait()
@@ -104,6 +130,7 @@ class Other:
                 self.closed.set_result(None)
             if not self._leaves:
                 self.is_told = False
+                self.state = "returning"
                 gone(how)
 
         self._watching = asyncio.create_task(watch(), name=f"hfg process of {self.name}")
@@ -113,6 +140,33 @@ class Other:
     def is_there(self) -> bool:
         """Whether it was begun, and is not gone."""
         return self._launched is not None and not self._gone
+
+    @property
+    def process(self) -> int:
+        """The id of its process; 0 if it has none."""
+        return 0 if self._launched is None else self._launched.process
+
+    @property
+    def up_s(self) -> float:
+        """For how long that is there."""
+        return asyncio.get_running_loop().time() - self._since if self.process else 0.0
+
+    def died(self) -> float | None:
+        """It is gone; gives for how long to wait until it begins anew, or None: it does not any more."""
+        asked, self._is_restarted = self._is_restarted, False
+        return 0.0 if asked else self.deaths.died(asyncio.get_running_loop().time())
+
+    async def restart(self) -> None:
+        """End its process, as somebody has asked: that is no death, but else all follows from it.
+
+        Raises:
+          UsageError: it does not run.
+        """
+        if self._launched is None or self.state != "running":
+            raise UsageError(f'the process of group "{self.name}" is {self.state}: nothing is to be restarted')
+        self._is_restarted = True
+        self.state = "returning"
+        await self._launched.end()
 
     def let_go(self) -> None:
         """Its nodes are set up: they begin."""
@@ -128,6 +182,8 @@ class Other:
         """It is set up, or will not be."""
         if not self.opened.done():
             if error is None:
+                self.restarts += self.state == "returning"
+                self.state = "running"
                 self.opened.set_result(None)
             else:
                 self.opened.set_exception(error)

@@ -92,9 +92,9 @@ class Network:
         """Those that are open, in the order in which they were opened."""
         return tuple(self._sessions)
 
-    async def open(self) -> MemorySession:
-        """Begin a session on the running loop."""
-        session = MemorySession(self, asyncio.get_running_loop())
+    async def open(self, *, host: str = "here") -> MemorySession:
+        """Begin a session on the running loop, of a program on that host."""
+        session = MemorySession(self, asyncio.get_running_loop(), host)
         with self._lock:
             self._sessions.append(session)
         return session
@@ -234,8 +234,9 @@ _NONE: Final = Faults()
 class MemorySession:
     """One program's end of a network."""
 
-    def __init__(self, network: Network, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, network: Network, loop: asyncio.AbstractEventLoop, host: str) -> None:
         self.network = network
+        self.host = host
         self.is_cut = False
         self._loop = loop
         self._thread = threading.get_ident()
@@ -542,9 +543,9 @@ class _Memory:
         """Give the network of a name, to set its faults and to cut sessions off."""
         return self._networks.setdefault(name, Network())
 
-    async def open(self, *, network: Network | str = "default") -> MemorySession:
+    async def open(self, *, network: Network | str = "default", host: str = "here") -> MemorySession:
         """Begin a session on a network, or on that of a name."""
-        return await (self.network(network) if isinstance(network, str) else network).open()
+        return await (self.network(network) if isinstance(network, str) else network).open(host=host)
 
 
 transport: Final = _Memory()

@@ -66,7 +66,9 @@ class Composition:
       outputs: what came out of the graph's own outputs, where nobody reads them.
     """
 
-    distribute: ClassVar[Callable[[Graph, FlatGraph, Mapping[str, Any], bool], Others]]  # see `hfg.composing`
+    distribute: ClassVar[
+        Callable[[Graph, FlatGraph, Mapping[str, Any], bool, str | None], Others]
+    ]  # see `hfg.composing`
 
     def __init__(self, flat: FlatGraph, settings: Settings, others: Others | None = None) -> None:
         self.others = others

@@ -85,6 +85,11 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
                 'write clock="real"'
             )
         settings.watch = False
+        if settings.settings is not None:
+            raise UsageError(
+                "settings= needs the real clock: in virtual time all parts of a graph share one loop; leave settings= "
+                'out, or write clock="real"'
+            )
     flat = flatten(graph)
     _need_use_of_seed(flat, settings)
     problems = check_flat(flat)
@@ -96,9 +101,9 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
     if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
         _refuse_endless(flat)
     others = None
-    if any(group.process for group in flat.groups.values()):
+    if settings.settings is not None or any(group.process for group in flat.groups.values()):
         said = {name: getattr(settings, name) for name in ("debug", "policy", "seed", "fast", "block_warning_s")}
-        others = Composition.distribute(graph, flat, said, isinstance(loop, VirtualTimeLoop))
+        others = Composition.distribute(graph, flat, said, isinstance(loop, VirtualTimeLoop), settings.settings)
     parts = Composition(flat if others is None else others.flat, settings, others)
     run: Run = Run(graph, parts) if others is None else others.face(graph)
     level.whole.begin_run(run)
@@ -216,6 +221,7 @@ def run(
       fast: fuse plain nodes and take fast paths; outcomes do not differ.
       watch: let `hfg top` and `hfg tap` in other processes of the same user look at it, on the real clock; a text is
         what they show as the program. By default if the environment has HFG_WATCH=1.
+      settings: the file that says in which realm agents are found, and who else there hears of the run.
 
     Returns:
       How it went; `outcome` is "done", "stopped" or "until".

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import TypedDict
 
 from hfg.errors import UsageError
@@ -28,6 +29,7 @@ class RunOptions(TypedDict, total=False):
     block_warning_s: float
     fast: bool
     watch: bool | str | None
+    settings: str | Path | None
 
 
 class Settings:
@@ -49,6 +51,7 @@ class Settings:
         allow_idle: bool = False,
         block_warning_s: float = 0.1,
         watch: bool | str | None = None,
+        settings: str | Path | None = None,
     ) -> None:
         if until_s is not None and not _seconds(until_s):
             raise UsageError(f"until_s must be seconds from 0 on, or None for no end, got {until_s!r}")
@@ -61,6 +64,8 @@ class Settings:
             raise UsageError(f"seed must be a whole number, got {seed!r}")
         if not _may_be_watched(watch):
             raise UsageError(f"watch must be True or False, or what hfg top shows as the program, got {watch!r}")
+        if settings is not None and not isinstance(settings, str | Path):
+            raise UsageError(f'settings must be the file of a realm, as in settings="cell.toml", got {settings!r:.80}')
         self.debug = debug
         self.check_all = CHECK_ALL
         self.policy = policy
@@ -73,6 +78,7 @@ class Settings:
         self.block_warning_s = block_warning_s
         self.watch = _watch_asked() if watch is None else watch
         self.watch_said = watch is not None
+        self.settings = None if settings is None else str(settings)
         self.teardown_limit_s = 5.0  # X3
 
 

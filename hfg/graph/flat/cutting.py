@@ -36,6 +36,7 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
       guarantee: "exact" for whatever may lose nothing, "bounded" for signals with a policy that drops.
       window: the most tokens that may be under way, for what may lose nothing.
       hint: the declared type of what it carries.
+      within_host: whether both ends are on one host.
     """
 
     label: str
@@ -45,6 +46,7 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
     guarantee: Literal["exact", "bounded"]
     window: int
     hint: Any
+    within_host: bool = True
 
 
 class Cutting(msgspec.Struct, frozen=True, eq=False):
@@ -151,6 +153,9 @@ class _Cutter:
     def _gate_home(self, end: int) -> str | None:
         return self.home[end] if end >= 0 else self.scope_home[scope_end(end)]
 
+    def _host(self, part: str) -> str:
+        return self.flat.groups[part].host if part != MAIN else ""
+
     def _name(self, end: int) -> str:
         return self.flat.nodes[end].path if end >= 0 else self.flat.scopes[scope_end(end)].path
 
@@ -184,7 +189,9 @@ class _Cutter:
             buffer = edge.buffer or DEFAULT_WINDOW
         window = edge.capacity if edge.is_event_edge else buffer + 1
         hint = edge.source.port.type if edge.source.kind != "observable" else edge.target.port.type
-        crossing = CutEdge(edge.label, edge, source, target, "bounded" if drops else "exact", window, hint)
+        guarantee: Literal["exact", "bounded"] = "bounded" if drops else "exact"
+        within_host = self._host(source) == self._host(target)
+        crossing = CutEdge(edge.label, edge, source, target, guarantee, window, hint, within_host)
         self.edges.append(crossing)
         outside = End(LINK, "input", edge.label, edge.target.port)
         made[source].add(edge, edge.source, outside, initial=(), buffer=buffer)

@@ -150,6 +150,11 @@ class ZenohSession:
     # --- what it says of itself ---
 
     @property
+    def host(self) -> str:
+        """What this computer is called, as the settings say."""
+        return self.settings.host
+
+    @property
     def largest_message(self) -> int:
         """The most bytes of header and payload together."""
         return self.settings.largest_message

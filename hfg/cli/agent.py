@@ -1,0 +1,83 @@
+"""`hfg agent`: lets this host run parts of graphs, until it is ended. Stands on `hfg.parts.agent` and `hosting`."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from hfg.cli import show
+from hfg.cli.options import SettingsOption
+from hfg.parts.agent import Agent
+from hfg.parts.hosting import Computer, Journal, logs_folder
+from hfg.parts.rings import sweep_runs
+from hfg.parts.transports import transport
+
+__all__ = ["agent", "session_settings"]
+
+_ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+def session_settings(settings: str | None) -> dict[str, Any]:
+    """Give what opens a session in the realm of a file, or in the default one."""
+    return {"settings": str(Path(settings).resolve())} if settings else {}
+
+
+def agent(
+    settings: SettingsOption = None,
+    verbose: Annotated[int, typer.Option("-v", "--verbose", count=True, help="Tell of each part.")] = 0,
+) -> int:
+    """Let this host run parts of graphs, as processes, until Ctrl-C; modules are found from the working directory."""
+    show.Records(max(verbose, 0), debug=False).loaded()
+    return asyncio.run(_serve(session_settings(settings), Path.cwd()))
+
+
+async def _serve(settings: dict[str, Any], folder: Path) -> int:
+    sweep_runs()
+    session = await transport("zenoh").open(mode="router", **settings)
+    try:
+        journal = Journal(logs_folder(), session.host)
+        journal.open()
+        one = Agent(session, Computer(session, settings, journal, folder))
+        with _ending() as ended:
+            try:
+                await one.open()
+                sys.stdout.write(f'agent of host "{session.host}" is ready, process {os.getpid()}\n')
+                sys.stdout.flush()
+                await ended.wait()
+            finally:
+                await one.close()
+    finally:
+        await session.close()
+    return 0
+
+
+@contextmanager
+def _ending() -> Iterator[asyncio.Event]:
+    """Be told by Ctrl-C and its like; the second one leaves at once, and what was begun ends by itself."""
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+
+    def press() -> None:
+        if ended.is_set():
+            os._exit(1)
+        ended.set()
+
+    taken = []
+    for one in _ENDING:
+        if signal.getsignal(one) is not signal.SIG_IGN:  # as nohup has it
+            with contextlib.suppress(NotImplementedError, RuntimeError):
+                loop.add_signal_handler(one, press)
+                taken.append(one)
+    try:
+        yield ended
+    finally:
+        for one in taken:
+            loop.remove_signal_handler(one)

@@ -1,0 +1,314 @@
+"""`hfg ps`, `hfg deploy`, `hfg logs`, `hfg restart` and `hfg stop`: agents and runs of a realm, from any of its hosts.
+
+Stands on `hfg.parts.realm`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+import uuid
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from hfg.cli import show
+from hfg.cli.agent import session_settings
+from hfg.cli.options import AllowOption, ArgOption, ParamOption, SettingsOption, TargetArgument, UntilOption
+from hfg.errors import HfgError, NoAnswer, QueryRefused, TargetError, TransportError
+from hfg.parts.realm import (
+    FINDS_S,
+    AgentIs,
+    Chunk,
+    Deploy,
+    Done,
+    End,
+    Gone,
+    PartIs,
+    Parts,
+    PartsAre,
+    ReadLog,
+    Realm,
+    Restart,
+    RunIs,
+    Started,
+    Stop,
+    Wait,
+    agent_place,
+    ask,
+    run_place,
+)
+from hfg.parts.transports import transport
+
+__all__ = ["deploy", "logs", "ps", "restart", "stop"]
+
+_SETTLES_S: Final = 0.3  # who is there is told within this, once somebody is
+_LOOKS_AGAIN_S: Final = 0.5
+_BEGINS_S: Final = 60.0
+_ENDS_S: Final = 15.0
+_FIRST_LIFE: Final = 1
+
+RunArgument = Annotated[
+    str, typer.Argument(metavar="RUN", help="its name or the beginning of it, or that of its graph")
+]
+
+
+# --- the verbs ---
+
+
+def ps(
+    settings: SettingsOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Write agents and runs as JSON.")] = False,
+) -> int:
+    """List agents, runs and their parts in the realm."""
+    return asyncio.run(_ps(settings, json))
+
+
+def deploy(
+    target: TargetArgument,
+    settings: SettingsOption = None,
+    on: Annotated[
+        str | None, typer.Option("--on", metavar="HOST", help="Whose agent runs the main part; else that of here.")
+    ] = None,
+    until: UntilOption = None,
+    param: ParamOption = None,
+    arg: ArgOption = None,
+    allow: AllowOption = None,
+) -> int:
+    """Let an agent run a graph, which goes on when this terminal is closed."""
+    arguments = [] if until is None else ["--until", f"{until!r}"]
+    for name, values in (("--param", param), ("--arg", arg), ("--allow", allow)):
+        for value in values or ():
+            arguments += [name, value]
+    return asyncio.run(_deploy(settings, target, on, arguments))
+
+
+def logs(
+    run: RunArgument,
+    settings: SettingsOption = None,
+    follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on until the run is over.")] = False,
+) -> int:
+    """Print what the parts of a run have written on the hosts of agents."""
+    try:
+        return asyncio.run(_logs(settings, run, follow))
+    except KeyboardInterrupt:  # how one leaves it
+        return 0
+
+
+def stop(run: RunArgument, settings: SettingsOption = None) -> int:
+    """End a run well, whatever host it is on."""
+    return asyncio.run(_stop(settings, run))
+
+
+def restart(
+    part: Annotated[str, typer.Argument(metavar="RUN/GROUP", help="a group of a run, which has a process of its own")],
+    settings: SettingsOption = None,
+) -> int:
+    """End the process of one group and begin another, while the rest of the run waits."""
+    run, slash, group = part.partition("/")
+    if not slash or not run or not group:
+        raise TargetError(f'"{part}" names no group of a run: write RUN/GROUP, as hfg ps shows them')
+    return asyncio.run(_restart(settings, run, group))
+
+
+# --- who is there ---
+
+
+@asynccontextmanager
+async def _realm(settings: str | None) -> AsyncIterator[Realm]:
+    session = await transport("zenoh").open(**session_settings(settings))
+    try:
+        realm = Realm(session)
+        await realm.until(lambda: realm.agents or realm.runs, FINDS_S)
+        await asyncio.sleep(_SETTLES_S if realm.agents or realm.runs else 0.0)
+        yield realm
+    finally:
+        await session.close()
+
+
+def _find(realm: Realm, name: str) -> RunIs:
+    """Find a run by what the user calls it.
+
+    Raises:
+      TargetError: there is none, or more than one.
+    """
+    found = [one for one in realm.runs.values() if one.run == name]
+    found = found or [one for one in realm.runs.values() if one.run.startswith(name) or one.graph == name]
+    if len(found) == 1:
+        return found[0]
+    there = ", ".join(f'{one.run} ("{one.graph}" on "{one.host}")' for one in found or realm.runs.values())
+    if found:
+        raise TargetError(f'"{name}" is {len(found)} runs: name one of {there}')
+    raise TargetError(
+        f'no run "{name}" is in the realm; there is {there}'
+        if there
+        else f'no run "{name}" is in the realm, nor any other: hfg deploy begins one, or hfg run with --settings'
+    )
+
+
+async def _parts(realm: Realm, run: RunIs) -> list[PartIs]:
+    try:
+        return (await ask(realm.session, run_place(run.run), Parts(), PartsAre)).parts
+    except TransportError:
+        return [PartIs("", run.host, run.process, "does not answer", 0, 0.0)]
+
+
+async def _ps(settings: str | None, json: bool) -> int:
+    async with _realm(settings) as realm:
+        agents = sorted(realm.agents.values(), key=lambda one: one.host)
+        runs = sorted(realm.runs.values(), key=lambda one: (one.graph, one.run))
+        parts = await asyncio.gather(*(_parts(realm, run) for run in runs))
+    if json:
+        told = [{**_plain(run), "parts": [_plain(part) for part in of]} for run, of in zip(runs, parts, strict=True)]
+        show.json({"agents": [_plain(agent) for agent in agents], "runs": told})
+        return 0
+    if not agents and not runs:
+        show.sentence("nobody is in the realm: hfg agent begins an agent")
+        return 0
+    show.table("agents", ("host", "process", "hfg", "python"), [(a.host, a.process, a.hfg, a.python) for a in agents])
+    rows = [
+        (run.run, run.graph, part.group or "(main)", part.host, part.process, part.state, part.restarts, _time(part))
+        for run, of in zip(runs, parts, strict=True)
+        for part in of
+    ]
+    if rows:
+        show.table("runs", ("run", "graph", "group", "host", "process", "state", "restarts", "up"), rows)
+    return 0
+
+
+def _plain(one: Any) -> dict[str, Any]:
+    return {name: getattr(one, name) for name in one.__struct_fields__}
+
+
+def _time(part: PartIs) -> str:
+    minutes, seconds = divmod(int(part.up_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}"
+
+
+# --- beginning ---
+
+
+async def _deploy(settings: str | None, target: str, on: str | None, arguments: Sequence[str]) -> int:
+    async with _realm(settings) as realm:
+        here = realm.session.host
+        host = on or here
+        agent = await realm.agent(host)
+        run = uuid.uuid4().hex[:12]
+        folder = str(Path.cwd()) if host == here else ""
+        order = Deploy(f"hfg/{run}", target, list(arguments), folder)
+        await _ask_agent(realm, agent, order, Started)
+        gone = asyncio.ensure_future(_gone(realm, agent, order.run))
+        begun = asyncio.ensure_future(realm.until(lambda: run_place(run) in realm.runs, _BEGINS_S))
+        await asyncio.wait({gone, begun}, return_when=asyncio.FIRST_COMPLETED)
+        is_there = run_place(run) in realm.runs
+        for waiting in (gone, begun):
+            waiting.cancel()
+        if not is_there:
+            told = await _ask_agent(realm, agent, ReadLog(order.run, 0), Chunk)
+            sys.stderr.write(told.text)
+            if gone.done() and not gone.cancelled() and not gone.result():
+                return 0  # it was over before anybody could look
+            show.sentence(f'{target} has not begun on host "{host}"; what it wrote is above')
+            return 1
+    sys.stdout.write(f"{run}\n")
+    show.sentence(f'{target} runs on host "{host}": hfg logs {run}, hfg ps, hfg stop {run}')
+    return 0
+
+
+async def _gone(realm: Realm, agent: AgentIs, run: str) -> bool:
+    """Wait until the main part of a run is gone; gives whether it has failed."""
+    while True:
+        with contextlib.suppress(NoAnswer):
+            told = await _ask_agent(realm, agent, Wait(run, "", _FIRST_LIFE), Gone, timeout_s=20.0)
+            if told.how:
+                return "ended with code 0" not in told.how
+        await asyncio.sleep(_LOOKS_AGAIN_S)
+
+
+async def _ask_agent(realm: Realm, agent: AgentIs, request: Any, answer: Any, *, timeout_s: float = 10.0) -> Any:
+    try:
+        return await ask(realm.session, agent_place(agent), request, answer, timeout_s=timeout_s)
+    except QueryRefused as error:
+        raise TransportError(f'the agent of host "{agent.host}" refuses: {error}') from None
+
+
+# --- looking and steering ---
+
+
+async def _logs(settings: str | None, name: str, follow: bool) -> int:
+    async with _realm(settings) as realm:
+        known = {one.run for one in realm.runs.values()}
+        is_hex = len(name) == 12 and all(char in "0123456789abcdef" for char in name)
+        run = name if is_hex and name not in known else _find(realm, name).run  # one that is over has its log still
+        offsets: dict[str, int] = {}
+        seen = False
+        while True:
+            is_over = run_place(run) not in realm.runs
+            new: list[str] = []
+            for place, agent in sorted(realm.agents.items(), key=lambda item: item[1].host):
+                new += await _read_all(realm, place, agent, run, offsets)
+            seen = seen or bool(new)
+            sys.stdout.write("".join(sorted(new, key=_time_of)))
+            sys.stdout.flush()
+            if not follow or is_over:
+                break
+            await asyncio.sleep(_LOOKS_AGAIN_S)
+    if not seen:
+        show.sentence(f'no agent has anything that run "{run}" has written')
+    return 0
+
+
+def _time_of(line: str) -> str:
+    return line[:19]
+
+
+async def _read_all(realm: Realm, place: str, agent: AgentIs, run: str, offsets: dict[str, int]) -> list[str]:
+    """What is new on one host, each line with its name behind the time."""
+    lines: list[str] = []
+    while True:
+        try:
+            told: Chunk = await ask(realm.session, place, ReadLog(run, offsets.get(place, 0)), Chunk)
+        except TransportError:
+            return lines
+        offsets[place] = told.offset
+        if not told.text:
+            return lines
+        lines += [f"{line[:19]} {agent.host}{line[19:]}\n" for line in told.text.splitlines()]
+
+
+async def _stop(settings: str | None, name: str) -> int:
+    async with _realm(settings) as realm:
+        run = _find(realm, name)
+        place = run_place(run.run)
+        try:
+            await ask(realm.session, place, Stop(), Done)
+            if await realm.until(lambda: place not in realm.runs, _ENDS_S):
+                return 0
+        except NoAnswer:
+            pass
+        for agent in realm.of(run.host):  # its main part does not answer: whoever has begun it ends it
+            with contextlib.suppress(HfgError):
+                await _ask_agent(realm, agent, End(f"hfg/{run.run}", "", _FIRST_LIFE), Done, timeout_s=_ENDS_S)
+        if await realm.until(lambda: place not in realm.runs, FINDS_S):
+            show.sentence(f"run {run.run} did not answer; its process was ended")
+            return 1
+        show.sentence(
+            f'run {run.run} does not answer, and no agent has begun it: end process {run.process} on host "{run.host}"'
+        )
+        return 1
+
+
+async def _restart(settings: str | None, name: str, group: str) -> int:
+    async with _realm(settings) as realm:
+        run = _find(realm, name)
+        try:
+            await ask(realm.session, run_place(run.run), Restart(group), Done, timeout_s=_ENDS_S)
+        except QueryRefused as error:
+            raise TargetError(str(error)) from None
+        show.sentence(f'group "{group}" of run {run.run} begins anew')
+    return 0

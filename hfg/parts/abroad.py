@@ -1,0 +1,223 @@
+"""Parts on other hosts: agents are found, asked whether all is there, and asked to begin them (rules L1, L3).
+
+Parts without a host begin here, as processes that meet in the same realm. When a connection is away nothing follows
+for a while; the links wait. When the agent is gone so are its parts; they begin anew as soon as it is there again, and
+until then everybody waits for them as for a part that is slow. Stands on `realm` and `launching`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import sys
+from collections.abc import Mapping
+from contextvars import ContextVar
+from typing import Any, Final, TypeVar
+
+from hfg.errors import HfgError, NoAnswer, QueryRefused, TransportError
+from hfg.logs import Log
+from hfg.parts.agent import WAITS_S
+from hfg.parts.other import Launched, Launcher
+from hfg.parts.realm import (
+    FINDS_S,
+    GONE_S,
+    AgentIs,
+    Begins,
+    Check,
+    Done,
+    End,
+    Gone,
+    Missing,
+    Realm,
+    Start,
+    Started,
+    Wait,
+    agent_place,
+    ask,
+    myself,
+    named,
+)
+from hfg.transport import Session
+
+__all__ = ["AgentLauncher", "deployed_as"]
+
+_LOGGER = Log("hfg.parts")
+_STARTS_S: Final = 20.0  # an agent may have to end a former life first
+_ENDS_S: Final = 8.0
+_AGAIN_S: Final = 0.2
+_FIRST_LIFE: Final = 1
+
+_T = TypeVar("_T")
+
+deployed_as: ContextVar[str | None] = ContextVar("hfg.parts.deployed_as", default=None)
+"""What the run of this process is called, if an agent has begun it."""
+
+
+class AgentLauncher:
+    """Begins parts by the agents of their hosts.
+
+    Args:
+      here: begins those without a host, and opens the session.
+    """
+
+    shares_memory: bool
+    is_in_realm = True
+
+    def __init__(self, here: Launcher) -> None:
+        self.shares_memory = here.shares_memory
+        self._here = here
+        self._session: Session | None = None
+        self._realm: Realm | None = None
+
+    async def open(self) -> Session:
+        """See `Launcher`."""
+        self._session = session = await self._here.open()
+        self._realm = Realm(session)
+        return session
+
+    async def close(self) -> None:
+        """See `Launcher`."""
+        if self._realm is not None:
+            self._realm.close()
+        await self._here.close()
+
+    # --- before anything begins -------------------------------------------------------------------------------------
+
+    async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
+        """See `Launcher`: all agents are asked at once, and all that is wrong is told."""
+        abroad = sorted({host for host in hosts.values() if host})
+        if not abroad:
+            return
+        own = {module: path for module, path in modules.items() if _is_of_the_program(module)}
+        found = await asyncio.gather(*(self._wrong_with(host, modules, own) for host in abroad))
+        wrong = [sentence for sentences in found for sentence in sentences]
+        if wrong:
+            raise TransportError("; and ".join(wrong))
+
+    async def _wrong_with(self, host: str, modules: Mapping[str, str], own: Mapping[str, str]) -> list[str]:
+        assert self._realm is not None
+        try:
+            agent = await self._realm.agent(host)
+            if wrong := _versions(agent, myself("")):
+                return [wrong]
+            if own:
+                module, path = next(iter(own.items()))
+                return [
+                    f'host "{host}" cannot import the type of "{path}", which is in the program itself '
+                    f"({_in_words(module)}): move the node types into a module, and have that on all hosts"
+                ]
+            there = await self._ask(agent, Check(sorted(modules)), Missing)
+        except HfgError as error:
+            return [str(error)]
+        if not there.modules:
+            return []
+        first = there.modules[0]
+        return [
+            f'host "{host}" has no module {named(there.modules)}, which "{modules[first]}" needs: install it for '
+            f"the Python of its agent, or put {first.replace('.', '/')}.py into {there.folder} there, where the agent "
+            "was begun"
+        ]
+
+    # --- a part -----------------------------------------------------------------------------------------------------
+
+    async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Launched:
+        """See `Launcher`: a first life needs the agent to be there, any other waits for it."""
+        if not host:
+            return await self._here.launch(run, part, host, lives)
+        assert self._realm is not None
+        order = Start(run, part, lives, sys.argv, logging.getLogger("hfg").getEffectiveLevel())
+        is_first = lives[0] == _FIRST_LIFE
+        while True:
+            agent = await self._agent(part, host, FINDS_S if is_first else None)
+            try:
+                started = await self._ask(agent, order, Started, timeout_s=_STARTS_S)
+            except NoAnswer:
+                if is_first:
+                    raise
+                await asyncio.sleep(_AGAIN_S)  # it has gone just now, which is about to be told
+                continue
+            return _Abroad(self, agent, order, started.process)
+
+    async def _agent(self, part: str, host: str, within_s: float | None) -> AgentIs:
+        assert self._realm is not None
+        if within_s is None and not self._realm.of(host):
+            _LOGGER.warning('group "%s" waits for the agent of host "%s" to be there again', part, host)
+        return await self._realm.agent(host, within_s)
+
+    def replaced(self, agent: AgentIs) -> bool:
+        """Say whether another life of an agent is there."""
+        assert self._realm is not None
+        return any(one.incarnation != agent.incarnation for one in self._realm.of(agent.host))
+
+    async def _ask(self, agent: AgentIs, request: Any, answer: type[_T], *, timeout_s: float = 5.0) -> _T:
+        assert self._session is not None
+        try:
+            return await ask(self._session, agent_place(agent), request, answer, timeout_s=timeout_s)
+        except NoAnswer:
+            raise NoAnswer(f'the agent of host "{agent.host}" does not answer; is it being ended?') from None
+        except QueryRefused as error:
+            raise TransportError(f'the agent of host "{agent.host}" refuses: {error}') from None
+
+    ask = _ask
+
+
+class _Abroad:
+    """A part that an agent has begun."""
+
+    def __init__(self, launcher: AgentLauncher, agent: AgentIs, order: Start, process: int) -> None:
+        self.process = process
+        self._launcher = launcher
+        self._agent = agent
+        self._which = (order.run, order.part, order.lives[0])
+        self._telling: asyncio.Task[Done] | None = None
+
+    async def wait(self) -> str:
+        """See `Launched`: the agent is asked again and again, until it says how it has ended or is itself gone."""
+        loop = asyncio.get_running_loop()
+        silent_since: float | None = None
+        while True:
+            try:
+                told = await self._launcher.ask(self._agent, Wait(*self._which), Gone, timeout_s=WAITS_S + FINDS_S)
+            except TransportError:
+                silent_since = loop.time() if silent_since is None else silent_since
+                if self._launcher.replaced(self._agent) or loop.time() - silent_since > GONE_S:
+                    return f'the agent of host "{self._agent.host}" is gone'
+                await asyncio.sleep(_AGAIN_S)
+                continue
+            silent_since = None
+            if told.how:
+                return told.how
+
+    def begins(self) -> None:
+        """See `Launched`."""
+        self._telling = asyncio.create_task(self._launcher.ask(self._agent, Begins(*self._which), Done))
+        self._telling.add_done_callback(lambda told: told.cancelled() or told.exception())  # its end is told by `wait`
+
+    async def end(self) -> None:
+        """See `Launched`; an agent that cannot be reached ends it by itself when it hears nothing of the run."""
+        if self._telling is not None:
+            self._telling.cancel()
+        with contextlib.suppress(TransportError):
+            await self._launcher.ask(self._agent, End(*self._which), Done, timeout_s=_ENDS_S)
+
+
+def _versions(there: AgentIs, here: AgentIs) -> str:
+    """Say that an agent is of another version; "" if it is not."""
+    if there.hfg != here.hfg:
+        return (
+            f'host "{there.host}" has hfg {there.hfg} (Python {there.python}), and here is hfg {here.hfg} (Python '
+            f"{here.python}): install the same hfg on all hosts, and begin the agent anew"
+        )
+    if there.python.rpartition(".")[0] != here.python.rpartition(".")[0]:
+        _LOGGER.warning('host "%s" has Python %s, and here is Python %s', there.host, there.python, here.python)
+    return ""
+
+
+def _is_of_the_program(module: str) -> bool:
+    return module in ("__main__", "__hfg_main__") or module.startswith("hfg_target_")
+
+
+def _in_words(module: str) -> str:
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return str(file or module)

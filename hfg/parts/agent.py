@@ -1,0 +1,316 @@
+"""An agent: begins the parts of runs on its host as it is asked, and ends those whose run is gone (rules L2, X3).
+
+It decides nothing about a run. Whether a part that has died begins anew is for the main part, which asks for its next
+life; the agent sees to it that the former one is gone by then. It is itself begun and ended by whoever has the host,
+and what it has begun ends with it. Stands on `realm`; how a process is begun is the matter of `hosting`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import Any, Final, Protocol
+
+import msgspec
+
+from hfg.errors import HfgError, TransportError, UsageError, in_words
+from hfg.logs import Log
+from hfg.parts.realm import (
+    GONE_S,
+    AgentIs,
+    Begins,
+    Check,
+    Chunk,
+    Deploy,
+    Done,
+    End,
+    Gone,
+    Missing,
+    ReadLog,
+    Realm,
+    Start,
+    Started,
+    Wait,
+    agent_place,
+    myself,
+    run_place,
+    serve,
+)
+from hfg.transport import Closing, Session
+
+__all__ = ["WAITS_S", "Agent", "Host", "Hosted"]
+
+_LOGGER = Log("hfg.agent")
+
+WAITS_S: Final = 10.0
+"""How long a question for the end of a part is kept; it is asked again then."""
+
+_LOOKS_S: Final = 0.5  # for another agent of the same name, before this one says that it is there
+_MAIN: Final = ""
+_FIRST_LIFE: Final = 1
+
+
+class Hosted(Protocol):
+    """A process that an agent has begun; see `Launched`.
+
+    Attributes:
+      process: its id.
+    """
+
+    process: int
+
+    async def wait(self) -> str:
+        """Wait until it is gone; give a sentence about how."""
+
+    def begins(self) -> None:
+        """From now on it may be expected to answer."""
+
+    async def end(self) -> None:
+        """See to it that it is gone."""
+
+
+class Host(Protocol):
+    """What an agent needs of the computer that it is on."""
+
+    async def part(self, order: Start) -> Hosted:
+        """Begin a part.
+
+        Raises:
+          HfgError: it cannot be begun.
+        """
+
+    async def main(self, order: Deploy) -> Hosted:
+        """Begin the main part of a run."""
+
+    def missing(self, modules: list[str]) -> Missing:
+        """Give those that cannot be imported."""
+
+    def read_log(self, run: str, offset: int) -> Chunk:
+        """Give what parts of a run have written."""
+
+    def forget(self, run: str) -> None:
+        """No part of a run is here any more: nothing of it is to be left."""
+
+
+class _Charge:
+    """One life of a part of a run.
+
+    Attributes:
+      life: which.
+      begun: done when it has a process.
+      gone: how it has ended.
+    """
+
+    def __init__(self, life: int) -> None:
+        loop = asyncio.get_running_loop()
+        self.life = life
+        self.begun: asyncio.Future[Hosted] = loop.create_future()
+        self.gone: asyncio.Future[str] = loop.create_future()
+        self.task: asyncio.Task[None]
+
+    async def end(self) -> None:
+        """See to it that it is gone."""
+        with contextlib.suppress(HfgError):
+            hosted = await asyncio.shield(self.begun)
+            await hosted.end()
+        await asyncio.shield(self.gone)
+
+
+class Agent:
+    """The agent of a host.
+
+    Attributes:
+      me: what it says of itself.
+    """
+
+    def __init__(self, session: Session, host: Host) -> None:
+        """Prepare it.
+
+        Args:
+          session: of the transport, on which parts of runs find each other.
+          host: what it is on.
+        """
+        self.me: AgentIs = myself(session.host)
+        self._session = session
+        self._host = host
+        self._charges: dict[tuple[str, str], _Charge] = {}
+        self._leaving: dict[str, asyncio.TimerHandle] = {}  # runs of which nothing is heard
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._answers: list[Closing] = []
+        self._announced: Closing | None = None
+        self._realm: Realm | None = None
+        self._is_closing = False
+        self._warned = False
+
+    # --- being there ------------------------------------------------------------------------------------------------
+
+    async def open(self) -> None:
+        """Look who else is there, and be there.
+
+        Raises:
+          TransportError: another agent has the name.
+        """
+        name, session = self.me.host, self._session
+        self._realm = realm = Realm(session)
+        if await realm.until(lambda: realm.of(name), _LOOKS_S):
+            other = realm.of(name)[0]
+            raise TransportError(
+                f'another agent is called "{name}" already (process {other.process} of its host): end that one, or '
+                'give this one another name by host = "..." in its settings'
+            )
+        self._answers = serve(
+            session,
+            agent_place(self.me),
+            {
+                Check: self._check,
+                Start: self._start,
+                Deploy: self._deploy,
+                Begins: self._begins,
+                Wait: self._wait,
+                End: self._end,
+                ReadLog: self._read_log,
+            },
+        )
+        self._announced = session.announce(agent_place(self.me), msgspec.msgpack.encode(self.me))
+        self._spawn(self._look_after_runs(realm))
+
+    async def _look_after_runs(self, realm: Realm) -> None:
+        """Whenever somebody comes or goes."""
+        while True:
+            for run in {run for run, part in self._charges if part != _MAIN}:
+                self._look_at(run)
+            twins = [one for one in realm.of(self.me.host) if one.incarnation != self.me.incarnation]
+            if twins and not self._warned:
+                self._warned = True
+                _LOGGER.warning(
+                    'another agent is called "%s" too (process %d of its host), so neither gets parts of runs: end '
+                    "one of the two, or give it another name",
+                    self.me.host,
+                    twins[0].process,
+                )
+            await realm.change()
+
+    def _look_at(self, run: str) -> None:
+        """Give a run some time, if it is not heard of; and no more thought, if it is."""
+        assert self._realm is not None
+        if run_place(run) in self._realm.runs:
+            leaving = self._leaving.pop(run, None)
+            if leaving is not None:
+                leaving.cancel()
+        elif run not in self._leaving:
+            loop = asyncio.get_running_loop()
+            self._leaving[run] = loop.call_later(GONE_S, lambda: self._spawn(self._abandon(run)))
+
+    async def _abandon(self, run: str) -> None:
+        """The main part of a run is gone: so are the others."""
+        self._leaving.pop(run, None)
+        parts = [(key, charge) for key, charge in self._charges.items() if key[0] == run and key[1] != _MAIN]
+        if parts:
+            _LOGGER.warning("run %s is not heard of any more: its parts are ended", run_place(run))
+        await asyncio.gather(*(self._let_go(key, charge) for key, charge in parts))
+
+    async def close(self) -> None:
+        """End all that was begun here, and be there no more."""
+        self._is_closing = True
+        if self._announced is not None:
+            self._announced.close()
+        mains = [(key, charge) for key, charge in self._charges.items() if key[1] == _MAIN]
+        await asyncio.gather(*(self._let_go(key, charge) for key, charge in mains))  # they ask for the end of others
+        await asyncio.gather(*(self._let_go(key, charge) for key, charge in list(self._charges.items())))
+        for timer in self._leaving.values():
+            timer.cancel()
+        for answer in self._answers:
+            answer.close()
+        if self._realm is not None:
+            self._realm.close()
+        for task in self._tasks:
+            task.cancel()
+
+    def _spawn(self, work: Any) -> None:
+        task = asyncio.get_running_loop().create_task(work, name="hfg agent")
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    # --- what it is asked -------------------------------------------------------------------------------------------
+
+    async def _check(self, request: Check) -> Missing:
+        return self._host.missing(request.modules)
+
+    async def _start(self, order: Start) -> Started:
+        return await self._take((order.run, order.part), order.lives[0], order)
+
+    async def _deploy(self, order: Deploy) -> Started:
+        return await self._take((order.run, _MAIN), _FIRST_LIFE, order)
+
+    async def _take(self, key: tuple[str, str], life: int, order: Start | Deploy) -> Started:
+        if self._is_closing:
+            raise UsageError(f'the agent of host "{self.me.host}" is being ended')
+        charge = self._charges.get(key)
+        if charge is None or charge.life < life:
+            former, charge = charge, _Charge(life)
+            self._charges[key] = charge
+            charge.task = asyncio.create_task(self._run(charge, former, key, order), name=f"hfg part {key[1]}")
+            if isinstance(order, Start):
+                self._look_at(key[0])
+        elif charge.life > life:
+            raise UsageError(f'life {life} of group "{key[1]}" is over: {charge.life} has begun')
+        return Started((await asyncio.shield(charge.begun)).process)
+
+    async def _run(self, charge: _Charge, former: _Charge | None, key: tuple[str, str], order: Start | Deploy) -> None:
+        """One life: behind the end of the former one, until its own."""
+        try:
+            if former is not None:
+                await former.end()
+            hosted = await (self._host.part(order) if isinstance(order, Start) else self._host.main(order))
+        except Exception as error:
+            known = error if isinstance(error, HfgError) else TransportError(f"it cannot be begun: {in_words(error)}")
+            charge.begun.set_exception(known)
+            charge.begun.exception()  # it may be that nobody waits for it any more
+            charge.gone.set_result(str(known))
+            return
+        charge.begun.set_result(hosted)
+        _LOGGER.info("run %s, %s: process %d", key[0], key[1] or "main part", hosted.process)
+        how = await hosted.wait()
+        charge.gone.set_result(f'{how} on host "{self.me.host}"')
+        if key[1] == _MAIN:
+            self._charges.pop(key, None)
+            self._done_with(key[0])
+
+    def _of(self, request: Begins | Wait | End) -> _Charge | None:
+        charge = self._charges.get((request.run, request.part))
+        return charge if charge is not None and charge.life == request.life else None
+
+    async def _begins(self, request: Begins) -> Done:
+        charge = self._of(request)
+        if charge is not None and charge.begun.done() and charge.begun.exception() is None:
+            charge.begun.result().begins()
+        return Done()
+
+    async def _wait(self, request: Wait) -> Gone:
+        charge = self._of(request)
+        if charge is None:
+            return Gone(f'the agent of host "{self.me.host}" has no process of it')
+        await asyncio.wait({charge.gone}, timeout=WAITS_S)
+        return Gone(charge.gone.result() if charge.gone.done() else "")
+
+    async def _end(self, request: End) -> Done:
+        charge = self._of(request)
+        if charge is not None:
+            await self._let_go((request.run, request.part), charge)
+        return Done()
+
+    async def _let_go(self, key: tuple[str, str], charge: _Charge) -> None:
+        await charge.end()
+        if self._charges.get(key) is charge:
+            del self._charges[key]
+            self._done_with(key[0])
+
+    def _done_with(self, run: str) -> None:
+        if not any(key[0] == run for key in self._charges):
+            leaving = self._leaving.pop(run, None)
+            if leaving is not None:
+                leaving.cancel()
+            self._host.forget(run)
+
+    async def _read_log(self, request: ReadLog) -> Chunk:
+        return self._host.read_log(request.run, request.offset)

@@ -1,0 +1,223 @@
+"""What an agent has of its computer: processes for parts, the modules that these can import, and what they write.
+
+Stands on `launching` and `realm`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import importlib.machinery
+import os
+import re
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from hfg.errors import TransportError
+from hfg.parts.launching import Begun, PartProcess, beat_of
+from hfg.parts.realm import Chunk, Deploy, Missing, Start, run_id
+from hfg.parts.rings import sweep_run
+from hfg.transport import Session
+
+__all__ = ["Computer", "Deployed", "Journal", "is_importable", "logs_folder"]
+
+_LONGEST_LINE: Final = 64 * 1024
+_LONGEST_LOG: Final = 16 * 2**20
+_LONGEST_CHUNK: Final = 256 * 1024
+_MOST_LOGS: Final = 100
+
+
+class Deployed(msgspec.Struct, frozen=True):
+    """What the process of a deployed run is told on its standard input.
+
+    Attributes:
+      run: what it is called.
+      arguments: of `hfg run`, the target first.
+      settings: the file of the agent; "" for none.
+      folder: in which the target is.
+    """
+
+    run: str
+    arguments: list[str]
+    settings: str
+    folder: str
+
+
+class Computer:
+    """This computer, for its agent.
+
+    Args:
+      session: of the agent.
+      settings: by which parts open theirs.
+      journal: keeps what processes write.
+      folder: whose modules parts can import, beside what is installed.
+    """
+
+    def __init__(self, session: Session, settings: dict[str, Any], journal: Journal, folder: Path) -> None:
+        self._session = session
+        self._settings = settings
+        self._journal = journal
+        self._folder = folder
+        self._path = [str(folder), *(one for one in sys.path if one)]
+
+    async def part(self, order: Start) -> PartProcess:
+        """See `Host`."""
+        life = order.lives[0]
+        begun = Begun(
+            order.run,
+            order.part,
+            order.lives,
+            "zenoh",
+            self._settings,
+            order.argv,
+            main="",
+            targets={},
+            path=self._path,
+            parent=os.getpid(),
+            folder="",
+            beat=beat_of(order.run, order.part, life),
+            level=order.level,
+        )
+        process = await PartProcess.begin(order.part, begun, keeps_output=True)
+        process.watch(self._session, begun.beat)
+        self._journal.keep(order.run, order.part, process)
+        return process
+
+    async def main(self, order: Deploy) -> PartProcess:
+        """See `Host`."""
+        folder = order.folder or str(self._folder)
+        if not _is_folder(folder):
+            raise TransportError(f'host "{self._session.host}" has no folder {folder}, from which it was to run')
+        told = Deployed(order.run, [order.target, *order.arguments], self._settings.get("settings", ""), folder)
+        process = await PartProcess.begin("main", told, module="hfg.cli.deployed", keeps_output=True)
+        self._journal.keep(order.run, "main", process)
+        return process
+
+    def missing(self, modules: list[str]) -> Missing:
+        """See `Host`."""
+        return Missing([one for one in modules if not is_importable(one, self._path)], str(self._folder))
+
+    def read_log(self, run: str, offset: int) -> Chunk:
+        """See `Host`."""
+        return self._journal.read(run, offset)
+
+    def forget(self, run: str) -> None:
+        """See `Host`."""
+        sweep_run(run)
+
+
+def _is_folder(path: str) -> bool:
+    return Path(path).is_dir()
+
+
+def is_importable(module: str, path: Sequence[str]) -> bool:
+    """Say whether a module can be found on a path; nothing is imported, and what is new there is seen."""
+    importlib.invalidate_caches()
+    name, where = "", list(path)
+    for chunk in module.split("."):
+        name = f"{name}.{chunk}" if name else chunk
+        spec = _find(name, where, is_top=name == chunk)
+        if spec is None:
+            return module in sys.modules and module.startswith("hfg.")  # made while hfg was imported
+        where = list(spec.submodule_search_locations or [])
+    return True
+
+
+def _find(name: str, where: list[str], *, is_top: bool) -> importlib.machinery.ModuleSpec | None:
+    for finder in sys.meta_path:
+        is_usual = finder is importlib.machinery.PathFinder
+        find = getattr(finder, "find_spec", None)
+        try:
+            spec = None if find is None else find(name, where if is_usual or not is_top else None)
+        except Exception:
+            spec = None  # a finder of somebody's that fails finds nothing
+        if spec is not None:
+            return spec  # type: ignore[no-any-return]
+    return None
+
+
+# --- what they write ---
+
+
+def logs_folder() -> Path:
+    """Give where the agents of this user keep what parts have written."""
+    own = os.environ.get("XDG_STATE_HOME")
+    return (Path(own) if own else Path.home() / ".local" / "state") / "hfg" / "logs"
+
+
+class Journal:
+    """Keeps what the parts of runs write on this host, a file for each run, with the time and the group of each line.
+
+    Args:
+      folder: of the files.
+      host: its name, for two agents may share a folder.
+    """
+
+    def __init__(self, folder: Path, host: str) -> None:
+        self._folder = folder
+        self._host = re.sub(r"[^A-Za-z0-9_.-]", "_", host)
+        self._pumps: set[asyncio.Task[None]] = set()
+
+    def open(self) -> None:
+        """Make the folder, and let go of what is old.
+
+        Raises:
+          TransportError: it cannot be made.
+        """
+        try:
+            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            old = sorted(self._folder.glob("*.log*"), key=lambda file: file.stat().st_mtime)[:-_MOST_LOGS]
+            for file in old:
+                file.unlink(missing_ok=True)
+        except OSError as error:
+            raise TransportError(
+                f"{self._folder}, where an agent keeps what its parts write, cannot be used ({error.strerror}): set "
+                "XDG_STATE_HOME to a folder that you may write to"
+            ) from None
+
+    def _file(self, run: str) -> Path:
+        return self._folder / f"{re.sub('[^A-Za-z0-9]', '_', run_id(run))}@{self._host}.log"
+
+    def keep(self, run: str, part: str, process: PartProcess) -> None:
+        """Write down all that a process writes, until it ends."""
+        pump = asyncio.create_task(self._pump(self._file(run), part, process), name=f"hfg log of {part}")
+        self._pumps.add(pump)
+        pump.add_done_callback(self._pumps.discard)
+
+    async def _pump(self, file: Path, part: str, process: PartProcess) -> None:
+        assert process.output is not None
+        rest = b""
+        while data := await process.output.read(_LONGEST_LINE):
+            *lines, rest = (rest + data).split(b"\n")
+            if len(rest) > _LONGEST_LINE:
+                lines, rest = [*lines, rest], b""
+            self._write(file, part, lines)
+        if rest:
+            self._write(file, part, [rest])
+
+    def _write(self, file: Path, part: str, lines: list[bytes]) -> None:
+        head = f"{time.strftime('%Y-%m-%d %H:%M:%S')} {part}: ".encode()
+        try:
+            if file.exists() and file.stat().st_size > _LONGEST_LOG:
+                file.replace(file.with_suffix(".log.1"))
+            with file.open("ab") as stream:
+                stream.write(b"".join(head + line + b"\n" for line in lines))
+        except OSError:
+            pass  # the disk is full: the run goes on
+
+    def read(self, run: str, offset: int) -> Chunk:
+        """Give some of it, from a byte on; from the first again, if the file has been begun anew."""
+        file = self._file(run)
+        if not file.exists():
+            return Chunk("", 0)
+        with file.open("rb") as stream:
+            stream.seek(offset if 0 <= offset <= file.stat().st_size else 0)
+            begin = stream.tell()
+            data = stream.read(_LONGEST_CHUNK)
+        data = data[: data.rfind(b"\n") + 1]
+        return Chunk(data.decode(errors="replace"), begin + len(data))

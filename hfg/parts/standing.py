@@ -1,0 +1,95 @@
+"""A run where all of a realm hear of it: what its main part says of itself there, and does when it is asked.
+
+Stands on `realm`; knows a run by its face.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import msgspec
+
+from hfg.engine import Run
+from hfg.engine.face.watching import Door
+from hfg.engine.face.watching import Question as Asked
+from hfg.engine.observing.encoding import encode
+from hfg.parts.realm import (
+    Done,
+    Look,
+    PartIs,
+    Parts,
+    PartsAre,
+    Restart,
+    RunIs,
+    Seen,
+    Stop,
+    run_id,
+    run_place,
+    serve,
+)
+from hfg.transport import Session
+
+__all__ = ["Standing"]
+
+
+class Standing:
+    """Announces a run and answers for it, until it is closed."""
+
+    def __init__(
+        self,
+        session: Session,
+        run: str,
+        face: Run,
+        parts: Callable[[], list[PartIs]],
+        restart: Callable[[str], Awaitable[None]],
+    ) -> None:
+        """Begin.
+
+        Args:
+          session: of the main part.
+          run: by which name its parts know it.
+          face: what can be done with it.
+          parts: tells of them.
+          restart: ends the process of one, and begins another.
+        """
+        self._run = face
+        self._parts = parts
+        self._restart = restart
+        target = " ".join(sys.argv[1:] or sys.argv)[:200]
+        self._door = Door(face, target, run_id(run))
+        place = run_place(run)
+        me = RunIs(run_id(run), face.graph.name, target, session.host, os.getpid())
+        answers: dict[Any, Callable[[Any], Awaitable[Any]]] = {
+            Parts: self._tell,
+            Stop: self._stop,
+            Restart: self._begin_again,
+            Look: self._look,
+        }
+        self._open = [*serve(session, place, answers), session.announce(place, msgspec.msgpack.encode(me))]
+
+    def close(self) -> None:
+        """It is over."""
+        for one in reversed(self._open):
+            one.close()
+
+    async def _tell(self, _: Parts) -> PartsAre:
+        return PartsAre(self._parts())
+
+    async def _stop(self, _: Stop) -> Done:
+        self._run.stop()
+        return Done()
+
+    async def _begin_again(self, request: Restart) -> Done:
+        await self._restart(request.part)
+        return Done()
+
+    async def _look(self, request: Look) -> Seen:
+        answer = self._door.answer(request.question)
+        if isinstance(answer, Asked):
+            answer = msgspec.structs.replace(
+                self._door.name, error="what passes a port is told on the host of the main part alone: hfg tap there"
+            )
+        return Seen(encode(answer))
