@@ -10,15 +10,18 @@ import contextlib
 import sys
 import uuid
 from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+import msgspec
 import typer
 
 from hfg.cli import show
 from hfg.cli.agent import session_settings
 from hfg.cli.options import AllowOption, ArgOption, ParamOption, SettingsOption, TargetArgument, UntilOption
+from hfg.engine.face.watching import Answer, Question
+from hfg.engine.observing.encoding import encode
 from hfg.errors import HfgError, NoAnswer, QueryRefused, TargetError, TransportError
 from hfg.parts.realm import (
     FINDS_S,
@@ -28,6 +31,7 @@ from hfg.parts.realm import (
     Done,
     End,
     Gone,
+    Look,
     PartIs,
     Parts,
     PartsAre,
@@ -35,6 +39,7 @@ from hfg.parts.realm import (
     Realm,
     Restart,
     RunIs,
+    Seen,
     Started,
     Stop,
     Wait,
@@ -44,17 +49,59 @@ from hfg.parts.realm import (
 )
 from hfg.parts.transports import transport
 
-__all__ = ["deploy", "logs", "ps", "restart", "stop"]
+__all__ = ["RealmLine", "deploy", "logs", "ps", "restart", "stop"]
 
 _SETTLES_S: Final = 0.3  # who is there is told within this, once somebody is
 _LOOKS_AGAIN_S: Final = 0.5
 _BEGINS_S: Final = 60.0
 _ENDS_S: Final = 15.0
+_PATIENCE_S: Final = 2.0  # for one look
 _FIRST_LIFE: Final = 1
 
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="its name or the beginning of it, or that of its graph")
 ]
+
+
+class RealmLine:
+    """A way to the main part of a run, wherever in the realm; use it in a `with` block.
+
+    Raises:
+      TargetError: there is no such run.
+      TransportError: the realm cannot be reached.
+    """
+
+    def __init__(self, settings: str, name: str | None) -> None:
+        self._runner = asyncio.Runner()
+        self._stack = AsyncExitStack()
+        try:
+            self._realm = self._runner.run(self._stack.enter_async_context(_realm(settings)))
+            self._run = _find(self._realm, name)
+        except BaseException:
+            self.__exit__()
+            raise
+
+    def ask(self, question: Question) -> Answer | None:
+        """Ask and wait for the answer; None if there is none within two seconds.
+
+        Raises:
+          TargetError: the run is over.
+        """
+        look, place = Look(encode(question)), run_place(self._run.run)
+        try:
+            told = self._runner.run(ask(self._realm.session, place, look, Seen, timeout_s=_PATIENCE_S))
+        except NoAnswer:
+            if place in self._realm.runs:
+                return None
+            raise TargetError(f'run {self._run.run} of graph "{self._run.graph}" is over') from None
+        return msgspec.json.decode(told.answer, type=Answer)
+
+    def __enter__(self) -> RealmLine:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self._runner.run(self._stack.aclose())
+        self._runner.close()
 
 
 # --- the verbs ---
@@ -130,12 +177,13 @@ async def _realm(settings: str | None) -> AsyncIterator[Realm]:
         await session.close()
 
 
-def _find(realm: Realm, name: str) -> RunIs:
-    """Find a run by what the user calls it.
+def _find(realm: Realm, name: str | None) -> RunIs:
+    """Find a run by what the user calls it; without a name, the only one.
 
     Raises:
       TargetError: there is none, or more than one.
     """
+    name = name or ""
     found = [one for one in realm.runs.values() if one.run == name]
     found = found or [one for one in realm.runs.values() if one.run.startswith(name) or one.graph == name]
     if len(found) == 1:
@@ -290,7 +338,7 @@ async def _stop(settings: str | None, name: str) -> int:
             if await realm.until(lambda: place not in realm.runs, _ENDS_S):
                 return 0
         except NoAnswer:
-            pass
+            _need_permission(run, await _parts(realm, run))
         for agent in realm.of(run.host):  # its main part does not answer: whoever has begun it ends it
             with contextlib.suppress(HfgError):
                 await _ask_agent(realm, agent, End(f"hfg/{run.run}", "", _FIRST_LIFE), Done, timeout_s=_ENDS_S)
@@ -303,11 +351,27 @@ async def _stop(settings: str | None, name: str) -> int:
         return 1
 
 
+def _need_permission(run: RunIs, parts: list[PartIs]) -> None:
+    """Who may not steer gets no answer: nobody tells him, but that what only tells is answered.
+
+    Raises:
+      TargetError: so it is.
+    """
+    if parts[0].state != "does not answer":
+        raise TargetError(
+            f"run {run.run} answers, but is not steered from here: these settings may only look; use a certificate "
+            "that write in [access] of the agents names"
+        )
+
+
 async def _restart(settings: str | None, name: str, group: str) -> int:
     async with _realm(settings) as realm:
         run = _find(realm, name)
         try:
             await ask(realm.session, run_place(run.run), Restart(group), Done, timeout_s=_ENDS_S)
+        except NoAnswer:
+            _need_permission(run, await _parts(realm, run))
+            raise
         except QueryRefused as error:
             raise TargetError(str(error)) from None
         show.sentence(f'group "{group}" of run {run.run} begins anew')

@@ -1,6 +1,6 @@
-"""`hfg top [RUN]`: the live table of a graph that runs in another process.
+"""`hfg top [RUN]`: the live table of a graph that runs in another process, or on another host of the realm.
 
-Stands on `sockets`, `table`, `terminal` and `show`.
+Stands on `sockets`, `runs`, `table`, `terminal` and `show`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.live import EVERY_S
+from hfg.cli.options import SettingsOption
+from hfg.cli.runs import RealmLine
 from hfg.cli.sockets import Line, runs
 from hfg.cli.table import View
 from hfg.cli.terminal import Foot, is_terminal
@@ -31,20 +33,28 @@ def top(
     run: Annotated[
         str | None, typer.Argument(help="process id or name of the graph; without it, the only one that runs")
     ] = None,
+    settings: SettingsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Write one look at the run as JSON.")] = False,
 ) -> int:
     """Watch a graph that runs in another process, by `hfg run` or a program; without a terminal, one table."""
+    if settings is not None:
+        with RealmLine(settings, run) as far:
+            return _look(far, json)
     there = _find(run)
     if len(there) > 1:
         rows = [(one.name, one.graph, one.target) for one in there]
         show.table("", ("process", "graph", "target"), rows)
         show.sentence("more than one graph runs: name its process, as in hfg top " + there[0].name)
         return 2
+    with Line(there[0].name) as line:
+        return _look(line, json)
+
+
+def _look(line: Line | RealmLine, json: bool) -> int:
     try:
-        with Line(there[0].name) as line:
-            if json or not is_terminal(sys.stdout):
-                return _once(line, json)
-            _watch(line)
+        if json or not is_terminal(sys.stdout):
+            return _once(line, json)
+        _watch(line)
     except KeyboardInterrupt:  # how one leaves it
         return 0
     return 0
@@ -73,7 +83,7 @@ def _find(named: str | None) -> list[Answer]:
     return fitting
 
 
-def _once(line: Line, json: bool) -> int:
+def _once(line: Line | RealmLine, json: bool) -> int:
     """Look twice, so that there are rates, and write what was seen."""
     view = View()
     glances: list[Glance] = []
@@ -95,7 +105,7 @@ def _once(line: Line, json: bool) -> int:
     return 0
 
 
-def _watch(line: Line) -> None:
+def _watch(line: Line | RealmLine) -> None:
     """Draw until the run is over."""
     foot = Foot(sys.stdout)
     view = View()
@@ -118,6 +128,6 @@ def _watch(line: Line) -> None:
         show.sentence(str(over))
 
 
-def _glance(line: Line) -> Glance | None:
+def _glance(line: Line | RealmLine) -> Glance | None:
     answer = line.ask(Question("glance"))
     return None if answer is None else answer.glance

@@ -33,6 +33,7 @@ from hfg.parts.realm import (
     Wait,
     agent_place,
     myself,
+    run_id,
     run_place,
     serve,
 )
@@ -206,7 +207,7 @@ class Agent:
         self._leaving.pop(run, None)
         parts = [(key, charge) for key, charge in self._charges.items() if key[0] == run and key[1] != _MAIN]
         if parts:
-            _LOGGER.warning("run %s is not heard of any more: its parts are ended", run_place(run))
+            _LOGGER.warning("run %s is not heard of any more: its parts are ended", run_id(run))
         await asyncio.gather(*(self._let_go(key, charge) for key, charge in parts))
 
     async def close(self) -> None:
@@ -269,7 +270,7 @@ class Agent:
             charge.gone.set_result(str(known))
             return
         charge.begun.set_result(hosted)
-        _LOGGER.info("run %s, %s: process %d", key[0], key[1] or "main part", hosted.process)
+        _LOGGER.info("run %s, %s: process %d", run_id(key[0]), key[1] or "main part", hosted.process)
         how = await hosted.wait()
         charge.gone.set_result(f'{how} on host "{self.me.host}"')
         if key[1] == _MAIN:

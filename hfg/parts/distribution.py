@@ -245,7 +245,12 @@ class Distribution:
                 self._say(name, Finish(self._part.engine.outcome))
 
     def _ended_there(self, other: Other, message: Ended) -> None:
-        """Another part is over, for a reason of its own, or because it was told: so are all."""
+        """Another part is over, for a reason of its own, or because it was told: so are all.
+
+        Another takes the place of one whose process is made to leave, by its agent or for a restart.
+        """
+        if message.outcome == "cancelled":
+            return
         error = None if message.failed is None else self._error(message.failed, other)
         self._part.finish(message.outcome, error)
         self._asking.over(other.name)

@@ -93,7 +93,7 @@ class Computer:
         folder = order.folder or str(self._folder)
         if not _is_folder(folder):
             raise TransportError(f'host "{self._session.host}" has no folder {folder}, from which it was to run')
-        told = Deployed(order.run, [order.target, *order.arguments], self._settings.get("settings", ""), folder)
+        told = Deployed(run_id(order.run), [order.target, *order.arguments], self._settings.get("settings", ""), folder)
         process = await PartProcess.begin("main", told, module="hfg.cli.deployed", keeps_output=True)
         self._journal.keep(order.run, "main", process)
         return process

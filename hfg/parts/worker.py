@@ -79,7 +79,6 @@ class Worker:
         self._shares_memory = False
         self._serving: Serving | None = None
         self._is_closed = False
-        self._is_alone = False
 
     async def serve(self) -> None:
         """Do as the main part says, until that says that it is over."""
@@ -98,7 +97,6 @@ class Worker:
                     self._obey(self._part, message)
         finally:
             if self._part is not None and not self._is_closed:  # nobody is there any more who would say so
-                self._is_alone = True
                 self._part.finish("cancelled", None)
                 if self._serving is not None:
                     self._serving.close()
@@ -202,8 +200,6 @@ class Worker:
     def _ended(self, part: Part) -> None:
         assert self._serving is not None
         self._serving.flush()
-        if self._is_alone:
-            return  # this process is ended: the run goes on with another
         self._say(MAIN, Ended(self._name, part.engine.outcome, as_failed(part.engine.error)))
 
     # --- the end ----------------------------------------------------------------------------------------------------

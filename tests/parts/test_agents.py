@@ -303,7 +303,7 @@ def test_when_the_main_part_is_killed_the_agent_ends_its_parts(world: World) -> 
         next(one for one in world.network.sessions if one not in before).die()  # the first was that of the main part
         await asyncio.sleep(GONE_S - 1.0)
         early = task._task.done()
-        await asyncio.sleep(2.0)
+        await asyncio.sleep(4.0)  # and some for the last words, which nobody hears
         late = task._task.done()
         running.cancel()
         await asyncio.wait({running})
