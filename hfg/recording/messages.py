@@ -17,7 +17,8 @@ import numpy as np
 from hfg.engine.observing.recorder import Told
 from hfg.errors import UsageError
 from hfg.recording import schemas
-from hfg.recording.values import CannotKeep, Codec, is_plain
+from hfg.recording.forms import is_plain
+from hfg.recording.values import CannotKeep, Codec
 from hfg.token import Token
 from hfg.types import describe, describe_value
 

@@ -21,8 +21,8 @@ from hfg.graph.structure.naming import suggest
 from hfg.logs import Log
 from hfg.ports import Port
 from hfg.ports.automatic import sent_name
+from hfg.recording.forms import reference
 from hfg.recording.messages import Images, TokenWriter
-from hfg.recording.values import reference
 from hfg.recording.writing import RecordingWriter, open_new
 from hfg.types import describe
 
@@ -347,7 +347,7 @@ def _is_data(hint: type) -> bool:
 
     import numpy as np
 
-    from hfg.recording.values import fields_of
+    from hfg.recording.forms import fields_of
 
     known = (
         enum.Enum,

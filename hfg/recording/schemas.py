@@ -1,20 +1,18 @@
 """JSON schemas of what is recorded, so that other programs can show it; images in those that Foxglove knows.
 
 `foxglove.RawImage` and `foxglove.CompressedImage` are Foxglove's published schemas; what else a token has stands
-beside their fields, where readers that do not know it pass over it. Stands on `values` and `images`.
+beside their fields, where readers that do not know it pass over it. Stands on `forms`.
 """
 
 from __future__ import annotations
 
-import enum
 import typing
-from collections import abc
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import msgspec
 import numpy as np
 
-from hfg.recording.values import bare, fields_of
+from hfg.recording.forms import bare, form_of
 from hfg.types import Pixels, describe
 
 __all__ = ["COMPRESSED_IMAGE", "RAW_IMAGE", "encoding_of", "is_image", "message_schema"]
@@ -82,7 +80,6 @@ _NAMES: Final = {
     ("<f4", 1): "32FC1",
 }
 _LETTERS: Final = {"u": "U", "i": "S", "f": "F"}
-_PLAIN: Final = {bool: "boolean", int: "integer", float: "number", str: "string", type(None): "null"}
 _DEEPEST: Final = 8
 
 
@@ -113,49 +110,49 @@ def message_schema(hint: Any) -> bytes:
     )
 
 
+_ARRAY: Final[dict[str, Any]] = {
+    "type": "object",
+    "title": "array",
+    "properties": {
+        "dtype": {"description": 'As numpy writes it, "<f8"'},
+        "shape": {"type": "array", "items": {"type": "integer"}},
+        "data": {**_BYTES, "description": "In C order"},
+    },
+}
+# a whole number where the type says float is written as it is, what is not finite as an object
+_SIMPLE: Final[dict[Any, dict[str, Any]]] = {
+    int: {"type": "integer"},
+    float: {"type": ["number", "object"]},
+    str: {"type": ["string", "object"]},
+    bool: {"type": "boolean"},
+}
+
+
 def _schema(hint: Any, depth: int) -> dict[str, Any]:
     """What is exactly of the type; a value that is not stands as an object with "$type"."""
     hint = bare(hint)
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if depth > _DEEPEST:
         return {}
     if hint in (int, float, str, bool):
-        # a whole number where the type says float is written as it is, what is not finite as an object
-        return (
-            {"type": "integer"}
-            if hint is int
-            else {"type": [_PLAIN[hint], "object"]}
-            if hint in (float, str)
-            else {"type": "boolean"}
-        )
-    if origin is Literal:
-        return {}
-    fields = fields_of(hint)
-    if fields is not None:
-        return {
-            "type": "object",
-            "title": hint.__name__,
-            "properties": {name: _schema(one, depth + 1) for name, one in fields.items()},
-        }
-    if isinstance(hint, type) and issubclass(hint, enum.Enum):
-        return {"enum": [one.name for one in hint]}
-    if hint is bytes:
-        return dict(_BYTES)
-    if hint is np.ndarray or origin is np.ndarray:
-        return {
-            "type": "object",
-            "title": "array",
-            "properties": {
-                "dtype": {"description": 'As numpy writes it, "<f8"'},
-                "shape": {"type": "array", "items": {"type": "integer"}},
-                "data": {**_BYTES, "description": "In C order"},
-            },
-        }
-    if hint in (list, tuple) or origin in (list, tuple, abc.Sequence):
-        items = {one for one in arguments if one is not Ellipsis} if _all_hashable(arguments) else set()
-        return {"type": ["array", "object"], **({"items": _schema(items.pop(), depth + 1)} if len(items) == 1 else {})}
-    if origin is dict and arguments and bare(arguments[0]) is str:
-        return {"type": "object"}
+        return dict(_SIMPLE[hint])
+    form = form_of(hint)
+    match form.kind:
+        case "fields":
+            properties = {name: _schema(one, depth + 1) for name, one in form.of.items()}
+            return {"type": "object", "title": hint.__name__, "properties": properties}
+        case "enum":
+            return {"enum": [one.name for one in hint]}
+        case "bytes":
+            return dict(_BYTES)
+        case "array":
+            return dict(_ARRAY)
+        case "list" | "tuple":
+            arguments = typing.get_args(hint)
+            items = {one for one in arguments if one is not Ellipsis} if _all_hashable(arguments) else set()
+            of_items = {"items": _schema(items.pop(), depth + 1)} if len(items) == 1 else {}
+            return {"type": ["array", "object"], **of_items}
+        case "dict":
+            return {"type": "object"}
     return {}
 
 

@@ -4,13 +4,12 @@ For each type of a port a pair of functions is made. What is exactly of the type
 object of its fields, a tuple as a list, so that other programs can read it; whatever is not (a whole number where the
 type says float, not a number at all) is written with its type beside it, `{"$type": "tuple", "value": [1, 2]}`. What
 is made shares nothing with the value that others may go on changing. Nothing that is read is ever executed, apart from
-pickle where somebody has asked for it. Stands on `generics` and numpy.
+pickle where somebody has asked for it. Stands on `forms` and numpy.
 """
 
 from __future__ import annotations
 
 import base64
-import dataclasses
 import datetime
 import decimal
 import enum
@@ -18,74 +17,26 @@ import pathlib
 import pickle
 import struct
 import sys
-import types
-import typing
 import uuid
-from collections import abc, deque
+from collections import deque
 from collections.abc import Callable
 from math import isfinite
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final
 
 import msgspec
 import numpy as np
 
 from hfg.errors import HfgError
+from hfg.recording.forms import bare, fields_of, form_of, reference
 
-__all__ = ["PLAIN_TYPES", "CannotKeep", "Codec", "array_fields", "bare", "fields_of", "is_plain", "reference"]
+__all__ = ["CannotKeep", "Codec", "array_fields"]
 
 _TAG: Final = "$type"
 _NONE: Final = type(None)
-PLAIN_TYPES: Final = frozenset({bool, int, float, str})
-"""Types whose values nobody changes and JSON knows."""
 
 
 class CannotKeep(HfgError):
     """A value that has no place in a recording."""
-
-
-def bare(hint: Any) -> Any:
-    """Give a type without what is said about it."""
-    while True:
-        if typing.get_origin(hint) is Annotated:
-            hint = typing.get_args(hint)[0]
-        elif isinstance(hint, typing.NewType):
-            hint = hint.__supertype__
-        elif type(hint).__name__ == "TypeAliasType":
-            hint = hint.__value__
-        else:
-            return hint
-
-
-def is_plain(hint: Any) -> bool:
-    """Whether values of a type are numbers, truth values or text, and so can be kept as they are."""
-    hint = bare(hint)
-    if typing.get_origin(hint) is Literal:
-        return all(type(one) in PLAIN_TYPES for one in typing.get_args(hint))
-    return hint in PLAIN_TYPES
-
-
-def reference(kind: type) -> str:
-    """Give the name by which a class is found again."""
-    return f"{kind.__module__}:{kind.__qualname__}"
-
-
-def fields_of(kind: Any) -> dict[str, Any] | None:
-    """Give the fields of a struct, dataclass or NamedTuple with their types; None of anything else."""
-    if not isinstance(kind, type):
-        return None
-    if issubclass(kind, msgspec.Struct):
-        names: tuple[str, ...] = kind.__struct_fields__
-    elif dataclasses.is_dataclass(kind):
-        names = tuple(one.name for one in dataclasses.fields(kind))
-    elif issubclass(kind, tuple) and hasattr(kind, "_fields"):
-        names = kind._fields
-    else:
-        return None
-    try:
-        hints = typing.get_type_hints(kind, include_extras=True)
-    except Exception:  # names that only a type checker knows
-        hints = {}
-    return {name: hints.get(name, Any) for name in names}
 
 
 def array_fields(value: np.ndarray[Any, Any]) -> dict[str, Any]:
@@ -150,44 +101,49 @@ class Codec:
 
     def _make_encoder(self, hint: Any) -> Encode:
         exactly = self._any
-        origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-        other = _optional(hint)
-        if other is not None:
-            inner = self._encoder(other)
-            return lambda value: None if value is None else inner(value)
-        fields = fields_of(hint)
-        if fields is not None:
-            self._classes[reference(hint)] = hint
-            parts = [(name, self._encoder(one)) for name, one in fields.items()]
-
-            def of_fields(value: Any) -> Any:
-                if type(value) is not hint:
-                    return self._apart(value, dict)
-                return {name: encode(getattr(value, name)) for name, encode in parts}
-
-            return of_fields
-        if isinstance(hint, type) and issubclass(hint, enum.Enum):
-            self._classes[reference(hint)] = hint
-            return lambda value: value.name if type(value) is hint and value.name else self._apart(value, str)
-        if hint is bytes:
-            return lambda value: value if type(value) is bytes else self._apart(value, str)
-        if hint in (list, abc.Sequence) or origin in (list, abc.Sequence):
-            item = self._encoder(arguments[0]) if arguments else exactly
-            return lambda value: [item(one) for one in value] if type(value) is list else exactly(value)
-        if hint is tuple or origin is tuple:
-            return self._of_tuples(arguments)
-        if origin is dict and arguments and bare(arguments[0]) is str:
-            item = self._encoder(arguments[1])
-
-            def of_dicts(value: Any) -> Any:
-                if type(value) is not dict or not _has_names(value):
-                    return self._any(value)
-                return {key: item(one) for key, one in value.items()}
-
-            return of_dicts
-        if hint is np.ndarray or origin is np.ndarray:
-            return lambda value: self._array(value) if type(value) is np.ndarray else self._apart(value, dict)
+        form = form_of(hint)
+        match form.kind:
+            case "optional":
+                inner = self._encoder(form.of)
+                return lambda value: None if value is None else inner(value)
+            case "fields":
+                return self._of_fields(hint, form.of)
+            case "enum":
+                self._classes[reference(hint)] = hint
+                return lambda value: value.name if type(value) is hint and value.name else self._apart(value, str)
+            case "bytes":
+                return lambda value: value if type(value) is bytes else self._apart(value, str)
+            case "list":
+                item = self._encoder(form.of)
+                return lambda value: [item(one) for one in value] if type(value) is list else exactly(value)
+            case "tuple":
+                return self._of_tuples(form.of)
+            case "dict":
+                return self._of_dicts(form.of)
+            case "array":
+                return lambda value: self._array(value) if type(value) is np.ndarray else self._apart(value, dict)
         return exactly
+
+    def _of_fields(self, hint: Any, fields: dict[str, Any]) -> Encode:
+        self._classes[reference(hint)] = hint
+        parts = [(name, self._encoder(one)) for name, one in fields.items()]
+
+        def of_fields(value: Any) -> Any:
+            if type(value) is not hint:
+                return self._apart(value, dict)
+            return {name: encode(getattr(value, name)) for name, encode in parts}
+
+        return of_fields
+
+    def _of_dicts(self, values: Any) -> Encode:
+        item = self._encoder(values)
+
+        def of_dicts(value: Any) -> Any:
+            if type(value) is not dict or not _has_names(value):
+                return self._any(value)
+            return {key: item(one) for key, one in value.items()}
+
+        return of_dicts
 
     def _of_tuples(self, arguments: tuple[Any, ...]) -> Encode:
         items, rest = _tuple_items(arguments)
@@ -275,46 +231,49 @@ class Codec:
 
     def _make_decoder(self, hint: Any) -> Encode:
         revived = self._revived
-        origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-        other = _optional(hint)
-        if other is not None:
-            inner = self._decoder(other)
-            return lambda data: None if data is None else inner(data)
-        fields = fields_of(hint)
-        if fields is not None:
-            parts = {name: self._decoder(one) for name, one in fields.items()}
-            return lambda data: (
-                _made(hint, {name: decode(data[name]) for name, decode in parts.items()})
-                if type(data) is dict and _TAG not in data
-                else revived(data)
-            )
-        if isinstance(hint, type) and issubclass(hint, enum.Enum):
-            return lambda data: hint[data] if type(data) is str else revived(data)
-        if hint is bytes:
-            return lambda data: base64.b64decode(data) if type(data) is str else revived(data)
-        if hint in (list, abc.Sequence) or origin in (list, abc.Sequence):
-            item = self._decoder(arguments[0]) if arguments else revived
-            return lambda data: [item(one) for one in data] if type(data) is list else revived(data)
-        if hint is tuple or origin is tuple:
-            items, rest = _tuple_items(arguments)
-            decoders, of_rest = [self._decoder(one) for one in items], self._decoder(rest)
-            return lambda data: (
-                revived(data)
-                if type(data) is not list
-                else tuple(decode(one) for decode, one in zip(decoders, data, strict=True))
-                if items
-                else tuple(map(of_rest, data))
-            )
-        if origin is dict and arguments and bare(arguments[0]) is str:
-            item = self._decoder(arguments[1])
-            return lambda data: (
-                {key: item(one) for key, one in data.items()}
-                if type(data) is dict and _TAG not in data
-                else revived(data)
-            )
-        if hint is np.ndarray or origin is np.ndarray:
-            return lambda data: _array(data) if type(data) is dict and _TAG not in data else revived(data)
+        form = form_of(hint)
+        match form.kind:
+            case "optional":
+                inner = self._decoder(form.of)
+                return lambda data: None if data is None else inner(data)
+            case "fields":
+                parts = {name: self._decoder(one) for name, one in form.of.items()}
+                return self._unless_tagged(
+                    lambda data: _made(hint, {name: decode(data[name]) for name, decode in parts.items()})
+                )
+            case "enum":
+                return lambda data: hint[data] if type(data) is str else revived(data)
+            case "bytes":
+                return lambda data: base64.b64decode(data) if type(data) is str else revived(data)
+            case "list":
+                item = self._decoder(form.of)
+                return lambda data: [item(one) for one in data] if type(data) is list else revived(data)
+            case "tuple":
+                return self._to_tuples(form.of)
+            case "dict":
+                item = self._decoder(form.of)
+                return self._unless_tagged(lambda data: {key: item(one) for key, one in data.items()})
+            case "array":
+                return self._unless_tagged(_array)
         return revived
+
+    def _unless_tagged(self, decode: Encode) -> Encode:
+        """Make what decodes objects, but for those that stand for a value with its type beside it."""
+        revived = self._revived
+        return lambda data: decode(data) if type(data) is dict and _TAG not in data else revived(data)
+
+    def _to_tuples(self, arguments: tuple[Any, ...]) -> Encode:
+        items, rest = _tuple_items(arguments)
+        decoders, of_rest = [self._decoder(one) for one in items], self._decoder(rest)
+
+        def to_tuples(data: Any) -> Any:
+            if type(data) is not list:
+                return self._revived(data)
+            if items:
+                return tuple(decode(one) for decode, one in zip(decoders, data, strict=True))
+            return tuple(map(of_rest, data))
+
+        return to_tuples
 
     def _revived(self, data: Any) -> Any:
         kind = type(data)
@@ -376,14 +335,6 @@ def _made(kind: Any, fields: dict[str, Any]) -> Any:
     for name, value in fields.items():
         object.__setattr__(made, name, value)
     return made
-
-
-def _optional(hint: Any) -> Any:
-    """The only other member of a union with None."""
-    if typing.get_origin(hint) not in (typing.Union, types.UnionType):
-        return None
-    others = [one for one in typing.get_args(hint) if one is not _NONE]
-    return others[0] if len(others) == 1 else None
 
 
 def _tuple_items(arguments: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:

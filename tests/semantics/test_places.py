@@ -61,7 +61,7 @@ def test_what_the_first_operator_gives_at_the_end_is_taken_before_what_the_next_
     def build() -> hfg.Graph:
         graph = hfg.Graph()
         source, sink = graph.add(Script(count=0), name="source"), graph.add(Greeter(), name="sink")
-        at_last = [ops.ignore_elements(), ops.default_if_empty(8)]
+        at_last: list[Any] = [ops.ignore_elements(), ops.default_if_empty(8)]
         graph.connect(source.ports.events["out.sent"], sink.value, through=at_last)
         graph.connect(source.ports.events["processed"], sink.ports.slots["reset"], through=at_last)
         return graph

@@ -140,21 +140,7 @@ def recipe(name: str, seen: Measured | None = None) -> Recipe:
     function = getattr(cv2, name)
     overload = chosen(name)
     told = read(function, (one.name for one in overload.arguments))
-    inlets: list[Inlet] = []
-    knobs: list[Knob] = []
-    given: dict[str, Any] = {}
-    for argument in overload.arguments:
-        say = _say(name, argument)
-        if say.drop:
-            if say.given is not REQUIRED:
-                given[argument.name] = say.given
-        elif argument.optional and (argument.name in told.outputs or argument.name in _MADE):
-            continue  # an array to write into, which OpenCV makes if nobody gives one
-        elif _is_input(argument, say):
-            inlets.append(_inlet(argument, say, told, seen))
-        elif argument.type in _VALUES or say.hint is not None:
-            knobs.append(_knob(name, argument, say, told))
-    inlets.sort(key=lambda inlet: inlet.port.optional)  # Python wants those with a default last
+    inlets, knobs, given = _arguments(name, overload, told, seen)
     taken = {inlet.port.name for inlet in inlets} | {knob.setting.name for knob in knobs}
     category = next((one for one, members in CATEGORIES.items() if name in members), "other")
     return Recipe(
@@ -183,6 +169,28 @@ def recipe(name: str, seen: Measured | None = None) -> Recipe:
             is_single=len(told.outputs) <= 1,
         ),
     )
+
+
+def _arguments(
+    name: str, overload: Overload, told: Documentation, seen: Measured
+) -> tuple[list[Inlet], list[Knob], dict[str, Any]]:
+    """Say what becomes of each argument: an input, a parameter, or what is always the same."""
+    inlets: list[Inlet] = []
+    knobs: list[Knob] = []
+    given: dict[str, Any] = {}
+    for argument in overload.arguments:
+        say = _say(name, argument)
+        if say.drop:
+            if say.given is not REQUIRED:
+                given[argument.name] = say.given
+        elif argument.optional and (argument.name in told.outputs or argument.name in _MADE):
+            continue  # an array to write into, which OpenCV makes if nobody gives one
+        elif _is_input(argument, say):
+            inlets.append(_inlet(argument, say, told, seen))
+        elif argument.type in _VALUES or say.hint is not None:
+            knobs.append(_knob(name, argument, say, told))
+    inlets.sort(key=lambda inlet: inlet.port.optional)  # Python wants those with a default last
+    return inlets, knobs, given
 
 
 def _refusals(name: str) -> str:

@@ -1,0 +1,111 @@
+"""In which of a few forms values of a type are written: what both ways, and the schemas of files, go by.
+
+Stands on nothing of the recording.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import types
+import typing
+from collections import abc
+from typing import Annotated, Any, Final, Literal, NamedTuple
+
+import msgspec
+import numpy as np
+
+__all__ = ["PLAIN_TYPES", "Form", "bare", "fields_of", "form_of", "is_plain", "reference"]
+
+PLAIN_TYPES: Final = frozenset({bool, int, float, str})
+"""Types whose values nobody changes and JSON knows."""
+
+
+def bare(hint: Any) -> Any:
+    """Give a type without what is said about it."""
+    while True:
+        if typing.get_origin(hint) is Annotated:
+            hint = typing.get_args(hint)[0]
+        elif isinstance(hint, typing.NewType):
+            hint = hint.__supertype__
+        elif type(hint).__name__ == "TypeAliasType":
+            hint = hint.__value__
+        else:
+            return hint
+
+
+def is_plain(hint: Any) -> bool:
+    """Whether values of a type are numbers, truth values or text, and so can be kept as they are."""
+    hint = bare(hint)
+    if typing.get_origin(hint) is Literal:
+        return all(type(one) in PLAIN_TYPES for one in typing.get_args(hint))
+    return hint in PLAIN_TYPES
+
+
+def reference(kind: type) -> str:
+    """Give the name by which a class is found again."""
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def fields_of(kind: Any) -> dict[str, Any] | None:
+    """Give the fields of a struct, dataclass or NamedTuple with their types; None of anything else."""
+    if not isinstance(kind, type):
+        return None
+    if issubclass(kind, msgspec.Struct):
+        names: tuple[str, ...] = kind.__struct_fields__
+    elif dataclasses.is_dataclass(kind):
+        names = tuple(one.name for one in dataclasses.fields(kind))
+    elif issubclass(kind, tuple) and hasattr(kind, "_fields"):
+        names = kind._fields
+    else:
+        return None
+    try:
+        hints = typing.get_type_hints(kind, include_extras=True)
+    except Exception:  # names that only a type checker knows
+        hints = {}
+    return {name: hints.get(name, Any) for name in names}
+
+
+class Form(NamedTuple):
+    """How values of a type are written; all others are, each, with their own types beside them.
+
+    Attributes:
+      kind: "any" where nothing is known of the type.
+      of: the type of what is not None, of the items of a list, or of the values of a dict whose keys are names; the
+        types of fields by name; what is said of the items of a tuple.
+    """
+
+    kind: Literal["optional", "fields", "enum", "bytes", "list", "tuple", "dict", "array", "any"]
+    of: Any = None
+
+
+def form_of(hint: Any) -> Form:
+    """Give the form of a type that is `bare`."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    other = _optional(hint)
+    if other is not None:
+        return Form("optional", other)
+    fields = fields_of(hint)
+    if fields is not None:
+        return Form("fields", fields)
+    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+        return Form("enum")
+    if hint is bytes:
+        return Form("bytes")
+    if hint in (list, abc.Sequence) or origin in (list, abc.Sequence):
+        return Form("list", arguments[0] if arguments else Any)
+    if hint is tuple or origin is tuple:
+        return Form("tuple", arguments)
+    if origin is dict and arguments and bare(arguments[0]) is str:
+        return Form("dict", arguments[1])
+    if hint is np.ndarray or origin is np.ndarray:
+        return Form("array")
+    return Form("any")
+
+
+def _optional(hint: Any) -> Any:
+    """The only other member of a union with None."""
+    if typing.get_origin(hint) not in (typing.Union, types.UnionType):
+        return None
+    others = [one for one in typing.get_args(hint) if one is not types.NoneType]
+    return others[0] if len(others) == 1 else None
