@@ -11,6 +11,7 @@ import contextlib
 import logging
 import os
 import sys
+import time
 import uuid
 from collections.abc import Mapping
 from functools import partial
@@ -29,11 +30,13 @@ from hfg.logs import Log
 from hfg.parts.agreement import Agreement, Question, Rest
 from hfg.parts.asking import Asking
 from hfg.parts.channels import Carrier, Channel, name_of
+from hfg.parts.clocks import RunClock, machine
 from hfg.parts.failing import as_error
 from hfg.parts.inheriting import inheriting
 from hfg.parts.lives import LIMIT, WITHIN_S
 from hfg.parts.messages import (
     Ask,
+    AskTime,
     Call,
     Close,
     Closed,
@@ -49,6 +52,7 @@ from hfg.parts.messages import (
     Rests,
     Result,
     Seen,
+    TellTime,
     Told,
 )
 from hfg.parts.other import Launcher, Other
@@ -181,7 +185,9 @@ class Distribution:
         other.live(launched, partial(self._gone, other))
         calls = self._asking.open(name)
         shares = self._launcher.shares_memory
-        self._say(name, Open(self._text, self._options, dict(self._lives), _known_packages(), shares, calls))
+        engine = self._part.engine
+        clock = RunClock(machine(), engine.ahead_s, engine.began_at)
+        self._say(name, Open(self._text, self._options, dict(self._lives), clock, _known_packages(), shares, calls))
 
     def begin(self) -> None:
         """All are set up: let them go, behind which the main part goes."""
@@ -206,6 +212,8 @@ class Distribution:
         match message:
             case Opened():
                 other.answer(None if message.failed is None else self._error(message.failed, other))
+            case AskTime():
+                self._say(other.name, TellTime(message.asked, time.monotonic()))
             case Rests():
                 self._agreement.rest(message.rest)
             case Told():
@@ -354,6 +362,7 @@ class Distribution:
         edges = dict(report.edges)
         errors = list(report.errors)
         lost = report.lost_activity
+        clocks: dict[str, float] = {}
         halves: dict[str, dict[str, EdgeReport]] = {MAIN: report.edges}
         goes_on = report.outcome == "running"
         said: Mapping[str, Counts] = {}
@@ -375,6 +384,8 @@ class Distribution:
             halves[other.name] = found.edges
             errors += found.errors
             lost += found.lost_activity
+            if found.clock_within_s:
+                clocks[other.name] = found.clock_within_s
         for edge in self._cutting.edges:
             edges[edge.label] = _joined(edge, halves)
         order = [node.path for node in _all_nodes(self._cutting)]
@@ -385,6 +396,7 @@ class Distribution:
             edges=edges,
             errors=errors,
             lost_activity=lost,
+            clocks=clocks,
         )
 
 

@@ -1,7 +1,7 @@
 """What the parts of a run tell each other beside tokens, in order and without loss; and how.
 
-    Whole -> part     Open, Begin, Question, Reborn, Finish, Call, Close
-    Part  -> whole    Opened, Rest, Answer, Ended, Result, Seen, Logged, Closed
+    Whole -> part     Open, TellTime, Begin, Question, Reborn, Finish, Call, Close
+    Part  -> whole    AskTime, Opened, Rest, Answer, Ended, Result, Seen, Logged, Closed
     Part  -> part     Speaks, Hears, Joins, Shares, Sees
 
 All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
@@ -15,6 +15,7 @@ import msgspec
 
 from hfg.engine.observing.report import EdgeReport, NodeReport
 from hfg.parts.agreement import Answer, Question, Rest
+from hfg.parts.clocks import RunClock
 from hfg.trace import (
     ActivityChanged,
     ActivityLost,
@@ -38,6 +39,7 @@ from hfg.trace import (
 
 __all__ = [
     "Ask",
+    "AskTime",
     "Begin",
     "Call",
     "Close",
@@ -61,6 +63,7 @@ __all__ = [
     "Sees",
     "Shares",
     "Speaks",
+    "TellTime",
     "Told",
     "pack",
     "unpack",
@@ -92,6 +95,7 @@ class Open(msgspec.Struct, frozen=True, tag=True):
       graph: the text of a graph file: the whole graph, of which it makes its part.
       options: of the run, as `hfg.run` takes them.
       incarnations: which life of each part this is for.
+      clock: of the run.
       allow: packages whose node types may be imported.
       shares_memory: large arrays may go through shared memory.
       calls: what was asked for already, to be done before the nodes are set up.
@@ -100,6 +104,7 @@ class Open(msgspec.Struct, frozen=True, tag=True):
     graph: str
     options: dict[str, Any]
     incarnations: dict[str, int]
+    clock: RunClock
     allow: list[str]
     shares_memory: bool = False
     calls: list[Call] = []
@@ -110,6 +115,19 @@ class Opened(msgspec.Struct, frozen=True, tag=True):
 
     part: str
     failed: Failed | None = None
+
+
+class AskTime(msgspec.Struct, frozen=True, tag=True):
+    """What time is it there, on the monotonic clock; `asked` comes back with the answer."""
+
+    asked: float
+
+
+class TellTime(msgspec.Struct, frozen=True, tag=True):
+    """It is so late here."""
+
+    asked: float
+    told: float
 
 
 class Begin(msgspec.Struct, frozen=True, tag=True):
@@ -256,6 +274,7 @@ class Closed(msgspec.Struct, frozen=True, tag=True):
       errors: failures that did not end the run.
       lost_activity: see `Report`.
       failed: what its teardown failed with.
+      clock_within_s: by how much its clock differs from the run's at most; 0 where it is the same.
     """
 
     part: str
@@ -264,6 +283,7 @@ class Closed(msgspec.Struct, frozen=True, tag=True):
     errors: list[str]
     lost_activity: int
     failed: Failed | None = None
+    clock_within_s: float = 0.0
 
 
 class Speaks(msgspec.Struct, frozen=True, tag=True):
@@ -362,6 +382,8 @@ OfAnEdge: TypeAlias = Speaks | Hears | Joins | Shares | Sees
 Message: TypeAlias = (
     Open
     | Opened
+    | AskTime
+    | TellTime
     | Begin
     | Ask
     | Told

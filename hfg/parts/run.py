@@ -52,6 +52,7 @@ class Counts(msgspec.Struct, frozen=True):
     Attributes:
       nodes, edges, errors, lost_activity: as in `Report`.
       glance, statistics: if they were asked for.
+      clock_within_s: by how much its clock differs from the run's at most.
       at: when it was said, on the clock of the main part.
     """
 
@@ -61,6 +62,7 @@ class Counts(msgspec.Struct, frozen=True):
     lost_activity: int
     glance: Glance | None = None
     statistics: Statistics | None = None
+    clock_within_s: float = 0.0
     at: float = 0.0
 
 

@@ -6,12 +6,15 @@ Stands on `channels` and the files of graphs; knows no processes.
 from __future__ import annotations
 
 import asyncio
+import time
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from hfg.engine.face.composition import Composition
 from hfg.engine.observing.report import edge_reports, node_reports
+from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.settings import Settings
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
@@ -20,10 +23,12 @@ from hfg.graph.structure.level import level_of
 from hfg.logs import Log
 from hfg.parts.agreement import Rest
 from hfg.parts.channels import Carrier, Channel, name_of
+from hfg.parts.clocks import Offset, RunClock, machine
 from hfg.parts.failing import as_failed
 from hfg.parts.inheriting import inheriting
 from hfg.parts.messages import (
     Ask,
+    AskTime,
     Begin,
     Call,
     Close,
@@ -37,6 +42,7 @@ from hfg.parts.messages import (
     Opened,
     Reborn,
     Rests,
+    TellTime,
     Told,
 )
 from hfg.parts.part import Part
@@ -50,6 +56,8 @@ __all__ = ["FIRST_LIFE", "Worker"]
 _LOGGER = Log("hfg.parts")
 FIRST_LIFE = 1
 _MOST_RECORDS = 1000  # that wait to be told
+_ROUNDS = 8  # times that the time is asked for before the nodes are set up
+_ASKS_EVERY_S = 5.0
 _PARTING_S = 2.0  # how long the last words may take
 
 
@@ -79,17 +87,21 @@ class Worker:
         self._shares_memory = False
         self._serving: Serving | None = None
         self._is_closed = False
+        self._offset: Offset | None = None  # of the machine of the main part, if that is another
+        self._postponed: deque[Message] = deque()
 
     async def serve(self) -> None:
         """Do as the main part says, until that says that it is over."""
         try:
             while True:
-                message = await self._inbox.get()
+                message = self._postponed.popleft() if self._postponed else await self._inbox.get()
                 if isinstance(message, Open):
                     await self._open(message)
                 elif isinstance(message, Close):
                     await self._close()
                     return
+                elif isinstance(message, TellTime):
+                    self._told_time(message)
                 elif isinstance(message, Reborn):
                     if self._part is not None:
                         await self._admit(self._part, message)
@@ -117,6 +129,7 @@ class Worker:
     async def _open(self, message: Open) -> None:
         try:
             self._part = part = self._make(message)
+            await self._follow(part.engine, message.clock)
             assert self._serving is not None
             for call in message.calls:
                 self._serving.obey(call)
@@ -173,6 +186,36 @@ class Worker:
         await old.close()
         self._channels[message.part] = self._channel_to(part, message.part, message.life)
         self._carrier.admit(message.part, message.life)
+
+    # --- time -------------------------------------------------------------------------------------------------------
+
+    async def _follow(self, engine: Engine, clock: RunClock) -> None:
+        """Go by the clock of the run, as far as that is known here."""
+        if clock.machine == machine():
+            engine.follow(clock.ahead_s, clock.began_s, float)
+            return
+        self._offset = offset = Offset()
+        while offset.heard < _ROUNDS:
+            self._ask_time()
+            while not isinstance(message := await self._inbox.get(), TellTime):
+                self._postponed.append(message)
+            offset.hear(message.asked, message.told, time.monotonic())
+        used_s = offset.offset_s
+        engine.follow(clock.ahead_s + used_s, clock.began_s, lambda: offset.error_of(used_s, time.monotonic()))
+        self._ask_time_later()
+
+    def _ask_time_later(self) -> None:
+        """The longer ago it was asked, the less is known: clocks drift."""
+        asyncio.get_running_loop().call_later(_ASKS_EVERY_S, self._ask_time)
+
+    def _ask_time(self) -> None:
+        if not self._is_closed:
+            self._say(MAIN, AskTime(time.monotonic()))
+
+    def _told_time(self, message: TellTime) -> None:
+        if self._offset is not None:
+            self._offset.hear(message.asked, message.told, time.monotonic())
+            self._ask_time_later()
 
     # --- what is said -----------------------------------------------------------------------------------------------
 
@@ -238,4 +281,5 @@ def _closed(name: str, engine: Any, failed: Any) -> Closed:
         [str(error) for error in core.errors],
         core.lost_activity,
         failed,
+        engine.clock_within_s(),
     )

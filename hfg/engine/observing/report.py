@@ -72,6 +72,7 @@ class Report(msgspec.Struct, frozen=True):
       outputs: what came out of the graph's own outputs, where nobody read them.
       errors: failures that did not end the run (X1, X3), as sentences.
       lost_activity: how often activity was discarded with nobody to give it back to (A8).
+      clocks: by group on another machine, by how many seconds its clock may differ from the run's, at most (T5).
     """
 
     outcome: str
@@ -82,6 +83,7 @@ class Report(msgspec.Struct, frozen=True):
     outputs: dict[str, list[Any]]
     errors: list[str]
     lost_activity: int
+    clocks: dict[str, float] = {}
 
     def __str__(self) -> str:
         """A table of the nodes, and one of the edges; what nobody has is left out."""
@@ -99,6 +101,8 @@ class Report(msgspec.Struct, frozen=True):
         ]
         if edges:
             lines += ["", *table(("edge", "sent", "dropped", "drained", "untaken", "grown"), edges)]
+        if self.clocks:
+            lines += ["", *table(("group", "clock within"), [(one, seconds(at)) for one, at in self.clocks.items()])]
         if self.lost_activity:
             lines += ["", f"activity was lost {self.lost_activity} times"]
         return "\n".join([*lines, *([""] if self.errors else []), *self.errors])

@@ -101,6 +101,7 @@ class Engine:
       holds: people outside who may still bring something (R5).
       readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
       read_out: those whose END somebody has read.
+      clock_within_s: tells by how much the clock here may differ from that of the run of which this is a part.
     """
 
     def __init__(self, flat: FlatGraph, settings: Settings) -> None:
@@ -144,6 +145,8 @@ class Engine:
         self.tasks = TaskRunner(self, self.core, self.code)
         self.groups = self._make_groups()
         self._loop_group = self.groups["loop"]
+        self.clock_within_s: Callable[[], float] = float  # 0.0: it is the run's own
+        self._began_before: float | None = None  # on the loop's clock: when the run began of which this is a part
         self._started: float | None = None  # on the loop's clock, whose digits are not taken up by the date
         self._ended: float | None = None
         self._instant = -1.0
@@ -168,9 +171,40 @@ class Engine:
         """When the run was over, on its clock; None before."""
         return None if self._ended is None else self._ended + self._epoch
 
+    def follow(self, ahead_s: float, began_s: float, within_s: Callable[[], float]) -> None:
+        """Go by the clock of the run of which this is a part; before it begins.
+
+        Args:
+          ahead_s: how far that is ahead of this machine's monotonic clock.
+          began_s: when the run began, on its clock.
+          within_s: tells by how much the two may differ.
+        """
+        self.clock_within_s = within_s
+        if not self.virtual:
+            self._epoch = ahead_s
+            if self.epoch is not None:
+                self.epoch = ahead_s
+        self._began_before = began_s - self._epoch
+
+    @property
+    def ahead_s(self) -> float:
+        """How far the run's clock is ahead of the loop's."""
+        return self._epoch
+
+    @property
+    def began_at(self) -> float:
+        """When the run began, on its clock.
+
+        Raises:
+          EngineInternalError: it has not.
+        """
+        if self._started is None:
+            raise EngineInternalError("the run has not begun")
+        return self._started + self._epoch
+
     def begin(self) -> None:
-        """The run begins now."""
-        self._started = self.loop.time()
+        """The run begins now, or did when it began elsewhere."""
+        self._started = self.loop.time() if self._began_before is None else self._began_before
 
     def call_at(self, when: float, callback: Callable[[], None], *, counts: bool = True) -> _Timer:
         """See `Host`."""
