@@ -2,14 +2,14 @@
 
 Which floor stands on which; imports go down only, and asyncio begins on floor 5:
 
-    7  cli      studio
-    6  nodes    files                              beside: testing (sees all; nobody below sees it)
-    5  engine                                      outside: hfg_transports (sees floors 0-1 only)
-    4  activity
+    7  cli      meeting   composing
+    6  nodes    files   recording   parts   catalogue     beside: testing (sees all; nobody below sees it)
+    5  engine   links at work                             outside: hfg_transports (sees floors 0-1 only)
+    4  activity   links   timeline
     3  graph
     2  nodetype, functions  <-  declaration  <-  vectors, signature  <-  hints, description     registry
-    1  ports                                       transport
-    0  errors   problem   token   types   values   limits   encoding   images   generics   clock   trace   starting
+    1  ports                transport   sharedmemory
+    0  errors   problem   token   types   values   limits   encoding   images   generics   clock   logs   trace   starting
 
 A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
 """

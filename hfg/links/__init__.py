@@ -5,8 +5,10 @@ producer  <- peer     the exact link's sending end: numbers, windows, evidence, 
 consumer              the exact link's receiving end: order, repetitions, credits, fencing
 bounded               both ends of the link that may lose some and counts them
 running               the ends at work: over a session of a transport, on an event loop
+offers                what programs that meet by a name say of themselves, and who fits whom
+meeting               these programs: the publishing and the subscribing end
 
-All but `running` are plain state machines: frames, tokens and the time go in, frames and tokens come out.
+All but `running` and `meeting` are plain state machines: frames, tokens and the time go in, frames and tokens come out.
 """
 
 from hfg.links.bounded import BoundedConsumer, BoundedProducer

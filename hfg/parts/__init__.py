@@ -10,7 +10,7 @@ crossing      what is brought in and seen, as data; sieve: which side of an edge
 realm         agents and runs on other hosts: how they are found, and what one asks them
 agent         begins parts on its host; hosting: the processes it does that with, and what these write
 abroad        launching by agents; standing: a run that others hear of and steer
-distribution  the whole, as the main part sees it; launching: where the others are begun
+distribution  the whole, as the main part sees it; other: what it knows of another; launching: where they are begun
 local         all parts on one event loop, without links
 """
 
