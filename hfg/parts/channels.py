@@ -14,8 +14,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, NamedTuple
 
-import msgspec
-
 from hfg.encoding import TokenCodec
 from hfg.engine.runtime.borders import Hearing
 from hfg.errors import EncodingError, RunError, TransportError
@@ -61,6 +59,9 @@ class Channel:
     """Messages between two parts, in order and without loss, both ways.
 
     What cannot leave at once waits in memory: there is little of it, and whoever says something goes on.
+
+    Attributes:
+      refused: how much has come that is no message (L4).
     """
 
     def __init__(
@@ -83,6 +84,7 @@ class Channel:
           receive: called with each message.
         """
         one, other = name_of(here), name_of(there)
+        self.refused = 0
         self._receive = receive
         self._waiting: list[Message] = []
         self._is_closed = False
@@ -110,12 +112,11 @@ class Channel:
 
     def _arrived(self) -> None:
         for delivery in self._in.machine.take_all():
-            try:
-                message = unpack(delivery.token[1])
-            except msgspec.DecodeError:
-                message = None  # from nobody of this run
+            message = unpack(delivery.token[1])
             self._in.done()
-            if message is not None:
+            if message is None:
+                self.refused += 1  # from nobody of this run
+            else:
                 self._receive(message)
 
     async def flush(self, within_s: float) -> None:
@@ -187,22 +188,23 @@ class Carrier:
                 link.admit(life)
 
     def hear(self, message: OfAnEdge) -> None:
-        """The other end of an edge has said something."""
+        """The other end of an edge has said something; what is said of no edge that comes in, or leaves, is nothing."""
         label = message.label
+        if label not in (self._outgoing if isinstance(message, Hears | Sees) else self._links):
+            return
+        if isinstance(message, Speaks | Shares) and label not in self._incoming:
+            return
         match message:
             case Speaks():
                 self._part.speak(label, message.speaking, message.total)
             case Hears():
                 self._part.hear(label, message.hearing, message.total)  # type: ignore[arg-type]  # checked there
             case Joins():
-                if label in self._links:
-                    self._links[label].join(message)
+                self._links[label].join(message)
             case Shares():
-                if label in self._incoming:
-                    self._incoming[label].borrow(message)
+                self._incoming[label].borrow(message)
             case Sees():
-                if label in self._outgoing:
-                    self._outgoing[label].seen(message)
+                self._outgoing[label].seen(message)
 
     async def close(self) -> None:
         """End all links."""

@@ -36,6 +36,7 @@ from hfg.trace import (
     StructureChanged,
     TokenProcessed,
 )
+from hfg.transport import Buffer
 
 __all__ = [
     "Ask",
@@ -407,5 +408,12 @@ Message: TypeAlias = (
 pack: Final = msgspec.msgpack.Encoder().encode
 """Make bytes of a message."""
 
-unpack: Final = msgspec.msgpack.Decoder(Message).decode
-"""Make a message of bytes; raises `msgspec.DecodeError` for what is none."""
+_decoder: Final[msgspec.msgpack.Decoder[Message]] = msgspec.msgpack.Decoder(Message)
+
+
+def unpack(data: Buffer) -> Message | None:
+    """Make a message of bytes; None of what is none, however deep it is or whatever stands where text should."""
+    try:
+        return _decoder.decode(data)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return None

@@ -15,6 +15,7 @@ def sieve(part: str, edges: Iterable[CutEdge]) -> Callable[[TraceEvent], bool]:
 
     The source's part tells what is sent and processed, the target's what is taken.
     """
+    edges = tuple(edges)
     leaving = {edge.label for edge in edges if edge.source == part}
     coming = {edge.label for edge in edges if edge.target == part}
 
