@@ -20,7 +20,7 @@ MOST: Final = 1_000
 """Publishers of one name, consumers of one publisher, and sentences about them, that are taken note of."""
 
 
-class News:
+class _News:
     """Something has changed: whoever waits looks again."""
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class End:
         self._codec = TokenCodec[Any](hint, what=f'a value of "{name}"')
         self._id = secrets.token_hex(8)
         self._closed = False
-        self._news = News()
+        self._news = _News()
 
     def _seen(self, presences: list[Presence]) -> Iterator[tuple[Seen, Presence]]:
         """Give what was heard, but for what is not said by ends like these."""
