@@ -7,7 +7,7 @@ edited, and shares nothing with what runs them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from typing import Any
 
 from hfg.graph.editing import history_of, prepare
@@ -15,7 +15,7 @@ from hfg.graph.editing.changes import Change, EdgeChange, NodeSwap, OptionsChang
 from hfg.graph.editing.commands import decode
 from hfg.testing.reference.calls import Calling
 from hfg.testing.reference.state import Line, Station, fresh
-from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of, is_box, whole
+from hfg.testing.reference.structure import ROOT, Edge, End, Structure, boundary_of, is_box, whole
 from hfg.trace import ParameterSet, TokenDropped, TokenProcessed
 
 __all__ = ["Editing"]
@@ -85,33 +85,56 @@ class Editing(Calling):
         name_of = {owner: self._name_of(owner) for owner in self._owners()}  # by what it is, not by its number
         before = {id(station.leaf.node): station for station in self.stations}
         boxes = {id(box.node): box.index for box in self.structure.boxes}
-        swapped: dict[int, Station] = {}
-        for change in changes:
-            if isinstance(change, NodeSwap) and id(change.old) in before:
-                station = before[id(change.new)] = before.pop(id(change.old))
-                swapped[id(station)] = station
+        swapped = self._swap(changes, before)
         rubbed_out = {id(one.edge) for one in changes if isinstance(one, EdgeChange) and not one.added and one.for_good}
         old_lines = [(name_of[line.edge.source.owner], name_of[line.edge.target.owner], line) for line in self.lines]
         senders = [(lying, name_of.get(lying.sender, "")) for line in self.lines for lying in line.queue]
         after = whole(self.graph)
         enabled = [station for station in self.stations if self.is_enabled(station.leaf.index)]
-        gated = {id(self.stations[index]) for gate in self.structure.gates for index in gate.targets}
+        gated = self._gated()
         self._disable_for_good(boxes, {id(box.node) for box in after.boxes})
         self._exchange_stations(after, before)
         self._exchange_boxes(after, boxes)
-        for index in {index for gate in self.structure.gates for index in gate.targets}:
-            if id(self.stations[index]) not in gated:
-                self.stations[index].last_function = float("-inf")  # from the first firing behind the gate
+        for station in self._gated().values():
+            if id(station) not in gated:
+                station.last_function = float("-inf")  # from the first firing behind the gate
         number_of = {self._name_of(owner): owner for owner in self._owners()}
         for lying, name in senders:
             lying.sender = number_of.get(name, _GONE)
         lost, new = self._exchange_lines(old_lines, number_of, rubbed_out)
+        self._name_all_anew(after)
+        self._begin_and_end(list(before.values()), swapped, new, lost)
+        self._set_parameters(changes)
+        self._silence_those_that_rest_now(enabled)
+        for station in self.stations:
+            self._process_what_is_pipelined_now(station)
+
+    def _swap(self, changes: Sequence[Change], before: dict[int, Station]) -> set[int]:
+        """Find stations by the nodes that have taken the places of others; give those that this is about."""
+        swapped = set()
+        for change in changes:
+            if isinstance(change, NodeSwap) and id(change.old) in before:
+                station = before[id(change.new)] = before.pop(id(change.old))
+                swapped.add(id(station))
+        return swapped
+
+    def _gated(self) -> dict[int, Station]:
+        stations = [self.stations[index] for gate in self.structure.gates for index in gate.targets]
+        return {id(station): station for station in stations}
+
+    def _name_all_anew(self, after: Structure) -> None:
         self.paths = {station.path: station.leaf.index for station in self.stations}
         self.paths |= {box.path: -2 - box.index for box in after.boxes}
         self.paths[""] = ROOT
         self.labels = {line.edge.label: line for line in self.lines}
+
+    def _begin_and_end(
+        self, before: Sequence[Station], swapped: Set[int], new: Sequence[Line], lost: Sequence[Line]
+    ) -> None:
+        """What has come begins, then what has gone ends."""
+        were = {id(station) for station in before}
         for station in self.stations:
-            if id(station) not in {id(one) for one in before.values()}:
+            if id(station) not in were:
                 self.connect_one(station)
                 self.set_up(station)
             elif id(station) in swapped:
@@ -121,15 +144,15 @@ class Editing(Calling):
         for line in lost:
             self._let_go(line)
         here = {id(station) for station in self.stations}
-        for station in before.values():
+        for station in before:
             if id(station) not in here:
                 self._remove(station)
-        self._set_parameters(changes)
+
+    def _silence_those_that_rest_now(self, enabled: Sequence[Station]) -> None:
+        here = {id(station) for station in self.stations}
         for station in enabled:
             if id(station) in here and not self.is_enabled(station.leaf.index) and station.enabled:
                 self._silence(station)
-        for station in self.stations:
-            self._process_what_is_pipelined_now(station)
 
     # --- who is who
 
