@@ -41,31 +41,15 @@ from hfg.testing.strategies import tokens
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.types import Array, Shape
 from hfg.values import Colour, Span, same
+from tests.encoding.kinds import Found, Mode, Plan, Pose, Sides
 
 T = TypeVar("T")
 Metres = NewType("Metres", float)
 
 
-class Mode(enum.Enum):
-    FAST = 1
-    GOOD = "x"
-
-
 class Level(enum.IntEnum):
     LOW = 1
     HIGH = 2
-
-
-class Sides(enum.Flag):
-    LEFT = 1
-    RIGHT = 2
-
-
-@dataclasses.dataclass
-class Pose:
-    x: float
-    mode: Mode = Mode.FAST
-    file: Path | None = None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, slots=True)
@@ -86,19 +70,9 @@ class Angle:
         self.radians = math.radians(self.degrees)
 
 
-class Plan(msgspec.Struct):
-    poses: list[Pose]
-    name: str = ""
-
-
 class Options(msgspec.Struct, frozen=True, kw_only=True):
     speed: int | None
     name: str
-
-
-class Found(NamedTuple):
-    score: float
-    label: str = "?"
 
 
 class Nothing(NamedTuple):

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import datetime
 import decimal
-import enum
 import fractions
 import json
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -26,33 +23,7 @@ from hfg.encoding import decode, encode, has_tag, read_text
 from hfg.errors import EncodingError
 from hfg.types import Shape
 from hfg.values import Colour, Span, same
-
-
-class Mode(enum.Enum):
-    FAST = 1
-    GOOD = "x"
-
-
-class Sides(enum.Flag):
-    LEFT = 1
-    RIGHT = 2
-
-
-@dataclasses.dataclass
-class Pose:
-    x: float
-    mode: Mode = Mode.FAST
-    file: Path | None = None
-
-
-class Plan(msgspec.Struct):
-    poses: list[Pose]
-    name: str = ""
-
-
-class Found(NamedTuple):
-    score: float
-    label: str = "?"
+from tests.encoding.kinds import Found, Mode, Plan, Pose, Sides
 
 
 def named(value: float) -> float:
@@ -80,8 +51,8 @@ PLAIN: list[tuple[Any, Any, Any]] = [
     (Found(0.5), Found, {"score": 0.5, "label": "?"}),
     (datetime.datetime(2020, 1, 2, tzinfo=datetime.UTC), datetime.datetime, "2020-01-02T00:00:00Z"),
     (decimal.Decimal("1.50"), decimal.Decimal, "1.50"),
-    (named, Callable[[float], float], "tests.test_encoding:named"),
-    (Pose, type, "tests.test_encoding:Pose"),
+    (named, Callable[[float], float], "tests.encoding.test_data:named"),
+    (Pose, type, "tests.encoding.kinds:Pose"),
     (Mode.FAST, Literal[Mode.FAST], "FAST"),
     (None, int | None, None),
 ]
@@ -259,7 +230,7 @@ def test_who_reads_decides_what_may_be_imported() -> None:
         raise EncodingError(f'"{reference}" is not allowed here')
 
     data = encode(Pose(1.0))
-    with pytest.raises(EncodingError, match='"tests.test_encoding:Pose" is not allowed here'):
+    with pytest.raises(EncodingError, match='"tests.encoding.kinds:Pose" is not allowed here'):
         decode(data, find=refuse)
     assert decode(encode(Pose(1.0), Pose), Pose, find=refuse) == Pose(1.0)
 
