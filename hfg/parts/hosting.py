@@ -184,7 +184,7 @@ class Journal:
         return self._folder / f"{re.sub('[^A-Za-z0-9]', '_', run_id(run))}@{self._host}.log"
 
     def keep(self, run: str, part: str, process: PartProcess) -> None:
-        """Write down all that a process writes, until it ends."""
+        """Write down all that a process writes, and how it ends."""
         pump = asyncio.create_task(self._pump(self._file(run), part, process), name=f"hfg log of {part}")
         self._pumps.add(pump)
         pump.add_done_callback(self._pumps.discard)
@@ -197,8 +197,8 @@ class Journal:
             if len(rest) > _LONGEST_LINE:
                 lines, rest = [*lines, rest], b""
             self._write(file, part, lines)
-        if rest:
-            self._write(file, part, [rest])
+        ended = f"hfg: {await process.wait()}".encode()
+        self._write(file, part, [rest, ended] if rest else [ended])
 
     def _write(self, file: Path, part: str, lines: list[bytes]) -> None:
         head = f"{time.strftime('%Y-%m-%d %H:%M:%S')} {part}: ".encode()

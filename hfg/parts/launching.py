@@ -136,10 +136,15 @@ class _Task:
         self.process = 0
         self._session = session
         self._task = asyncio.create_task(worker.serve(), name=f"hfg part {part}")
+        self._killed = asyncio.Event()
 
     async def wait(self) -> str:
         """See `Launched`."""
-        await asyncio.wait({self._task})
+        killed = asyncio.ensure_future(self._killed.wait())
+        await asyncio.wait({self._task, killed}, return_when=asyncio.FIRST_COMPLETED)
+        killed.cancel()
+        if self._killed.is_set():
+            return "its task was killed"
         if self._task.cancelled():
             return "its task was cancelled"
         error = self._task.exception()
@@ -154,12 +159,14 @@ class _Task:
         if die is not None:
             die()
         self._task.cancel()
+        self._killed.set()
 
     async def end(self) -> None:
-        """See `Launched`."""
+        """See `Launched`; who was killed is waited for no more than a process that was."""
         self._task.cancel()
-        await asyncio.wait({self._task})
-        await self._session.close()
+        if not self._killed.is_set():
+            await asyncio.wait({self._task})
+            await self._session.close()
 
 
 # --- in processes ---
