@@ -10,6 +10,7 @@ import msgspec
 import pytest
 
 import hfg
+from hfg.engine.face.watching import Answer, Question
 from hfg.errors import NoAnswer, QueryRefused, TransportError
 from hfg.parts import launching
 from hfg.parts.abroad import AgentLauncher
@@ -22,12 +23,14 @@ from hfg.parts.realm import (
     Done,
     End,
     Gone,
+    Look,
     Missing,
     Parts,
     PartsAre,
     Realm,
     Restart,
     RunIs,
+    Seen,
     Start,
     Started,
     Stop,
@@ -347,6 +350,41 @@ def test_a_part_is_restarted_when_somebody_asks_for_it_and_that_is_no_death(worl
     values, parts = play(world, scene)
     assert values == list(range(100))
     assert parts == [("", "base", 0), ("on_arm", "arm", 7)]
+
+
+def test_who_looks_at_a_run_from_another_host_sees_its_table_and_no_port(world: World) -> None:
+    async def scene() -> tuple[Answer, Answer]:
+        await world.agent("arm")
+        realm = await world.realm()
+        async with hfg.running(chain("arm"), clock="virtual"):
+            (place,) = realm.runs
+
+            async def look(question: Question) -> Answer:
+                told = await ask(realm.session, place, Look(msgspec.json.encode(question)), Seen)
+                return msgspec.json.decode(told.answer, type=Answer)
+
+            return await look(Question("glance")), await look(Question("tap", path="numbers.out"))
+
+    glance, tap = play(world, scene)
+    assert glance.glance is not None
+    assert glance.glance.graph == "chain"
+    assert tap.error == "what passes a port is told on the host of the main part alone: hfg tap there"
+
+
+def test_types_of_the_program_itself_are_not_found_on_other_hosts(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hfg.files.building.modules_of", lambda _: {"__main__": "numbers"})
+
+    async def scene() -> None:
+        await world.agent("arm")
+        await hfg.run_async(chain("arm"), clock="virtual")
+
+    with pytest.raises(
+        TransportError,
+        match='^host "arm" cannot import the type of "numbers", which is in the program itself .*into a module, and',
+    ):
+        play(world, scene)
 
 
 def test_what_is_asked_in_vain_of_a_run_is_refused_with_what_there_is(world: World) -> None:

@@ -82,12 +82,13 @@ class Cell:
         self.begun.append(process)
         return process
 
-    def agent(self, host: str) -> subprocess.Popen[str]:
-        """Begin one, and wait until it is there."""
-        process = self.begin("agent", "--settings", f"{host}.toml")
-        assert process.stdout is not None
-        assert process.stdout.readline() == f'agent of host "{host}" is ready, process {process.pid}\n'
-        return process
+    def agents(self, *hosts: str) -> list[subprocess.Popen[str]]:
+        """Begin some, and wait until they are there."""
+        begun = [self.begin("agent", "--settings", f"{host}.toml") for host in hosts]
+        for host, process in zip(hosts, begun, strict=True):
+            assert process.stdout is not None
+            assert process.stdout.readline() == f'agent of host "{host}" is ready, process {process.pid}\n'
+        return begun
 
     def values(self) -> list[int]:
         return [int(line) for line in self.written.read_text().split()] if self.written.exists() else []
@@ -171,7 +172,7 @@ def test_a_run_is_deployed_looked_at_restarted_and_stopped_from_another_host(
         (run,) = json.loads(command("ps", "--json"))["runs"]
         return {part["group"]: part for part in run["parts"]}
 
-    arm, base = cell.agent("arm"), cell.agent("base")
+    agents = cell.agents("arm", "base")
     run = command("deploy", "robot.py", "--on", "base", "--arg", f"into={cell.written}").strip()
     cell.come()
     first = seen()
@@ -191,18 +192,20 @@ def test_a_run_is_deployed_looked_at_restarted_and_stopped_from_another_host(
     assert any(line.endswith(" arm far: relayed 3") for line in lines)
     there = cell.processes()
     assert len(there) == 2
+    assert any(" arm far: hfg: process " in line and "SIGKILL" in line for line in lines)
     command("stop", run)
     wait_for(lambda: not any(is_there(pid) for pid in there))
     assert cell.values() == list(range(len(cell.values()))), "nothing is lost or doubled by a kill and a restart"
-    for agent in (arm, base):
+    for agent in agents:
         agent.terminate()
+    for agent in agents:
         assert agent.wait(timeout=20) == 0
     assert shared_memory() <= before
 
 
 @pytest.mark.rule("L2", "L3", "X3")
 def test_whoever_is_killed_nothing_is_left_and_the_rest_goes_on(cell: Cell) -> None:
-    agent = cell.agent("arm")
+    (agent,) = cell.agents("arm")
     killed = cell.begin("run", "robot.py", "--arg", f"into={cell.written}", "--settings", "user.toml")
     cell.come()
     (orphan,) = cell.processes()
@@ -214,7 +217,7 @@ def test_whoever_is_killed_nothing_is_left_and_the_rest_goes_on(cell: Cell) -> N
     (part,) = cell.processes()
     agent.kill()
     wait_for(lambda: not is_there(part))
-    agent = cell.agent("arm")  # at the same port
+    (agent,) = cell.agents("arm")  # at the same port
     cell.come(20)
     run.send_signal(signal.SIGINT)
     assert run.wait(timeout=20) == 1
