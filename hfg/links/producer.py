@@ -18,6 +18,7 @@ import msgspec
 
 from hfg.errors import UsageError
 from hfg.links.frames import (
+    LONGEST_METADATA,
     LONGEST_NAME,
     OtherVersion,
     Outgoing,
@@ -188,7 +189,10 @@ class ExactProducer:
         number = self._next
         if number > self._limit:
             raise self._why_not()
-        self._kept.append(checked(token, self._largest_token))
+        metadata, value = token
+        if type(value) is not bytes or len(value) > self._largest_token or len(metadata) > LONGEST_METADATA:
+            token = checked(token, self._largest_token)  # which most need not
+        self._kept.append(token)
         self._next = number + 1
         if number <= self._released or not self._peers:  # done before: a relay that began anew comes to it again
             self._free()

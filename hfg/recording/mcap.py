@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, BinaryIO, Final, NamedTuple, TypeAlias
 
 import lz4.frame  # type: ignore[import-untyped]
@@ -156,20 +156,12 @@ class Writer:
         begins = self.bytes_written
         at = begins + len(chunk)
         indexes, written = {}, []
-        by_channel = np.argsort(channels, kind="stable")
-        pairs = np.empty((len(channels), 2), "<u8")
-        pairs[:, 0], pairs[:, 1] = times[by_channel], offsets[by_channel]
-        first_of = 0
-        for channel, count in enumerate(np.bincount(channels).tolist()):
-            if not count:
-                continue
-            mine = pairs[first_of : first_of + count]
-            first_of += count
-            record = _record(_MESSAGE_INDEX, struct.pack("<HI", channel, mine.nbytes), mine.tobytes())
+        for channel, pairs in _by_channel(channels, times, offsets):
+            record = _record(_MESSAGE_INDEX, struct.pack("<HI", channel, pairs.nbytes), pairs.tobytes())
             indexes[channel] = at
             at += len(record)
             written.append(record)
-            self._counts[channel] += count
+            self._counts[channel] += len(pairs)
         self._write(chunk + b"".join(written))
         self._stream.flush()
         length = sum(map(len, written))
@@ -234,6 +226,20 @@ class Writer:
     def _write(self, data: bytes) -> None:
         self._stream.write(data)
         self.bytes_written += len(data)
+
+
+def _by_channel(
+    channels: npt.NDArray[Any], times: npt.NDArray[Any], offsets: npt.NDArray[Any]
+) -> Iterator[tuple[int, npt.NDArray[np.uint64]]]:
+    """Give the channels of the messages of a chunk, each with the times and places of its own, in their order."""
+    order = np.argsort(channels, kind="stable")
+    pairs = np.empty((len(channels), 2), "<u8")
+    pairs[:, 0], pairs[:, 1] = times[order], offsets[order]
+    first = 0
+    for channel, count in enumerate(np.bincount(channels).tolist()):
+        if count:
+            yield channel, pairs[first : first + count]
+            first += count
 
 
 def _compressed(content: bytes) -> tuple[str, bytes]:

@@ -150,13 +150,16 @@ def _process(references: Sequence[str], how: _How) -> tuple[list[Trial], str]:
                 raise
             if not line:
                 told.seek(0)
-                code = process.wait()
-                if code == -signal.SIGXCPU:
-                    return trials, f"{_STOPPED} {how.limit_s:g} s of processor time"
-                return trials, _death(code, told.read())
+                return trials, _end(process.wait(), told.read(), how)
             trials.append(msgspec.json.decode(line, type=Trial))
         process.wait()
     return trials, ""
+
+
+def _end(code: int, told: str, how: _How) -> str:
+    if code == -signal.SIGXCPU:
+        return f"{_STOPPED} {how.limit_s:g} s of processor time"
+    return _death(code, told)
 
 
 def _read(process: subprocess.Popen[str], lines: queue.Queue[str]) -> None:
