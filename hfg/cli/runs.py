@@ -253,26 +253,35 @@ async def _deploy(settings: str | None, target: str, on: str | None, arguments: 
         gone = asyncio.ensure_future(_gone(realm, agent, order.run))
         begun = asyncio.ensure_future(realm.until(lambda: run_place(run) in realm.runs, _BEGINS_S))
         await asyncio.wait({gone, begun}, return_when=asyncio.FIRST_COMPLETED)
-        is_there = run_place(run) in realm.runs
-        for waiting in (gone, begun):
-            waiting.cancel()
-        if not is_there:
+        begun.cancel()
+        if run_place(run) not in realm.runs:
+            has_failed = gone.result() if gone.done() else True  # else it is slow beyond all patience
+            gone.cancel()
             told = await _ask_agent(realm, agent, ReadLog(order.run, 0), Chunk)
             sys.stderr.write(told.text)
-            if gone.done() and not gone.cancelled() and not gone.result():
+            if not has_failed:
                 return 0  # it was over before anybody could look
             show.sentence(f'{target} has not begun on host "{host}"; what it wrote is above')
             return 1
+        gone.cancel()
     sys.stdout.write(f"{run}\n")
     show.sentence(f'{target} runs on host "{host}": hfg logs {run}, hfg ps, hfg stop {run}')
     return 0
 
 
 async def _gone(realm: Realm, agent: AgentIs, run: str) -> bool:
-    """Wait until the main part of a run is gone; gives whether it has failed."""
+    """Wait until the main part of a run is gone; gives whether it has failed.
+
+    Raises:
+      TransportError: the agent is gone.
+    """
     while True:
-        with contextlib.suppress(NoAnswer):
+        try:
             told = await _ask_agent(realm, agent, Wait(run, "", _FIRST_LIFE), Gone, timeout_s=20.0)
+        except NoAnswer:
+            if agent_place(agent) not in realm.agents:
+                raise TransportError(f'the agent of host "{agent.host}" is gone, and the run with it') from None
+        else:
             if told.how:
                 return "ended with code 0" not in told.how
         await asyncio.sleep(_LOOKS_AGAIN_S)
