@@ -335,6 +335,7 @@ class _Making:
                         seed=group.seed,
                         process=group.process,
                         host=group.host,
+                        ledger=group.ledger,
                     )
         if owner is None:
             self.declare(graph, box, key)

@@ -93,7 +93,9 @@ class _Telling:
         for spec in root.whole.groups.by_name.values():
             if spec != GroupSpec("loop"):
                 threads = 1 if spec.name == "loop" else spec.threads
-                document.groups[spec.name] = GroupDocument(threads, spec.policy, spec.seed, spec.process, spec.host)
+                document.groups[spec.name] = GroupDocument(
+                    threads, spec.policy, spec.seed, spec.process, spec.host, spec.ledger
+                )
         for name, port in root.ports.inputs.items():
             document.inputs[name] = self.type_text(port.type, f'input "{name}"')
         for name, out in root.ports.outputs.items():

@@ -101,6 +101,7 @@ class GroupDocument(msgspec.Struct, omit_defaults=True):
       seed: for policy "random"; by default the run's.
       process: it has a process of its own.
       host: the agent that runs that process.
+      ledger: what that has done is kept: true by the run, a path in that file, too.
     """
 
     threads: int = 1
@@ -108,6 +109,7 @@ class GroupDocument(msgspec.Struct, omit_defaults=True):
     seed: int | None = None
     process: bool = False
     host: str = ""
+    ledger: bool | str = False
 
 
 class ParameterDocument(msgspec.Struct, omit_defaults=True):

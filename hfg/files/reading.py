@@ -122,8 +122,10 @@ class _Reading:
             case inspect.UnionType(types=types):
                 if found.value is None and any(isinstance(one, inspect.NoneType) for one in types):
                     return None
-                (inner,) = (one for one in types if not isinstance(one, inspect.NoneType))
-                return self.value(found, inner, key)
+                inners = [one for one in types if not isinstance(one, inspect.NoneType)]
+                is_switch = isinstance(found.value, bool)  # of those with two, one is true or false
+                fits = [one for one in inners if isinstance(one, inspect.BoolType) == is_switch]
+                return self.value(found, (fits or inners)[0], key)
             case inspect.LiteralType(values=values):
                 if found.value in values:
                     return found.value

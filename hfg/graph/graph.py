@@ -323,6 +323,7 @@ class Graph:
         seed: int | None = None,
         process: bool = False,
         host: str | None = None,
+        ledger: bool | str | os.PathLike[str] = False,
     ) -> GroupSpec:
         """Declare where nodes run; groups belong to the whole graph, wherever they are declared.
 
@@ -334,11 +335,14 @@ class Graph:
           seed: for policy "random"; by default the run's.
           process: True for a process of its own; edges to and from its nodes become links (rule L1).
           host: the agent that is to run that process, as in host="arm"; it implies `process`.
+          ledger: True: what the process has done, its `hfg.State` and its places on all edges are kept together, so
+            that another goes on from there when it dies, with nothing lost or doubled. A path: in that file as well, so
+            that the next run goes on, too.
 
         Raises:
           GraphError: a value is out of its range, or the group is declared otherwise already.
         """
-        return declare_group(self._level, name, threads, policy, seed, process, host)
+        return declare_group(self._level, name, threads, policy, seed, process, host, ledger)
 
     def move(self, node: Node | str, *, group: str | None) -> None:
         """Let a node run in another group; with a subgraph go all inside that have no group of their own.

@@ -169,6 +169,11 @@ class ExactProducer:
         """How many tokens are not done by all."""
         return len(self._kept)
 
+    @property
+    def outbox(self) -> Outbox:
+        """What another life would need to carry on from here."""
+        return Outbox(self._stream, self._next - len(self._kept), tuple(self._kept))
+
     def takes(self, position: Position | None = None) -> bool:
         """Whether a token of that position can be sent now: `free`, and where numbers jump all before is done."""
         if position is not None and tuple(position) >= (self._stream, self._next):

@@ -18,6 +18,7 @@ from hfg.encoding import TokenCodec
 from hfg.engine.runtime.borders import Hearing
 from hfg.errors import EncodingError, RunError, TransportError
 from hfg.graph.flat import CutEdge
+from hfg.links import Outbox
 from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
 from hfg.parts.failing import codec_of
@@ -27,7 +28,7 @@ from hfg.parts.part import Part
 from hfg.parts.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
 from hfg.token import Token
-from hfg.transport import Delivery, Position, Session
+from hfg.transport import Delivery, EncodedToken, Position, Session
 
 __all__ = ["Carrier", "Channel", "name_of"]
 
@@ -147,9 +148,10 @@ class Carrier:
         lives: dict[str, int],
         edges: list[CutEdge],
         say: Callable[[str, Message], None],
-        inheriting: frozenset[str] = frozenset(),
+        remembering: frozenset[str] = frozenset(),
         *,
         shares_memory: bool = False,
+        admits: bool = True,
     ) -> None:
         """Connect the part.
 
@@ -160,8 +162,9 @@ class Carrier:
           lives: which life of each part this is for.
           edges: those between it and others.
           say: brings a message to another part.
-          inheriting: the parts whose tokens inherit positions.
+          remembering: the parts that know in each life what they have sent in others.
           shares_memory: large arrays may go through shared memory.
+          admits: parts of younger lives are there, and hear what they are told.
         """
         self._part = part
         self._links: dict[str, _Outgoing | _Incoming] = {}
@@ -172,12 +175,16 @@ class Carrier:
             if edge.source == part.name:
                 self._links[edge.label] = outgoing[edge.label] = _Outgoing(world, edge)
             else:
-                self._links[edge.label] = incoming[edge.label] = _Incoming(world, edge, edge.source in inheriting)
+                self._links[edge.label] = incoming[edge.label] = _Incoming(world, edge, edge.source in remembering)
+            if part.keeper is not None and edge.source == part.name:
+                continue  # what is kept must hold the arrays
             if shares_memory and edge.within_host and edge.guarantee == "exact":
                 self._links[edge.label].share(world)
         self._outgoing, self._incoming = outgoing, incoming
         part.connect(outgoing, incoming)
-        for other, life in lives.items():
+        if part.keeper is not None:
+            part.keeper.stand_at(part.inlets, part.outlets, outgoing)
+        for other, life in lives.items() if admits else ():
             if life > lives[part.name]:
                 self.admit(other, life)
 
@@ -249,7 +256,9 @@ class _Outgoing(_NearEnd):
         self._waits_to_join = lives[part.name] > lives[edge.target]
         self._known: Where = (0, 0)  # the last that had come from former lives
         self._lending: Lending | None = None
+        self._held: deque[EncodedToken] = deque()  # what is not kept yet, and may not leave before it is
         self._sender: LinkSender | BoundedSender
+        outbox = None if part.keeper is None else part.keeper.outbox(edge.label)
         if edge.guarantee == "exact":
             self._sender = sender = LinkSender(
                 world.session,
@@ -258,8 +267,11 @@ class _Outgoing(_NearEnd):
                 window=self._most,
                 released=self._released,
                 inherits=part.inherits,
+                outbox=outbox,
             )
-            sender.admit(name_of(edge.target), lives[edge.target])
+            after = None if outbox is None else outbox.first - 1
+            sender.admit(name_of(edge.target), lives[edge.target], after=after)
+            part.outlets[edge.label].owe(sender.machine.unfinished)
         else:
             self._sender = BoundedSender(world.session, self._key, epoch=lives[part.name])
 
@@ -270,7 +282,7 @@ class _Outgoing(_NearEnd):
             return 0
         if isinstance(sender, BoundedSender):
             return self._edge.window * 4
-        room = self._most - sender.machine.unfinished
+        room = self._most - self._unfinished
         return self._in_a_row(sender, room) if self._part.inherits and room > 0 else room
 
     def _in_a_row(self, sender: LinkSender, most: int) -> int:
@@ -293,7 +305,9 @@ class _Outgoing(_NearEnd):
         try:
             for token in tokens:
                 encoded = self._codec.encode(token) if lending is None else lending.encode(self._codec, token)
-                if part.inherits and isinstance(sender, LinkSender):
+                if part.keeper is not None:
+                    self._held.append(encoded)
+                elif part.inherits and isinstance(sender, LinkSender):
                     where = part.positions[label].popleft()
                     repeated += where <= self._known
                     sender.send_nowait(encoded, Position(*where))
@@ -314,7 +328,32 @@ class _Outgoing(_NearEnd):
 
     @property
     def _unfinished(self) -> int:
-        return self._sender.machine.unfinished if isinstance(self._sender, LinkSender) else 0
+        return len(self._held) + (self._sender.machine.unfinished if isinstance(self._sender, LinkSender) else 0)
+
+    # --- of a part with a ledger (see `Leaving`)
+
+    def outbox(self) -> Outbox | None:
+        """See `Leaving`."""
+        if not isinstance(self._sender, LinkSender):
+            return None
+        stream, first, tokens = self._sender.machine.outbox
+        return Outbox(stream, first, (*tokens, *self._held))
+
+    @property
+    def held(self) -> int:
+        """See `Leaving`."""
+        return len(self._held)
+
+    def let_go(self, count: int) -> None:
+        """See `Leaving`."""
+        try:
+            for _ in range(count):
+                self._sender.send_nowait(self._held.popleft())
+        except TransportError as error:
+            label = self._edge.label
+            problem = RunError(f'edge "{label}" cannot carry a value to {name_of(self._edge.target)}: {error}')
+            problem.__cause__ = error
+            self._part.finish("failed", problem)
 
     def speaks(self, speaking: bool, total: int) -> None:
         """See `Outgoing`."""
@@ -332,10 +371,11 @@ class _Outgoing(_NearEnd):
         if isinstance(sender, LinkSender):
             sender.admit(name_of(self._edge.target), life)
         stream, number = sender.machine.position
+        number -= self._unfinished - len(self._held)
         if self._lending is not None:
             self._lending.admit()
         done = self._part.outlets[label].sent - self._unfinished
-        self._tell(Joins(label, done, stream, number - self._unfinished))
+        self._tell(Joins(label, done, stream, number))
         self._waits_to_join = False
         self._part.consumer_returns(label)
 
@@ -343,7 +383,20 @@ class _Outgoing(_NearEnd):
         """The consumer says what it has of former lives."""
         self._known = (message.stream, message.number)
         self._waits_to_join = False
-        self._part.precede(self._edge.label, message.total, message.hearing)  # type: ignore[arg-type]  # checked there
+        total = message.total
+        if self._part.keeper is not None:
+            total += self._ahead_of(message) - self._part.outlets[self._edge.label].sent
+        self._part.precede(self._edge.label, total, message.hearing)  # type: ignore[arg-type]  # checked there
+        if self._part.keeper is not None:
+            self._released()
+
+    def _ahead_of(self, message: Joins) -> int:
+        """How many tokens former lives have kept, and this one sent, that the consumer has not got."""
+        if not isinstance(self._sender, LinkSender):
+            return 0
+        stream, number = self._sender.machine.position
+        known = stream == message.stream
+        return len(self._held) + (number - message.number if known else self._sender.machine.unfinished)
 
     def share(self, world: _World) -> None:
         """Put large arrays into shared memory from now on, if the consumer can open it."""
@@ -396,6 +449,7 @@ class _Incoming(_NearEnd):
                 arrived=self._arrived,
                 capacity=_most_under_way(edge),
                 producer=lives[edge.source],
+                ledger=None if part.keeper is None else part.keeper.position(edge.label),
             )
         else:
             # What comes is laid on the edge at once, and that drops by the edge's own policy.
@@ -469,10 +523,14 @@ class _Incoming(_NearEnd):
 
     def join(self, message: Joins) -> None:
         """The producer says what former lives have done."""
-        self._done += message.total
+        total = message.total
+        ledger = None if self._part.keeper is None else self._part.keeper.position(self._edge.label)
+        if ledger is not None and ledger.stream == message.stream:
+            total += max(ledger.sequence - message.number, 0)  # which the producer does not know to be done
+        self._done += total
         self._before = message.total - message.number
         self._waits_to_join = False
-        self._part.follow(self._edge.label, message.total, (message.stream, message.number))
+        self._part.follow(self._edge.label, total, (message.stream, message.number))
         self._decode()
 
     def share(self, world: _World) -> None:

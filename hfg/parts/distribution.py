@@ -13,7 +13,7 @@ import os
 import sys
 import time
 import uuid
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,8 @@ from hfg.parts.asking import Asking
 from hfg.parts.channels import Carrier, Channel, name_of
 from hfg.parts.clocks import RunClock, machine
 from hfg.parts.failing import as_error
-from hfg.parts.inheriting import inheriting
+from hfg.parts.inheriting import keeping, remembering
+from hfg.parts.ledgers import Entry, Ledger, ledger_of
 from hfg.parts.lives import LIMIT, WITHIN_S
 from hfg.parts.messages import (
     Ask,
@@ -43,6 +44,8 @@ from hfg.parts.messages import (
     Ended,
     Failed,
     Finish,
+    Keep,
+    Kept,
     Logged,
     Message,
     OfAnEdge,
@@ -122,6 +125,7 @@ class Distribution:
         self._carrier: Carrier | None = None
         self._is_open = False
         self._has_begun = False
+        self._ledgers: dict[str, Ledger] = {}
         self._newest = FIRST_LIFE  # of all parts together: so a stream that begins later is higher on any link
 
     # --- the beginning ----------------------------------------------------------------------------------------------
@@ -146,6 +150,7 @@ class Distribution:
           HfgError: one of them cannot be, or its setup has failed. `close` is to be called all the same.
         """
         self._is_open = True
+        self._open_ledgers()
         self._session = session = await self._launcher.open()
         await self._launcher.prepare({name: self._host(name) for name in self._others}, self._modules)
         if self._launcher.is_in_realm:
@@ -162,16 +167,32 @@ class Distribution:
             self._lives,
             edges,
             self._say,
-            inheriting(self._cutting),
+            remembering(self._cutting),
             shares_memory=self._launcher.shares_memory,
+            admits=False,
         )
         for other in self._others.values():
             await self._launch(other)
+            if self._lives[other.name] > self._lives[MAIN]:
+                self._carrier.admit(other.name, self._lives[other.name])
         for other in self._others.values():
             await other.opened
 
     def _host(self, part: str) -> str:
         return self._cutting.parts[part].groups[part].host
+
+    def _open_ledgers(self) -> None:
+        """A part of which something is kept is younger than all who begin anew: those tell it where they stand."""
+        for name, where in keeping(self._cutting).items():
+            self._ledgers[name] = ledger_of(where, name)
+        kept = [name for name, ledger in self._ledgers.items() if ledger.entry is not None]
+        if kept:
+            first = 1 + max([ledger.entry.life for ledger in self._ledgers.values() if ledger.entry is not None])
+            self._lives = dict.fromkeys(self._lives, first)
+            self._newest = first
+            for name in kept:
+                self._newest += 1
+                self._lives[name] = self._newest
 
     def _channel_to(self, other: Other) -> Channel:
         lives = (FIRST_LIFE, self._lives[other.name])
@@ -187,7 +208,10 @@ class Distribution:
         shares = self._launcher.shares_memory
         engine = self._part.engine
         clock = RunClock(machine(), engine.ahead_s, engine.began_at)
-        self._say(name, Open(self._text, self._options, dict(self._lives), clock, _known_packages(), shares, calls))
+        ledger = self._ledgers.get(name)
+        kept = None if ledger is None or ledger.entry is None else ledger.entry.data
+        lives_of_all, known = dict(self._lives), _known_packages()
+        self._say(name, Open(self._text, self._options, lives_of_all, clock, known, shares, calls, kept))
 
     def begin(self) -> None:
         """All are set up: let them go, behind which the main part goes."""
@@ -218,6 +242,8 @@ class Distribution:
                 self._agreement.rest(message.rest)
             case Told():
                 self._agreement.hear(message.answer)
+            case Keep():
+                other.keep(partial(self._keep, other.name, message.number, message.data))
             case Ended():
                 self._ended_there(other, message)
             case Logged():
@@ -228,6 +254,19 @@ class Distribution:
                 other.close(message)
             case _:
                 _LOGGER.warning('%s has said "%s", which is not for here', name_of(other.name), type(message).__name__)
+
+    async def _keep(self, part: str, number: int, data: bytes, say: Callable[[Message], None]) -> None:
+        """Keep what a part has done, and tell it."""
+        ledger, entry = self._ledgers[part], Entry(self._newest, data)
+        try:
+            if ledger.is_slow and not self._part.engine.virtual:
+                await asyncio.to_thread(ledger.write, entry)
+            else:
+                ledger.write(entry)
+        except RunError as error:
+            self._part.finish("failed", error)
+        else:
+            say(Kept(number))
 
     def _rests(self, rest: Rest) -> None:
         self._loop.call_soon(self._agreement.rest, rest)
@@ -341,6 +380,10 @@ class Distribution:
         for other in self._others.values():
             await other.end()
         self._asking.close()
+        for ledger in self._ledgers.values():
+            if self._part.engine.outcome == "done" and ledger.entry is not None:
+                ledger.clear()
+            ledger.close()
         if self._carrier is not None:
             await self._carrier.close()
         if self._standing is not None:

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from hfg.graph.flat import LINK, MAIN, Cutting, FlatGraph, FlatNode
 from hfg.graph.flat.order import strongly_connected
 
-__all__ = ["Alignment", "Arrived", "Where", "inheriting"]
+__all__ = ["Alignment", "Arrived", "Where", "inheriting", "keeping", "remembering"]
 
 Where: TypeAlias = tuple[int, int]
 """The position of a token: stream and number."""
@@ -27,8 +27,38 @@ def inheriting(cutting: Cutting) -> frozenset[str]:
     """Give the parts whose tokens inherit positions; all parts of a run come to the same answer.
 
     A delay holds tokens back for good, so it would hold up who waits until they are done: with one in the graph none
-    does.
+    does; nor does one beside a ledger (see `keeping`).
     """
+    return frozenset() if _asked_for(cutting) else _one_to_one(cutting)
+
+
+def keeping(cutting: Cutting) -> dict[str, bool | str]:
+    """Give the parts that have a ledger, and where: as in `GroupSpec`; all parts of a run come to the same answer.
+
+    Beside one that was asked for, those that would inherit positions have one too: a neighbour that goes on from what
+    it has kept has not got all that it was sent, and what is inherited alone would not tell.
+    """
+    asked_for = _asked_for(cutting)
+    if not asked_for:
+        return {}
+    also: dict[str, bool | str] = dict.fromkeys(_one_to_one(cutting), True)
+    return also | asked_for
+
+
+def _asked_for(cutting: Cutting) -> dict[str, bool | str]:
+    return {
+        name: flat.groups[name].ledger
+        for name, flat in cutting.parts.items()
+        if name != MAIN and flat.groups[name].ledger
+    }
+
+
+def remembering(cutting: Cutting) -> frozenset[str]:
+    """Give the parts that remember what they have sent, in another life too."""
+    return inheriting(cutting) | keeping(cutting).keys()
+
+
+def _one_to_one(cutting: Cutting) -> frozenset[str]:
     if any(edge.initial for flat in cutting.parts.values() for edge in flat.edges):
         return frozenset()
     return frozenset(name for name, flat in cutting.parts.items() if name != MAIN and _is_one_to_one(flat))

@@ -1,7 +1,7 @@
 """What the parts of a run tell each other beside tokens, in order and without loss; and how.
 
-    Whole -> part     Open, TellTime, Begin, Question, Reborn, Finish, Call, Close
-    Part  -> whole    AskTime, Opened, Rest, Answer, Ended, Result, Seen, Logged, Closed
+    Whole -> part     Open, TellTime, Begin, Question, Reborn, Kept, Finish, Call, Close
+    Part  -> whole    AskTime, Opened, Rest, Answer, Keep, Ended, Result, Seen, Logged, Closed
     Part  -> part     Speaks, Hears, Joins, Shares, Sees
 
 All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
@@ -50,6 +50,8 @@ __all__ = [
     "Finish",
     "Hears",
     "Joins",
+    "Keep",
+    "Kept",
     "Logged",
     "Message",
     "OfAnEdge",
@@ -100,6 +102,7 @@ class Open(msgspec.Struct, frozen=True, tag=True):
       allow: packages whose node types may be imported.
       shares_memory: large arrays may go through shared memory.
       calls: what was asked for already, to be done before the nodes are set up.
+      kept: what the ledger has of former lives of the part.
     """
 
     graph: str
@@ -109,6 +112,7 @@ class Open(msgspec.Struct, frozen=True, tag=True):
     allow: list[str]
     shares_memory: bool = False
     calls: list[Call] = []
+    kept: bytes | None = None
 
 
 class Opened(msgspec.Struct, frozen=True, tag=True):
@@ -129,6 +133,24 @@ class TellTime(msgspec.Struct, frozen=True, tag=True):
 
     asked: float
     told: float
+
+
+class Keep(msgspec.Struct, frozen=True, tag=True):
+    """What a part has done until now is to be kept.
+
+    Attributes:
+      number: counts what this life of it has asked to be kept.
+      data: see `keeping`.
+    """
+
+    number: int
+    data: bytes
+
+
+class Kept(msgspec.Struct, frozen=True, tag=True):
+    """It is kept: what is in it may be told to others."""
+
+    number: int
 
 
 class Begin(msgspec.Struct, frozen=True, tag=True):
@@ -386,6 +408,8 @@ Message: TypeAlias = (
     | AskTime
     | TellTime
     | Begin
+    | Keep
+    | Kept
     | Ask
     | Told
     | Rests

@@ -106,6 +106,7 @@ class Other:
         self._is_restarted = False
         self.is_told = False
         self._returning: asyncio.Task[None] | None = None
+        self._keeping: asyncio.Task[None] | None = None
         self._channel: Channel
         self._watching: asyncio.Task[None] | None = None
         self._leaves = False
@@ -178,6 +179,11 @@ class Other:
         """Say something to it."""
         self._channel.send(message)
 
+    def keep(self, keep: Callable[[Callable[[Message], None]], Coroutine[Any, Any, None]]) -> None:
+        """Write into its ledger by that, which is given what speaks to the process of now, and to no later."""
+        keeping = keep(self._channel.send)
+        self._keeping = asyncio.get_running_loop().create_task(keeping, name=f"hfg ledger of {self.name}")
+
     def answer(self, error: HfgError | None) -> None:
         """It is set up, or will not be."""
         if not self.opened.done():
@@ -196,6 +202,8 @@ class Other:
             self._launched = None
         self._gone = False
         await self._channel.close()
+        if self._keeping is not None:
+            await asyncio.wait({self._keeping})
 
     def come_back(self, returning: Coroutine[Any, Any, None]) -> None:
         """Begin its next life by that."""
@@ -222,6 +230,8 @@ class Other:
         self._leaves = True
         if self._launched is not None:
             await self._launched.end()
+        if self._keeping is not None:
+            await asyncio.wait({self._keeping})
         if self._watching is not None:
             self._watching.cancel()
             await asyncio.wait({self._watching})

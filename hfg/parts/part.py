@@ -20,6 +20,7 @@ from hfg.errors import EngineInternalError, HfgError
 from hfg.graph.flat import CutEdge
 from hfg.parts.agreement import Account, Answer, Question, Rest
 from hfg.parts.inheriting import Alignment, Arrived, Where
+from hfg.parts.keeping import Keeper
 from hfg.ports.edges import EventEdge
 from hfg.token import Token
 
@@ -55,6 +56,7 @@ class Part:
     Attributes:
       name: of its group.
       composition: its engine, and what stands on that.
+      keeper: keeps what it does, if it has a ledger.
       inherits: whether what it sends inherits the positions of what comes in, and a token that came in is done when all
         that came of it is; else it is done when it was taken.
       positions: of what it will send next, by label of the edge, if it inherits them.
@@ -69,6 +71,7 @@ class Part:
         rests: Callable[[Rest], None],
         inherits: bool = False,
         returns: bool = False,
+        keeper: Keeper | None = None,
     ) -> None:
         """Make it; nothing is set up yet.
 
@@ -79,10 +82,12 @@ class Part:
           rests: told when nothing moves in it any more.
           inherits: see above.
           returns: it has lived before.
+          keeper: keeps what the part does, if it has a ledger.
         """
         edges = list(edges)
         self.name = name
         self.composition = composition
+        self.keeper = keeper
         self._rests = rests
         self._numbered = 0
         self._is_at_rest = False
@@ -106,7 +111,7 @@ class Part:
         coming = [edge.label for edge in edges if edge.target == name and _is_synchronous(edge)]
         self._leading = coming[0] if coming else ""
         self._origin = dict.fromkeys(self.inlets, 0)  # how many tokens came to former lives, or were skipped
-        self._alignment = Alignment(coming if returns else [])
+        self._alignment = Alignment(coming if returns and keeper is None else [])
         self._last = [  # who fires and sends nothing on; what stands for a subgraph never fires
             worker
             for worker in engine.core.by_path.values()
@@ -126,6 +131,27 @@ class Part:
         self._outgoing.update(outgoing)
         self._incoming.update(incoming)
 
+    def begin(self) -> None:
+        """All parts are set up: go."""
+        self.composition.lifetime.begin()
+        if self.keeper is not None:
+            self.engine.guard(self.keeper.go_on)
+
+    def be_kept(self, number: int) -> None:
+        """What was asked to be kept is kept: producers may hear of it, and what waited for it has left."""
+        if self.keeper is not None and self.keeper.be_kept(number):
+            self._is_at_rest = False
+            self._settle_kept()
+            self.send()
+            self.engine.kick()
+
+    def _settle_kept(self) -> None:
+        assert self.keeper is not None
+        for label, inlet in self.inlets.items():
+            done = min(inlet.taken, self.keeper.safe(label))
+            if inlet.settle(done):
+                self._incoming[label].taken(done)
+
     # --- tokens -----------------------------------------------------------------------------------------------------
 
     def receive(self, label: str, tokens: list[Arrived]) -> None:
@@ -138,6 +164,8 @@ class Part:
                 self._origin[one] += skipped
             for (value, activity, stamp), _ in later:
                 inlet.arrive(value, activity, stamp)
+            if self.keeper is not None:
+                self.keeper.came(one, [where for _, where in later])
             if self.inherits and one == self._leading:
                 for positions in self.positions.values():
                     positions.extend([where for _, where in later])
@@ -193,6 +221,8 @@ class Part:
     def follow(self, label: str, total: int, last: Where) -> None:
         """This life takes the place of others, of whose tokens on an edge that comes in so many were done."""
         self.inlets[label].rebase(total)
+        if self.keeper is not None:
+            self.keeper.rebased(label, total)
         self._origin[label] += total
         self._alignment.goes_on(label, last)
         self.receive(label, [])
@@ -246,7 +276,9 @@ class Part:
                     link.send(tokens)
 
     def _moved(self, inlet: Inlet) -> None:
-        if not self.inherits:
+        if self.keeper is not None:
+            self._settle_kept()
+        elif not self.inherits:
             inlet.settle(inlet.taken)
             self._incoming[inlet.label].taken(inlet.taken)
 
@@ -291,11 +323,16 @@ class Part:
         self.send()
         if self.inherits:
             self._settle()
+        if self.keeper is not None:
+            self.keeper.look()
 
     # --- quiet ------------------------------------------------------------------------------------------------------
 
     def _nothing_moves(self) -> None:
         if self._is_at_rest or any(outlet.has_more for outlet in self.outlets.values()):
+            return
+        if self.keeper is not None and self.keeper.is_behind:
+            self.keeper.look()  # it will rest when that is kept
             return
         self._is_at_rest = True
         self._numbered += 1

@@ -25,7 +25,8 @@ from hfg.parts.agreement import Rest
 from hfg.parts.channels import Carrier, Channel, name_of
 from hfg.parts.clocks import Offset, RunClock, machine
 from hfg.parts.failing import as_failed
-from hfg.parts.inheriting import inheriting
+from hfg.parts.inheriting import inheriting, keeping, remembering
+from hfg.parts.keeping import Keeper, read
 from hfg.parts.messages import (
     Ask,
     AskTime,
@@ -35,6 +36,8 @@ from hfg.parts.messages import (
     Closed,
     Ended,
     Finish,
+    Keep,
+    Kept,
     Logged,
     Message,
     OfAnEdge,
@@ -151,15 +154,20 @@ class Worker:
         if self._name not in cutting.parts:
             raise EngineInternalError(f'graph "{graph.name}" has no part "{self._name}" here')
         edges = list(cutting.edges_of(self._name))
-        composition = Composition(cutting.parts[self._name], Settings(**message.options))
-        heirs = inheriting(cutting)
+        flat_part = cutting.parts[self._name]
+        has_ledger = self._name in keeping(cutting)
+        options = message.options | ({"fast": False} if has_ledger else {})  # there is no between within a fused region
+        composition = Composition(flat_part, Settings(**options))
+        was_asked_for = bool(flat_part.groups[self._name].ledger)
+        keeper = self._keeper(composition, message.kept, was_asked_for) if has_ledger else None
         part = Part(
             self._name,
             composition,
             edges,
             rests=self._rests,
-            inherits=self._name in heirs,
-            returns=self._life > FIRST_LIFE,
+            inherits=self._name in inheriting(cutting),
+            returns=self._life > message.incarnations[MAIN],
+            keeper=keeper,
         )
         self._serving = Serving(graph, flat, composition, partial(self._say, MAIN))
         level_of(graph).whole.begin_run(self._serving.run)
@@ -170,10 +178,26 @@ class Worker:
         for other in neighbours - {self._name, MAIN}:
             self._channels[other] = self._channel_to(part, other, lives[other])
         self._carrier = Carrier(
-            part, self._session, self._run, lives, edges, self._say, heirs, shares_memory=message.shares_memory
+            part,
+            self._session,
+            self._run,
+            lives,
+            edges,
+            self._say,
+            remembering(cutting),
+            shares_memory=message.shares_memory,
         )
         self._shares_memory = message.shares_memory
         return part
+
+    def _keeper(self, composition: Composition, kept: bytes | None, keeps_states: bool) -> Keeper:
+        def keep(number: int, data: bytes) -> None:
+            self._say(MAIN, Keep(number, data))
+
+        snapshot = None if kept is None else read(kept, self._name)
+        keeper = Keeper(self._name, composition.engine, keep, snapshot, keeps_states=keeps_states)
+        keeper.check()
+        return keeper
 
     def _channel_to(self, part: Part, other: str, life: int) -> Channel:
         return Channel(self._session, self._run, self._name, other, (self._life, life), partial(self._obey, part))
@@ -226,7 +250,9 @@ class Worker:
             return
         match message:
             case Begin():
-                part.composition.lifetime.begin()
+                part.begin()
+            case Kept():
+                part.be_kept(message.number)
             case Ask():
                 self._say(MAIN, Told(part.answer(message.question)))
             case Finish():

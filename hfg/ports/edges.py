@@ -129,6 +129,11 @@ class Edge:
         self.sequential = sequential
         self.follows = follows
 
+    def go_on(self, sent: int, *, ended: bool) -> None:
+        """It takes the place of one over which so many tokens went, END last of all or not."""
+        self.sent = sent
+        self.ended = ended
+
     def rename(self, label: str) -> None:
         """Traces and reports call it so from now on."""
         self.label = label

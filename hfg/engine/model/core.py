@@ -268,6 +268,7 @@ class Core:
         self.fuse_after = 250  # firings of a head before its region is formed: forming costs as much as they save
         self.started = False
         self.over = False
+        self.recall: Callable[[Worker], None] | None = None  # gives a node back the state that was kept of it
         self.held = False  # the run is paused: nodes move one by one
         self.errors: list[HfgError] = []
         self.lost_activity = 0

@@ -85,6 +85,8 @@ def set_up(worker: Worker, then: Then) -> None:
     worker.be_up(True)  # from here on, for `teardown` follows a setup that fails half-way too
     try:
         worker.node._reset_states()
+        if worker.core.recall is not None:
+            worker.core.recall(worker)
     except Exception as error:  # a default that cannot be copied, a factory that fails
         problem = NodeError(worker.path, "its state", error)
         problem.__cause__ = error

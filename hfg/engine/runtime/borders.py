@@ -55,6 +55,7 @@ class Outlet:
         self._keeps = keeps
         (self._edge,) = worker.in_edges
         self._waiting = 0  # tokens that have left and still lie here
+        self._owed = 0  # tokens that a former life has kept and that are not taken: the oldest of those under way
         self.hearing: Hearing = "open"
         self.label: str = worker.port_name
         self.sent = 0
@@ -105,6 +106,17 @@ class Outlet:
         self.sent += total
         self.taken += total
 
+    def owe(self, count: int) -> None:
+        """A former life has kept so many for the consumer, which are on their way and do not lie here."""
+        self.sent += count
+        self._owed += count
+
+    @property
+    def unsent(self) -> list[Token[Any]]:
+        """What lies here and has not left, oldest first."""
+        lies: list[Token[Any]] = self._edge.contents()
+        return lies[self._waiting :]
+
     def repeat(self, count: int) -> None:
         """Of what has left, so many had been sent by a former life: they count once."""
         self.sent -= count
@@ -126,6 +138,9 @@ class Outlet:
         if count <= 0:
             return
         self.taken = total
+        of_former = min(count, self._owed)
+        self._owed -= of_former
+        count -= of_former
         self._waiting = min(self._waiting, self._edge.untaken)  # what a disabled producer took back is gone (F10)
         for _ in range(min(count, self._waiting)):
             self._waiting -= 1
@@ -192,6 +207,11 @@ class Inlet:
 
         worker.run_by(step)
         worker.changed()
+
+    @property
+    def waiting(self) -> int:
+        """How many have come that no firing and no call has taken."""
+        return len(self._inbox) + int(self._edge.untaken)
 
     def rebase(self, total: int) -> None:
         """A former life has done so many."""

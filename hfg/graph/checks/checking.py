@@ -21,6 +21,7 @@ from hfg.graph.checks.flow import (
     unconnected_inputs,
     unfed_slots,
 )
+from hfg.graph.checks.ledgers import kept_groups
 from hfg.graph.checks.nodes import (
     async_in_threads,
     concurrent_firings,
@@ -61,7 +62,7 @@ _OF_EACH_LEVEL: Final[list[Check]] = [
     endless_sources,
     unfed_slots,
 ]
-_OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions, changed_inputs, process_borders]
+_OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions, changed_inputs, process_borders, kept_groups]
 
 
 def also(check: Check) -> Check:

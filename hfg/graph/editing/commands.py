@@ -133,6 +133,7 @@ class AddGroup(Command, frozen=True):
     seed: int | None = None
     process: bool = False
     host: str | None = None
+    ledger: bool | str = False
 
 
 class ChangeGroup(Command, frozen=True):
@@ -144,6 +145,7 @@ class ChangeGroup(Command, frozen=True):
     seed: int | msgspec.UnsetType | None = msgspec.UNSET
     process: bool | msgspec.UnsetType = msgspec.UNSET
     host: str | msgspec.UnsetType = msgspec.UNSET
+    ledger: bool | str | msgspec.UnsetType = msgspec.UNSET
 
 
 class RemoveGroup(Command, frozen=True):

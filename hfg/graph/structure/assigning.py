@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 from hfg.errors import GraphError
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.membership import set_options
@@ -22,6 +24,7 @@ def declare_group(
     seed: int | None,
     process: bool = False,
     host: str | None = None,
+    ledger: bool | str | os.PathLike[str] = False,
 ) -> GroupSpec:
     """Declare a group of the whole graph.
 
@@ -32,7 +35,7 @@ def declare_group(
     groups = level.whole.groups
     declared: GroupSpec | None = None
     with Refusable(name):
-        declared = group_spec(name, threads, policy, seed, process, host)
+        declared = group_spec(name, threads, policy, seed, process, host, ledger)
         groups.declare(declared)
     # One that is refused while refusals are kept is there nevertheless, so that nodes in it are not refused as well.
     return declared if declared is not None else groups.by_name.setdefault(str(name), GroupSpec(str(name)))

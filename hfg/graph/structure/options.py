@@ -7,6 +7,7 @@ nodes nor ports.
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Iterable
 from typing import Any, Final, Literal, TypeAlias, TypeGuard, TypeVar
 
@@ -127,6 +128,8 @@ class GroupSpec(msgspec.Struct, frozen=True):
       seed: for "random"; None is the run's.
       process: its nodes run in a process of its own, on the loop or the threads there.
       host: of that process; "" is the one where the graph is run.
+      ledger: what its process has done is kept, so that another goes on from there: True by the run, a path in that
+        file, too.
     """
 
     name: str
@@ -135,6 +138,7 @@ class GroupSpec(msgspec.Struct, frozen=True):
     seed: int | None = None
     process: bool = False
     host: str = ""
+    ledger: bool | str = False
 
 
 _PAUSES: Final = {
@@ -254,7 +258,13 @@ def _listed(where: Callable[[], str], name: str, given: object, example: str) ->
 
 
 def group_spec(
-    name: str, threads: int | None, policy: str, seed: int | None, process: bool = False, host: str | None = None
+    name: str,
+    threads: int | None,
+    policy: str,
+    seed: int | None,
+    process: bool = False,
+    host: str | None = None,
+    ledger: bool | str | os.PathLike[str] = False,
 ) -> GroupSpec:
     """Check a group.
 
@@ -265,6 +275,7 @@ def group_spec(
       seed: for "random".
       process: whether it has a process of its own.
       host: where that is; whoever names one asks for a process.
+      ledger: whether what that has done is kept, or in which file.
 
     Raises:
       GraphError: a value is out of its range.
@@ -293,10 +304,18 @@ def group_spec(
         raise GraphError(
             f'{at}: it is the event loop of the program itself; declare another, graph.group("vision", process=True)'
         )
+    ledger = os.fspath(ledger) if isinstance(ledger, os.PathLike) else ledger
+    if type(ledger) is not bool and (type(ledger) is not str or not ledger):
+        raise GraphError(
+            f'{at}: ledger must be True (kept by the run) or the path of a file, as in ledger="writer.ledger", '
+            f"got {ledger!r}"
+        )
+    if ledger and not process:
+        raise GraphError(f"{at}: ledger= keeps what a process has done, and this group has none; add process=True")
     _need_choice(at, "policy", policy, POLICY, GraphError)
     if seed is not None:
         _need_whole(at, "seed", seed, None, GraphError)
-    return GroupSpec(name, threads, policy, seed, process, host)  # type: ignore[arg-type]  # checked above
+    return GroupSpec(name, threads, policy, seed, process, host, ledger)  # type: ignore[arg-type]  # checked above
 
 
 def _is_number(value: object) -> TypeGuard[int | float]:

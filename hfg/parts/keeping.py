@@ -1,0 +1,541 @@
+"""What a part with a ledger has done, as one piece of data, and how a new life of it goes on from there (rules L2, L4).
+
+Between two firings all there is to a part is the state of its nodes, what lies on its edges, and its places on those to
+and from other parts. That is kept together, or not at all. Until it is kept, nothing that came of it leaves the part,
+and no producer is told that anything of it is done: so whoever dies, what others have heard of the part and what the
+part knows of itself never differ, and no node has to do the same thing twice in the same way.
+
+Decides, never waits. Stands on the engine; what `part` and `channels` know of edges comes from them.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Protocol, get_type_hints
+
+import msgspec
+import numpy as np
+
+from hfg.encoding import TokenCodec, data
+from hfg.engine.model.worker import ENDED, Worker
+from hfg.engine.rules.agenda import consider, let_follow
+from hfg.engine.rules.ending import drain_left
+from hfg.engine.rules.sending import enqueue, put
+from hfg.engine.runtime.borders import Inlet, Outlet
+from hfg.engine.runtime.engine import Engine
+from hfg.errors import EncodingError, HfgError, RunError
+from hfg.links import Outbox
+from hfg.nodetype import Node
+from hfg.parts.inheriting import Where
+from hfg.ports import Port
+from hfg.ports.edges import AnyEdge, EventEdge
+from hfg.token import Token
+from hfg.transport import Position
+
+__all__ = ["Keeper", "Leaving", "Snapshot", "read"]
+
+_BYTES_PER_S: Final = 10_000_000  # how much is kept at most: large state is kept less often
+_VERSION: Final = 1
+
+Packed = tuple[int, bytes, bytes]
+"""A value: how it is encoded, metadata, and the bytes."""
+
+_BY_TYPE: Final = 0
+_AS_ARRAY: Final = 1
+_AS_DATA: Final = 2
+
+
+class KeptEdge(msgspec.Struct, array_like=True):
+    """An edge between two firings.
+
+    Attributes:
+      sent: how many tokens were put on it, of an edge that comes in: and taken.
+      ended: END was taken from it.
+      end_sent: END was put on it, of an event edge.
+      tokens: what lies on it: value, modifier and stamp of each.
+    """
+
+    sent: int
+    ended: bool
+    end_sent: bool
+    tokens: list[tuple[Packed, int, float]]
+
+
+class KeptOutbox(msgspec.Struct, array_like=True):
+    """What left over an edge and may not be done: see `Outbox`."""
+
+    stream: int
+    first: int
+    tokens: list[tuple[bytes, bytes]]
+
+
+class Snapshot(msgspec.Struct):
+    """A part between two firings.
+
+    Attributes:
+      version: of this class.
+      states: of nodes, by path and name.
+      ended: the nodes that have ended, by path; whether END is still to be sent.
+      edges: within the part and at its ends, by label.
+      coming: the position of the last token that was taken, by label of the edge.
+      leaving: what was sent, by label of the edge.
+    """
+
+    version: int
+    states: dict[str, dict[str, Packed]]
+    ended: dict[str, bool]
+    edges: dict[str, KeptEdge]
+    coming: dict[str, Where]
+    leaving: dict[str, KeptOutbox]
+
+
+def read(kept: bytes, part: str) -> Snapshot:
+    """Give what a ledger has kept.
+
+    Raises:
+      RunError: it is nothing that this version of hfg has kept.
+    """
+    try:
+        snapshot = msgspec.msgpack.decode(kept, type=Snapshot)
+    except msgspec.DecodeError as error:
+        raise RunError(f'the ledger of group "{part}" cannot be read ({error}): remove it to begin anew') from error
+    if snapshot.version != _VERSION:
+        raise RunError(
+            f'the ledger of group "{part}" was kept by another version of hfg ({snapshot.version}, this is '
+            f"{_VERSION}): let that one finish the run, or remove the ledger to begin anew"
+        )
+    return snapshot
+
+
+class Leaving(Protocol):
+    """The link behind an edge that leaves a part with a ledger."""
+
+    def outbox(self) -> Outbox | None:
+        """Give what has left and may not be done, what waits to be kept included; None where signals may be lost."""
+
+    @property
+    def held(self) -> int:
+        """How many tokens wait until they are kept."""
+
+    def let_go(self, count: int) -> None:
+        """So many of these are kept: they may leave."""
+
+
+class _Asked(msgspec.Struct):
+    """What will be known when it is kept.
+
+    Attributes:
+      number: of the message.
+      signature: of the moment.
+      taken: how many tokens were taken, by label of the edge.
+      held: how many tokens waited for it, by label of the edge.
+    """
+
+    number: int
+    signature: Any
+    taken: dict[str, int]
+    held: dict[str, int]
+
+
+class Keeper:
+    """Keeps what one part does."""
+
+    def __init__(
+        self,
+        name: str,
+        engine: Engine,
+        keep: Callable[[int, bytes], None],
+        kept: Snapshot | None = None,
+        *,
+        keeps_states: bool = True,
+    ) -> None:
+        """Keep nothing yet.
+
+        Args:
+          name: of the part.
+          engine: of the part, not begun yet.
+          keep: has data kept under a number; `be_kept` is called when it is.
+          kept: where former lives stopped.
+          keeps_states: the state of nodes as well as places on edges.
+        """
+        self._keeps_states = keeps_states
+        self.kept = kept
+        self._name = name
+        self._engine = engine
+        self._keep = keep
+        self._inlets: Mapping[str, Inlet] = {}
+        self._outlets: Mapping[str, Outlet] = {}
+        self._links: Mapping[str, Leaving] = {}
+        self._wheres: dict[str, deque[Where]] = {}
+        self._last: dict[str, Where] = {} if kept is None else dict(kept.coming)
+        self._safe: dict[str, int] = {}
+        self._asked: _Asked | None = None
+        self._known: Any = None
+        self._number = 0
+        self._not_before = 0.0
+        self._is_due = False
+        self._own: dict[str, dict[str, Any]] = {}
+        self._hints: dict[type, dict[str, Any]] = {}
+        self._codecs: dict[Any, TokenCodec[Any] | None] = {}
+        if kept is not None:
+            engine.core.recall = self._recall
+
+    def stand_at(
+        self, inlets: Mapping[str, Inlet], outlets: Mapping[str, Outlet], links: Mapping[str, Leaving]
+    ) -> None:
+        """These are the ends of the part."""
+        self._inlets, self._outlets, self._links = inlets, outlets, links
+        self._wheres = {label: deque() for label in inlets}
+        self._safe = dict.fromkeys(inlets, 0)
+        before = {} if self.kept is None else self.kept.edges
+        for edge in self._engine.core.edges:
+            if edge.label in before and edge.label in inlets:  # before anything comes
+                edge.go_on(before[edge.label].sent, ended=False)
+
+    def position(self, label: str) -> Position | None:
+        """Give the position of the last token of an edge that former lives have taken, if they have kept one."""
+        where = None if self.kept is None else self.kept.coming.get(label)
+        return None if where is None else Position(*where)
+
+    def outbox(self, label: str) -> Outbox | None:
+        """Give what former lives have sent over an edge, if they have kept some."""
+        found = None if self.kept is None else self.kept.leaving.get(label)
+        return None if found is None else Outbox(found.stream, found.first, tuple(found.tokens))
+
+    # --- tokens that come -------------------------------------------------------------------------------------------
+
+    def came(self, label: str, wheres: list[Where]) -> None:
+        """Tokens with these positions have come."""
+        self._wheres[label].extend(wheres)
+
+    def rebased(self, label: str, total: int) -> None:
+        """So many more came to former lives, as the other end counts."""
+        self._safe[label] += total
+        if self._asked is not None:
+            self._asked.taken[label] += total
+
+    def safe(self, label: str) -> int:
+        """How many tokens were taken whose effects are kept."""
+        return self._safe[label]
+
+    # --- keeping ----------------------------------------------------------------------------------------------------
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether something has happened that is not kept."""
+        return self._asked is not None or self._signature() != self._known
+
+    def _signature(self) -> Any:
+        core = self._engine.core
+        core.settle_counts()
+        workers = core.workers
+        return (
+            sum(worker.firings + worker.call_number for worker in workers),
+            [worker.path for worker in workers if worker.blocked & ENDED],
+            [worker.path for worker in workers if worker.pending_end],
+            [outlet.sent for outlet in self._outlets.values()],
+            [inlet.received - inlet.waiting for inlet in self._inlets.values()],
+        )
+
+    def look(self) -> None:
+        """A slice of the engine is over: keep what has happened, if this is a moment between firings."""
+        engine = self._engine
+        core = engine.core
+        if self._asked is not None or self._is_due or core.over or any(worker.busy for worker in core.workers):
+            return
+        signature = self._signature()
+        if signature == self._known:
+            return
+        if self._not_before > engine.loop.time():
+            self._is_due = True
+            engine.loop.call_at(self._not_before, self._look_again)
+            return
+        try:
+            kept = msgspec.msgpack.encode(self._snapshot())
+        except HfgError as error:
+            engine.finish("failed", error)
+            return
+        self._not_before = engine.loop.time() + len(kept) / _BYTES_PER_S
+        self._number += 1
+        taken = {label: inlet.received - inlet.waiting for label, inlet in self._inlets.items()}
+        held = {label: link.held for label, link in self._links.items()}
+        self._asked = _Asked(self._number, signature, taken, held)
+        self._keep(self._number, kept)
+
+    def _look_again(self) -> None:
+        self._is_due = False
+        self._not_before = 0.0  # a clock may stand a trifle before the moment for which it was set
+        self._engine.guard(self.look)
+
+    def be_kept(self, number: int) -> bool:
+        """It is kept: what has come of it may leave. Whether it is what was asked for last."""
+        asked = self._asked
+        if asked is None or asked.number != number:
+            return False
+        self._asked = None
+        self._known = asked.signature
+        self._safe |= asked.taken
+        for label, count in asked.held.items():
+            self._links[label].let_go(count)
+        return True
+
+    def _snapshot(self) -> Snapshot:
+        core = self._engine.core
+        if core.tasks:
+            busy = next(worker.path for worker in core.workers if worker.tasks is not None)
+            raise RunError(
+                f'group "{self._name}" has a ledger, and node "{busy}" has started a task beside its firings, of which '
+                "nothing can be kept: await what it does in the firing, or take ledger= from the group"
+            )
+        for label, inlet in self._inlets.items():
+            wheres = self._wheres[label]
+            while len(wheres) > inlet.waiting:
+                self._last[label] = wheres.popleft()
+        nodes = [worker for worker in core.workers if worker.node is not None and worker.scope is None]
+        leaving: dict[str, KeptOutbox] = {}
+        for label, link in self._links.items():
+            outbox = link.outbox()
+            if outbox is not None and outbox.stream:
+                tokens = [(bytes(metadata), bytes(value)) for metadata, value in outbox.tokens]
+                leaving[label] = KeptOutbox(outbox.stream, outbox.first, tokens)
+        return Snapshot(
+            _VERSION,
+            {worker.path: self._states(worker) if self._keeps_states else {} for worker in nodes},
+            {worker.path: worker.pending_end for worker in nodes if worker.blocked & ENDED},
+            {edge.label: self._edge(edge) for edge in core.edges},
+            dict(self._last),
+            leaving,
+        )
+
+    def _edge(self, edge: AnyEdge) -> KeptEdge:
+        tokens = edge.contents()
+        sent = edge.sent
+        if edge.label in self._inlets:  # they will come again
+            sent -= len(tokens)
+            tokens = []
+        elif edge.label in self._outlets:
+            tokens = self._outlets[edge.label].unsent
+            sent -= len(tokens)
+        else:
+            sent -= len(tokens)
+        hint = getattr(edge.source_port, "type", Any)
+        what = f'a value on "{edge.label}"'
+        packed = [(self._pack(token.value, hint, what), token.activity, token.stamp) for token in tokens]
+        return KeptEdge(sent, edge.ended, isinstance(edge, EventEdge) and edge.end_sent, packed)
+
+    def _states(self, worker: Worker) -> dict[str, Packed]:
+        node: Node = worker.node
+        self._need_state(worker.path, node)
+        found = {}
+        hints = self._hints_of(node)
+        for name in node._type.states:
+            found[name] = self._pack(node.__dict__[name], hints[name], f'"{name}" of node "{worker.path}"')
+        return found
+
+    # --- going on ---------------------------------------------------------------------------------------------------
+
+    def _recall(self, worker: Worker) -> None:
+        """Before a node is set up: give it the state that was kept of it."""
+        assert self.kept is not None
+        node = worker.node
+        states = self.kept.states.get(worker.path)
+        if node is None or states is None:
+            return
+        hints = self._hints_of(node)
+        for name, packed in states.items():
+            if name in node._type.states:
+                node.__dict__[name] = self._unpack(packed, hints[name], f'"{name}" of node "{worker.path}"')
+
+    def go_on(self) -> None:
+        """The nodes are set up and let go, and none has moved: be where former lives stopped."""
+        core = self._engine.core
+        for worker in core.workers:
+            if worker.node is not None and worker.scope is None:
+                if self.kept is not None:
+                    self._recall(worker)  # what setup() has written is older
+                self._own[worker.path] = _copies(_own(worker.node))
+        core.recall = None
+        if self.kept is not None:
+            self._go_on(self.kept)
+        self._known = self._signature()
+
+    def _go_on(self, kept: Snapshot) -> None:
+        core = self._engine.core
+        for path, is_pending in kept.ended.items():
+            worker = core.by_path[path]
+            worker.end()
+            if is_pending:
+                worker.promise_end(None)
+            else:
+                worker.take_deferred()
+            drain_left(worker.in_edges)
+        edges = {edge.label: edge for edge in core.edges}
+        for label, found in kept.edges.items():
+            edge = edges[label]
+            if label in self._inlets:  # on which new tokens lie already
+                edge.end(found.ended)
+            else:
+                edge.clear()
+                edge.go_on(found.sent, ended=found.ended)
+        for worker in core.workers:
+            core.upstairs.rewire(worker)
+        since = len(core.followers)
+        for label, found in kept.edges.items():
+            edge = edges[label]
+            hint = getattr(edge.source_port, "type", Any)
+            for packed, activity, stamp in found.tokens:
+                value = self._unpack(packed, hint, f'a value on "{label}"')
+                if isinstance(edge, EventEdge):
+                    enqueue(edge, value, activity, stamp)
+                else:
+                    put(edge, value, activity, stamp)
+                    source: Worker = edge.source
+                    if source.outputs.missing and source.placed:
+                        source.unplace()
+            if isinstance(edge, EventEdge) and found.end_sent:
+                edge.say_end()
+        let_follow(core, since)
+        for worker in core.workers:
+            consider(worker)
+        for path, is_pending in kept.ended.items():
+            worker = core.by_path[path]
+            if not is_pending:
+                core.upstairs.node_ended(worker)
+            elif not worker.outputs.missing:
+                core.upstairs.send_end(worker)
+
+    def check(self) -> None:
+        """See whether what was kept is of this part.
+
+        Raises:
+          RunError: it is of another graph.
+        """
+        if self.kept is None:
+            return
+        core = self._engine.core
+        nodes = {worker.path: worker.node for worker in core.workers if worker.node is not None and not worker.scope}
+        strange = sorted(self.kept.states.keys() ^ nodes.keys())
+        strange += sorted(self.kept.edges.keys() ^ {edge.label for edge in core.edges})
+        for path, states in self.kept.states.items():
+            node = nodes.get(path)
+            if node is not None and self._keeps_states:
+                strange += sorted(f"{path}.{name}" for name in states.keys() ^ node._type.states.keys())
+        if strange:
+            raise RunError(
+                f'the ledger of group "{self._name}" was kept of another graph: "{strange[0]}" is in one of them only; '
+                "run that graph to its end, or remove the ledger to begin anew"
+            )
+
+    # --- values -----------------------------------------------------------------------------------------------------
+
+    def _hints_of(self, node: Node) -> dict[str, Any]:
+        """What is declared of the states of a node, or can be seen of how they begin."""
+        kind = type(node)
+        if kind not in self._hints:
+            try:
+                said = get_type_hints(kind)
+            except Exception:  # a name that is known to a type checker alone
+                said = {}
+            hints: dict[str, Any] = {}
+            for name, state in node._type.states.items():
+                begins = type(state.default[0]) if state.default else state.factory
+                hints[name] = said.get(name, begins if isinstance(begins, type) or hasattr(begins, "__args__") else Any)
+            self._hints[kind] = hints
+        return self._hints[kind]
+
+    def _codec(self, hint: Any) -> TokenCodec[Any] | None:
+        try:
+            if hint not in self._codecs:
+                self._codecs[hint] = _codec(hint)
+            return self._codecs[hint]
+        except TypeError:  # unhashable
+            return _codec(hint)
+
+    def _pack(self, value: Any, hint: Any, what: str) -> Packed:
+        for kind, one in ((_BY_TYPE, hint), (_AS_ARRAY, np.ndarray if isinstance(value, np.ndarray) else None)):
+            codec = None if one is None else self._codec(one)
+            if codec is not None:
+                try:
+                    return (kind, *codec.encode(Token(value)))
+                except EncodingError:
+                    pass  # it may be data all the same
+        try:
+            plain = data.encode(value)
+            if data.has_tag(plain):
+                data.decode(plain, find=_refuse)
+            return (_AS_DATA, b"", msgspec.msgpack.encode(plain))
+        except (EncodingError, OverflowError, TypeError) as error:
+            raise RunError(
+                f'group "{self._name}" has a ledger, and {what} cannot be kept: {error}; declare its type, as in '
+                "seen: dict[str, int] = hfg.State(factory=dict), or take ledger= from the group"
+            ) from error
+
+    def _unpack(self, packed: Packed, hint: Any, what: str) -> Any:
+        kind, metadata, value = packed
+        try:
+            if kind == _AS_DATA:
+                return data.decode(msgspec.msgpack.decode(value), find=_refuse)
+            codec = self._codec(hint if kind == _BY_TYPE else np.ndarray)
+            if codec is None:
+                raise EncodingError("its type is another now")
+            found = codec.decode(metadata, value).value
+            return found.copy() if isinstance(found, np.ndarray) else found
+        except (EncodingError, msgspec.DecodeError) as error:
+            raise RunError(
+                f'the ledger of group "{self._name}" cannot be used: {what} is no value of the type that it has now '
+                f"({error}); remove the ledger to begin anew"
+            ) from error
+
+    def _need_state(self, path: str, node: Node) -> None:
+        """What changes outside of `hfg.State` would be lost, and nobody would know."""
+        before = self._own[path]
+        for name, value in _own(node).items():
+            if name in before and _is_same(before[name], value):
+                continue
+            raise RunError(
+                f'group "{self._name}" has a ledger, and node "{path}" keeps "{name}" outside of hfg.State, which '
+                f"{'changes' if name in before else 'appears'} while it runs and would be lost with its process: "
+                f"declare it as a state, as in {name} = hfg.State(0), or take ledger= from the group"
+            )
+
+
+def _codec(hint: Any) -> TokenCodec[Any] | None:
+    try:
+        return TokenCodec(hint)
+    except EncodingError:
+        return None
+
+
+def _refuse(reference: str) -> Any:
+    raise EncodingError(f'"{reference}" is code, and a ledger keeps none')
+
+
+def _own(node: Node) -> dict[str, Any]:
+    """What the code of a node has written on it beside its state."""
+    states = node._type.states
+    before = node._written_before or frozenset()
+    return {
+        name: value
+        for name, value in node.__dict__.items()
+        if name not in states and name not in before and not isinstance(value, Port)
+    }
+
+
+def _copies(own: dict[str, Any]) -> dict[str, Any]:
+    """Copies of what can change in its place, as far as that is seen at once."""
+    return {name: value.copy() if type(value) in _CONTAINERS else value for name, value in own.items()}
+
+
+def _is_same(before: Any, now: Any) -> bool:
+    if before is now:
+        return True
+    if type(before) is not type(now) or type(now) not in (*_CONTAINERS, int, float, str, bytes, bool):
+        return False
+    try:
+        return bool(before == now)
+    except Exception:
+        return len(before) == len(now)
+
+
+_CONTAINERS: Final = (list, dict, set, deque, bytearray)

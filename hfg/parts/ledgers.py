@@ -1,0 +1,135 @@
+"""Where what a part has done is kept: in the memory of the main part, which survives it, or in a file (rule L2).
+
+A ledger has one entry, and writing replaces it at once or not at all. Knows nothing of what is in an entry.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import zlib
+from typing import NamedTuple
+
+from hfg.errors import RunError
+
+__all__ = ["Entry", "Ledger", "LedgerFile", "ledger_of"]
+
+
+class Entry(NamedTuple):
+    """What is kept of a part.
+
+    Attributes:
+      life: the highest number of a life that was given in its run.
+      data: as the part has said it.
+    """
+
+    life: int
+    data: bytes
+
+
+class Ledger:
+    """Keeps an entry as long as the run goes on.
+
+    Attributes:
+      entry: what was written last.
+      is_slow: writing may take some milliseconds.
+    """
+
+    is_slow = False
+
+    def __init__(self) -> None:
+        self.entry: Entry | None = None
+
+    def write(self, entry: Entry) -> None:
+        """Put this in the place of what was there; when it returns it is kept.
+
+        Raises:
+          RunError: it cannot be.
+        """
+        self.entry = entry
+
+    def clear(self) -> None:
+        """The run has ended well: the next one begins anew."""
+        self.entry = None
+
+    def close(self) -> None:
+        """End it."""
+
+
+class LedgerFile(Ledger):
+    """Keeps the entry of one part in a file, which is open to one part of one run at a time."""
+
+    is_slow = True
+
+    def __init__(self, path: str, part: str) -> None:
+        """Open the file, and read what is there.
+
+        Args:
+          path: of the file; it is made if there is none.
+          part: of which part the entry is.
+
+        Raises:
+          RunError: it is no ledger, is broken, or another run has it open.
+        """
+        super().__init__()
+        self.path = path
+        self._part = part
+        try:
+            self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
+            self._file.execute("PRAGMA synchronous = FULL")
+            self._file.execute("PRAGMA locking_mode = EXCLUSIVE")
+            self._file.execute("BEGIN EXCLUSIVE")
+            self._file.execute(
+                "CREATE TABLE IF NOT EXISTS hfg_ledger (part TEXT PRIMARY KEY, life INT, sum INT, data BLOB)"
+            )
+            self._file.execute("COMMIT")
+            found = self._file.execute("SELECT life, sum, data FROM hfg_ledger WHERE part = ?", (part,)).fetchone()
+        except sqlite3.Error as error:
+            raise self._refuse(error) from error
+        if found is not None:
+            life, checksum, data = found
+            if zlib.crc32(data) != checksum:
+                raise RunError(
+                    f'ledger "{path}" of group "{part}" is broken: the checksum of what it keeps is another; restore '
+                    "it from a copy, or remove it to begin anew"
+                )
+            self.entry = Entry(life, data)
+
+    def write(self, entry: Entry) -> None:
+        """See `Ledger`."""
+        row = (self._part, entry.life, zlib.crc32(entry.data), entry.data)
+        try:
+            self._file.execute("INSERT OR REPLACE INTO hfg_ledger VALUES (?, ?, ?, ?)", row)
+        except sqlite3.Error as error:
+            raise self._refuse(error) from error
+        self.entry = entry
+
+    def clear(self) -> None:
+        """See `Ledger`."""
+        try:
+            self._file.execute("DELETE FROM hfg_ledger WHERE part = ?", (self._part,))
+        except sqlite3.Error as error:
+            raise self._refuse(error) from error
+        self.entry = None
+
+    def close(self) -> None:
+        """See `Ledger`."""
+        self._file.close()
+
+    def _refuse(self, error: sqlite3.Error) -> RunError:
+        return RunError(
+            f'ledger "{self.path}" of group "{self._part}" cannot be used: {error}; give a path that can be written, '
+            "of a file that is a ledger or not there, and that no other run or group has open"
+        )
+
+
+def ledger_of(where: bool | str, part: str) -> Ledger:
+    """Open the ledger of a part.
+
+    Args:
+      where: True or the path of a file.
+      part: its name.
+
+    Raises:
+      RunError: the file cannot be used.
+    """
+    return LedgerFile(where, part) if isinstance(where, str) else Ledger()
