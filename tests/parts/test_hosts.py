@@ -206,6 +206,7 @@ def test_a_run_is_deployed_looked_at_restarted_and_stopped_from_another_host(
     assert shared_memory() <= before
 
 
+@pytest.mark.soak
 @pytest.mark.rule("L2", "L3", "X3")
 def test_whoever_is_killed_nothing_is_left_and_the_rest_goes_on(cell: Cell) -> None:
     (agent,) = cell.agents("arm")
