@@ -145,14 +145,12 @@ def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cell]:
         yield one
     finally:
         left = children_of([process.pid for process in one.begun])
-        for process in one.begun:
-            with contextlib.suppress(OSError):
-                process.kill()
-            said, _ = process.communicate()
-            print(f"--- process {process.pid}: {process.args}\n{said}")
-        for pid in left:
+        for pid in [*left, *(process.pid for process in one.begun)]:  # first all: who lives holds the pipe open
             with contextlib.suppress(OSError):
                 os.kill(pid, signal.SIGKILL)
+        for process in one.begun:
+            said, _ = process.communicate()
+            print(f"--- process {process.pid}: {process.args!r}\n{said}")
 
 
 def shared_memory() -> set[str]:
