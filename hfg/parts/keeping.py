@@ -33,7 +33,7 @@ from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.token import Token
 from hfg.transport import Position
 
-__all__ = ["Keeper", "Leaving", "Snapshot", "read"]
+__all__ = ["Keeper", "KeptEdge", "KeptOutbox", "Leaving", "Snapshot", "read"]
 
 _BYTES_PER_S: Final = 10_000_000  # how much is kept at most: large state is kept less often
 _VERSION: Final = 1

@@ -109,7 +109,7 @@ class Door:
 
     def __init__(self, run: Run, target: str, name: str) -> None:
         self.run = run
-        self.guests: set[asyncio.Transport] = set()
+        self.guests: set[_Guest] = set()  # from when they knock until they are gone
         self.closed = False
         self._empty = asyncio.Event()
         self.name = Answer(os.getpid(), run.graph.name, target, name=name)
@@ -129,12 +129,13 @@ class Door:
     async def close(self) -> None:
         """Send everybody away, and see them gone: a loop that ends before that leaves their sockets open."""
         self.closed = True
+        await asyncio.sleep(0)  # who was let in at this very moment knocks in the loop's next pass
         for guest in self.guests:
-            guest.abort()
+            guest.send_away()
         if self.guests:
             await self._empty.wait()
 
-    def leave(self, guest: asyncio.Transport) -> None:
+    def leave(self, guest: _Guest) -> None:
         """One is gone."""
         self.guests.discard(guest)
         if self.closed and not self.guests:
@@ -213,31 +214,41 @@ class _Guest(asyncio.Protocol):
     def __init__(self, door: Door) -> None:
         self._door = door
         self._asked = b""
-        self._transport: asyncio.Transport
+        self._transport: asyncio.Transport | None = None
         self._tapping: asyncio.Task[None] | None = None
         self._may_write = asyncio.Event()
         self._may_write.set()
+        door.guests.add(self)
+
+    def send_away(self) -> None:
+        """End the connection; one that is not made yet ends when it is."""
+        if self._transport is not None:
+            self._transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        if self._door.closed or len(self._door.guests) >= _MOST_GUESTS:
+        if self._door.closed or len(self._door.guests) > _MOST_GUESTS:
             transport.abort()
             return
-        self._door.guests.add(transport)
         transport.set_write_buffer_limits(0)  # one answer at a time: whoever does not read is not heard
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._door.leave(self._transport)
+        self._door.leave(self)
         if self._tapping is not None:
             self._tapping.cancel()
 
+    @property
+    def _way(self) -> asyncio.Transport:
+        assert self._transport is not None
+        return self._transport
+
     def pause_writing(self) -> None:
-        self._transport.pause_reading()
+        self._way.pause_reading()
         self._may_write.clear()
 
     def resume_writing(self) -> None:
-        self._transport.resume_reading()
+        self._way.resume_reading()
         self._may_write.set()
 
     def data_received(self, data: bytes) -> None:
@@ -246,14 +257,14 @@ class _Guest(asyncio.Protocol):
         if (
             rest or len(line) > _LONGEST_QUESTION or self._tapping is not None
         ):  # nobody who keeps to the rules does that
-            self._transport.abort()
+            self._way.abort()
         elif newline:
             self._asked = b""
             answer = self._door.answer(line)
             self._say(self._tap(answer) if isinstance(answer, Question) else answer)
 
     def _say(self, answer: Answer) -> None:
-        self._transport.write(encode(answer) + b"\n")
+        self._way.write(encode(answer) + b"\n")
 
     def _tap(self, question: Question) -> Answer:
         size = _KEPT if question.max_rate_hz is None else None
@@ -269,5 +280,5 @@ class _Guest(asyncio.Protocol):
         with looking:
             async for token in looking:
                 await self._may_write.wait()
-                self._transport.write(line_of(token, began, json=json).encode())
-        self._transport.close()
+                self._way.write(line_of(token, began, json=json).encode())
+        self._way.close()
