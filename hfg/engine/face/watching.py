@@ -218,6 +218,7 @@ class _Guest(asyncio.Protocol):
         self._tapping: asyncio.Task[None] | None = None
         self._may_write = asyncio.Event()
         self._may_write.set()
+        self.is_let_in = False
         door.guests.add(self)
 
     def send_away(self) -> None:
@@ -228,9 +229,10 @@ class _Guest(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        if self._door.closed or len(self._door.guests) > _MOST_GUESTS:
+        if self._door.closed or sum(guest.is_let_in for guest in self._door.guests) >= _MOST_GUESTS:
             transport.abort()
             return
+        self.is_let_in = True
         transport.set_write_buffer_limits(0)  # one answer at a time: whoever does not read is not heard
 
     def connection_lost(self, exc: Exception | None) -> None:
