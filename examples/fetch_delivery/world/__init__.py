@@ -1,0 +1,17 @@
+"""The arena of the delivery example, simulated: walls, signs, robots, people. It knows nothing of graphs.
+
+simulation ── robots ── arena
+│           └────── (limits, collisions, odometry)
+├──── rendering ─── what the cameras see
+├──── scanning ──── what the lasers see
+├──── operators ─── people who put cubes in and take them out
+├──── faults ────── what can be made to go wrong, by name
+└──── scoring ───── what counts
+"""
+
+from examples.fetch_delivery.world.arena import Arena, Station
+from examples.fetch_delivery.world.faults import FAULTS, Fault, fault
+from examples.fetch_delivery.world.scoring import Score
+from examples.fetch_delivery.world.simulation import Simulation
+
+__all__ = ["FAULTS", "Arena", "Fault", "Score", "Simulation", "Station", "fault"]

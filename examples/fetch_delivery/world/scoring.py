@@ -1,0 +1,38 @@
+"""What counts: cubes, and what a referee would note down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass
+class Score:
+    """The score of one robot; times are in seconds.
+
+    Attributes:
+      fetched: when it got which cube.
+      delivered: when it has delivered which cube.
+      wrong: when which cube was taken at a station with another digit.
+      returned: when it gave which cube back at a filling station.
+      contact_s: how long it has touched something.
+      contacts: when each touch began.
+      lamp_while_driving_s: how long its lamp was on while it drove.
+      driven_m: how far it has driven.
+    """
+
+    fetched: list[tuple[float, int]] = field(default_factory=list)
+    delivered: list[tuple[float, int]] = field(default_factory=list)
+    wrong: list[tuple[float, int]] = field(default_factory=list)
+    returned: list[tuple[float, int]] = field(default_factory=list)
+    contact_s: float = 0.0
+    contacts: list[float] = field(default_factory=list)
+    lamp_while_driving_s: float = 0.0
+    driven_m: float = 0.0
+
+    def __str__(self) -> str:
+        """Say it in a line."""
+        return (
+            f"{len(self.delivered)} delivered, {len(self.wrong)} wrong, {len(self.returned)} returned, "
+            f"contact {self.contact_s:.1f} s, lamp while driving {self.lamp_while_driving_s:.1f} s, "
+            f"{self.driven_m:.0f} m driven"
+        )
