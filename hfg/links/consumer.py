@@ -80,6 +80,7 @@ class ExactConsumer:
     Attributes:
       name: see above.
       incarnation: see above.
+      capacity: see above.
       counts: what has happened.
       epoch: the life of the producer it listens to; 0: none yet.
       newer_incarnation: that of a newer life of this consumer, by which the producer has fenced this one off; or 0.
@@ -105,7 +106,7 @@ class ExactConsumer:
         self.epoch = 0
         self.newer_incarnation = 0
         self.closed = False
-        self._capacity = capacity
+        self.capacity = capacity
         self._expected = producer
         start = ledger or Position(0, 0)
         self._stream = start.stream
@@ -130,6 +131,11 @@ class ExactConsumer:
     def unfinished(self) -> int:
         """How many tokens have arrived and are not done."""
         return len(self._waiting) + self._taken
+
+    @property
+    def untold(self) -> int:
+        """How many tokens are done that the producer was not told of."""
+        return self._done - self._told
 
     @property
     def position(self) -> Position:
@@ -168,7 +174,7 @@ class ExactConsumer:
         self._older -= older
         self._done += count - older
         # A producer that waits needs the word now; else it has room still, and one word for several is cheaper.
-        if (count and not self._waiting) or older or 4 * (self._done - self._told) >= self._capacity:
+        if (count and not self._waiting) or older or 4 * (self._done - self._told) >= self.capacity:
             self._owes = True
 
     def believe(self, epoch: int) -> None:
@@ -207,7 +213,7 @@ class ExactConsumer:
             self._owes = True
             return
         values = values_of(frame, payload)
-        room = self._capacity - self._taken - len(self._waiting)
+        room = self.capacity - self._taken - len(self._waiting)
         stop = min(count, known + room)
         self.counts.repeated += known
         self.counts.overrun += count - stop
@@ -293,7 +299,7 @@ class ExactConsumer:
         self._owes = False
         self._told = self._done
         self.counts.statuses += 1
-        limit = self._done + max(self._capacity - self._older, self._accepted - self._done)
+        limit = self._done + max(self.capacity - self._older, self._accepted - self._done)
         status = Status(
             self.name, self.incarnation, self.epoch, self._stream, self._accepted, self._done, limit, self._seen
         )
@@ -305,7 +311,7 @@ class ExactConsumer:
         Raises:
           AssertionError: it does not.
         """
-        assert self.unfinished <= self._capacity, f"it holds {self.unfinished} tokens, more than {self._capacity} (L1)"
+        assert self.unfinished <= self.capacity, f"it holds {self.unfinished} tokens, more than {self.capacity} (L1)"
         assert self._accepted - self._done == self.unfinished - self._older, "its numbers and its tokens differ"
         numbers = [(one.stream, one.sequence) for one in self._waiting]
         assert numbers == sorted(set(numbers)), "tokens wait out of order (L2)"

@@ -104,6 +104,7 @@ class ExactProducer:
 
     Attributes:
       counts: what has happened.
+      window: see above.
       newer_epoch: that of a newer life of this producer, by which consumers have fenced this one off; or 0.
     """
 
@@ -126,7 +127,7 @@ class ExactProducer:
         self.epoch = epoch
         self.counts = ProducerCounts()
         self.newer_epoch = 0
-        self._window = window
+        self.window = window
         self._most = window + depth
         self._eager = release == "accepted"
         self._inherits = inherits
@@ -174,6 +175,11 @@ class ExactProducer:
         """What another life would need to carry on from here."""
         return Outbox(self._stream, self._next - len(self._kept), tuple(self._kept))
 
+    @property
+    def unsent(self) -> int:
+        """How many tokens have not been sent to anybody yet."""
+        return self._next - 1 - self._put
+
     def takes(self, position: Position | None = None) -> bool:
         """Whether a token of that position can be sent now: `free`, and where numbers jump all before is done."""
         if position is not None and tuple(position) >= (self._stream, self._next):
@@ -208,7 +214,7 @@ class ExactProducer:
             return UsageError("the link is closed")
         if self._stream == 0:
             return UsageError("this link inherits its numbers: give the position of the input with each token")
-        return UsageError(f"the window of {self._window} tokens is full: look at `free` first, or await send()")
+        return UsageError(f"the window of {self.window} tokens is full: look at `free` first, or await send()")
 
     def _begin_at(self, position: Position) -> bool:
         """Whether a token of that position is new; numbers go on from there if they jump."""
@@ -342,7 +348,7 @@ class ExactProducer:
     def _open_up(self) -> None:
         """See up to which number tokens may be sent."""
         before = self._next - 1 - len(self._kept)  # done by all
-        self._limit = 0 if self._closed or not self._stream else min(self._released + self._window, before + self._most)
+        self._limit = 0 if self._closed or not self._stream else min(self._released + self.window, before + self._most)
 
     # --- what leaves
 

@@ -1,8 +1,9 @@
 """The ends of links at work: over a session of a transport, on the event loop that is running.
 
-What is sent in one turn of the loop leaves in one datagram at its end, and so do the words on what is done. Nothing
-here decides: that is done by the machines beside this module, asked after each burst, at the end of each turn in
-which something was sent or done, and at the time when one has something to say by itself.
+What is sent in one turn of the loop leaves in one datagram at its end, and so do the words on what is done; a quarter
+of a window leaves at once, for there is work for the other end. Nothing here decides: that is done by the machines
+beside this module, asked after each burst, at the end of each turn in which something was sent or done, and at the time
+when one has something to say by itself.
 """
 
 from __future__ import annotations
@@ -25,6 +26,12 @@ __all__ = ["BoundedReceiver", "BoundedSender", "LinkReceiver", "LinkSender"]
 
 _HEADROOM = 8192  # bytes of a datagram that are kept for the header
 _TIMER_SLACK_S = 0.01
+_FEWEST = 4  # tokens, or words on tokens, for which a datagram is worth while that could be joined by more
+
+
+def _portion(window: int) -> int:
+    """Give how many leave at once, though the turn goes on: so that both ends work at the same time, not in turn."""
+    return max(window // 4, min(window, _FEWEST))
 
 
 def _to_all(name: str) -> str:
@@ -123,6 +130,7 @@ class LinkSender:
         room = session.largest_message - _HEADROOM
         options = {"largest_token": room, "largest_batch": min(60_000, room)} | options
         self.machine = ExactProducer(epoch, **options)
+        self._portion = _portion(self.machine.window)
         self.name = name
         self._loop = asyncio.get_running_loop()
         self._session = session
@@ -152,8 +160,8 @@ class LinkSender:
             raise TransportError(f'link "{self.name}" is closed')
         machine = self.machine
         number = machine.send(token, position)
-        if not machine.free:
-            self._flush()  # nothing can join it
+        if not machine.free or machine.unsent >= self._portion:
+            self._flush()  # nothing can join it, or it is enough
         elif not self._batch.asked:
             self._batch.ask()
         return number
@@ -374,6 +382,7 @@ class LinkReceiver(_Receiver):
         **options: Any,
     ) -> None:
         self.machine = ExactConsumer(consumer, incarnation, **options)
+        self._portion = _portion(self.machine.capacity)
         super().__init__(session, name, arrived)
         self._subscriptions.append(session.subscribe(_to_one(name, consumer), self._receive))
         self._back = session.publisher(_back(name), Traffic.ACKNOWLEDGEMENTS)
@@ -382,9 +391,10 @@ class LinkReceiver(_Receiver):
 
     def done(self, count: int = 1) -> None:
         """Say that the oldest tokens that were taken are processed; see `IncomingLink`."""
-        self.machine.done(count)
-        if not self.machine.unfinished:
-            self._flush()  # nothing can join it
+        machine = self.machine
+        machine.done(count)
+        if not machine.unfinished or machine.untold >= self._portion:
+            self._flush()  # nothing can join it, or it is enough
         elif not self._batch.asked:
             self._batch.ask()
 

@@ -283,6 +283,11 @@ class _Outgoing(_NearEnd):
         if isinstance(sender, BoundedSender):
             return self._edge.window * 4
         room = self._most - self._unfinished
+        if self._lending is not None:
+            if not self._lending.is_answered:
+                return 0
+            if not self._edge.edge.is_event_edge:  # whose links have no bound
+                room = min(room, self._lending.room)
         return self._in_a_row(sender, room) if self._part.inherits and room > 0 else room
 
     def _in_a_row(self, sender: LinkSender, most: int) -> int:
@@ -419,6 +424,7 @@ class _Outgoing(_NearEnd):
         """The consumer has opened it, or cannot."""
         if self._lending is not None:
             self._lending.seen(message)
+            self._part.room(self._edge.label)
 
     async def close(self) -> None:
         """End it."""

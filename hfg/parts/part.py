@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Protocol
+from functools import partial
+from typing import Any, Final, Protocol
 
 from hfg.engine.face.composition import Composition
 from hfg.engine.model.worker import ENDED
@@ -25,6 +26,8 @@ from hfg.ports.edges import EventEdge
 from hfg.token import Token
 
 __all__ = ["Incoming", "Outgoing", "Part"]
+
+_REST_S: Final = 0.002  # how long nothing has moved before that is said to others; in virtual time it is said at once
 
 
 class Outgoing(Protocol):
@@ -91,6 +94,7 @@ class Part:
         self._rests = rests
         self._numbered = 0
         self._is_at_rest = False
+        self._looks_later = False
         engine = self.engine
         keeps = {edge.label: edge.guarantee == "exact" for edge in edges}
         self.outlets: dict[str, Outlet] = {
@@ -156,6 +160,9 @@ class Part:
 
     def receive(self, label: str, tokens: list[Arrived]) -> None:
         """Tokens have come over a link, or it was told where they go on."""
+        self.engine.at_once(partial(self._receive, label, tokens))
+
+    def _receive(self, label: str, tokens: list[Arrived]) -> None:
         self._is_at_rest = False
         for one, (skipped, later) in self._alignment.arrive(label, tokens).items():
             inlet = self.inlets[one]
@@ -189,6 +196,9 @@ class Part:
         if total <= self.outlets[label].taken:
             return  # which was told in another way already, and moves nothing
         self._is_at_rest = False
+        self.engine.at_once(partial(self._take, label, total))
+
+    def _take(self, label: str, total: int) -> None:
         self.outlets[label].be_taken(total)
         self.send()
 
@@ -336,6 +346,26 @@ class Part:
             return
         self._is_at_rest = True
         self._numbered += 1
+        if self.engine.virtual:
+            self._say_rest()
+        elif not self._looks_later:
+            self._look_later()
+
+    def _look_later(self) -> None:
+        """A part that only waits for room rests again and again; to say so each time would cost as much as a token."""
+        self._looks_later = True
+        self.engine.loop.call_later(_REST_S, self._look, self._numbered)
+
+    def _look(self, rest: int) -> None:
+        self._looks_later = False
+        if self.engine.core.over or not self._is_at_rest:
+            return
+        if rest == self._numbered:
+            self._say_rest()
+        else:
+            self._look_later()
+
+    def _say_rest(self) -> None:
         self._rests(
             Rest(
                 self.name,

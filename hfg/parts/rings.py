@@ -34,7 +34,7 @@ _SMALLEST: Final = 2**16
 _SPARE: Final = 2  # slots beside those of the tokens under way: one is looked at, one is written to
 _MOST_SLOTS: Final = 128
 _LARGEST: Final = 2**28
-"""Bytes of a ring that are not exceeded for the sake of a long queue: what finds no slot is copied."""
+"""Bytes of a ring that are not exceeded for the sake of a long queue: what finds no slot there waits for one."""
 
 
 def segments_of(run: str) -> str:
@@ -76,6 +76,8 @@ class Lending:
 
     Attributes:
       ring: what large arrays lie in, once there was one.
+      is_answered: the consumer has said whether it can open what it was offered; until then each large array would have
+        to be copied, a whole window of them where that is long.
     """
 
     def __init__(
@@ -102,11 +104,13 @@ class Lending:
         self._segment = segment
         self._label = label
         self._slots = window + _SPARE
+        self._most = self._window = window
         self._unfinished = unfinished
         self._say = say
         self._thread = threading.get_ident()
         self._lane = 0
         self._is_seen = False
+        self.is_answered = True
         self._is_refused = unavailable() is not None
         self._early = 0
         self._leases: deque[list[Lease]] = deque()  # of each token under way, oldest first
@@ -117,6 +121,11 @@ class Lending:
         """How many large arrays went the ordinary way, and why."""
         found = RingCounts() if self.ring is None else self.ring.counts
         return LendingCounts(self._early, found.without_slot, found.too_large)
+
+    @property
+    def room(self) -> int:
+        """How many more tokens may leave so that each that has a large array finds a slot that none under way has."""
+        return self._most - sum(map(bool, self._leases)) if self._is_seen else self._window
 
     def loan(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> np.ndarray[Any, Any] | None:
         """Give an array of the ring to be filled; None if there is none, or no slot is free."""
@@ -188,6 +197,7 @@ class Lending:
             sweep_run(self._run)  # a former life of this part may have left a large one
             slots = max(1 + _SPARE, min(self._slots, _MOST_SLOTS, _LARGEST // size))
             self.ring = Ring(self._segment, slots, size, smallest=_SMALLEST)
+            self._most = slots - _SPARE
             self._leases.extend([] for _ in range(self._unfinished()))
             self._offer()
         except (SharedMemoryError, OSError) as error:
@@ -197,6 +207,7 @@ class Lending:
     def _offer(self) -> None:
         assert self.ring is not None
         self._lane = self.ring.admit()
+        self.is_answered = False
         self._say(Shares(self._label, self._segment, self._lane))
 
     def admit(self) -> None:
@@ -211,6 +222,7 @@ class Lending:
         """The consumer has opened what it was offered, or cannot."""
         if (message.segment, message.lane) != (self._segment, self._lane):
             return  # from a former life
+        self.is_answered = True
         if message.refused:
             _LOGGER.debug('edge "%s" copies its arrays: %s', self._label, message.refused)
             if not any(self._leases):
@@ -222,6 +234,7 @@ class Lending:
         """Remove the ring; who looks at arrays in it keeps them."""
         self._is_refused = True
         self._is_seen = False
+        self.is_answered = True
         ring = self.ring
         if ring is None:
             return

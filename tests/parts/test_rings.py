@@ -77,6 +77,35 @@ def is_lent(sent: tuple[bytes, bytes]) -> bool:
     return len(sent[1]) < SMALL
 
 
+def test_nothing_more_leaves_until_the_consumer_has_said_whether_it_can_open_the_ring(edge: Edge) -> None:
+    assert edge.lending.is_answered
+    edge.send(LARGE)
+    assert not edge.lending.is_answered
+    edge.agree()
+    assert edge.lending.is_answered
+    assert is_lent(edge.send(LARGE))
+
+
+def test_no_more_tokens_leave_than_find_a_slot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hfg.parts.rings._LARGEST", 5 * LARGE)
+    edge = Edge(window=64)
+    try:
+        edge.send(LARGE)
+        assert edge.lending.room == 64
+        edge.agree()
+        rooms = []
+        for _ in range(3):
+            rooms.append(edge.lending.room)
+            assert is_lent(edge.send(LARGE))
+        edge.send(SMALL)
+        assert [*rooms, edge.lending.room] == [3, 2, 1, 0]
+        edge.done()
+        edge.done()
+        assert edge.lending.room == 1
+    finally:
+        edge.lending.close()
+
+
 @pytest.mark.rule("L4")
 def test_small_arrays_make_no_ring_and_the_first_large_one_does(edge: Edge) -> None:
     edge.send(SMALL)
