@@ -11,14 +11,14 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench peers bench-peers bench-goals bench-docs docs-nodes soak setup clean
+.PHONY: help demo test lint bench peers bench-peers bench-goals bench-docs bench-links docs-nodes soak setup clean
 
 help:
 	@echo "make demo    search, measure and report on real photographs, watched and steered"
 	@echo "make test    run all tests (without the long ones)"
 	@echo "make lint    ruff and mypy"
 	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md;"
-	@echo "             bench-goals: what is to be reached, and whether it is)"
+	@echo "             bench-goals: what is to be reached, and whether it is; bench-links: from process to process)"
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything tools have left"
@@ -41,7 +41,7 @@ bench: $(READY)
 # The others have an environment of their own: nothing of hfg needs them. One that cannot be installed is named, and skipped.
 peers: $(READY)
 	@test -x $(PEERS)/bin/python || "$(PYTHON)" -m venv $(PEERS)
-	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[examples]'
+	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[examples,zenoh]'
 	@grep -v '^#' benchmarks/peers/requirements.txt | while read -r peer; do \
 	  $(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$peer" || echo "skipped: $$peer" >&2; done
 
@@ -52,6 +52,9 @@ bench-peers: peers
 # AGAINST=DIR, another checkout of hfg, adds what is compared with it.
 bench-goals: peers
 	$(PEERS)/bin/python -m benchmarks bench_goals --json $(RESULTS) $(if $(AGAINST),--against "$(AGAINST)")
+
+bench-links: peers
+	$(PEERS)/bin/python -m benchmarks bench_links --json $(RESULTS)
 
 bench-docs: $(READY)
 	$(BIN)/python -m benchmarks.page $(RESULTS)

@@ -31,7 +31,7 @@ SUITES = (
     "bench_threads",
     "bench_virtual_day",
 )
-OTHERS = ("bench_peers", "bench_goals")
+OTHERS = ("bench_peers", "bench_goals", "bench_links")
 T = TypeVar("T", str, Goal)
 
 
@@ -39,7 +39,7 @@ def main() -> int:
     """Run what was asked for and print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
-        "suites", nargs="*", default=SUITES, help=f"of {', '.join(SUITES + OTHERS)}; all but the last two by default"
+        "suites", nargs="*", default=SUITES, help=f"of {', '.join(SUITES + OTHERS)}; all but the last three by default"
     )
     parser.add_argument(
         "--runs", "--rounds", type=int, help="fresh processes per case; each suite has its own default, mostly 5"
@@ -66,22 +66,26 @@ def main() -> int:
         for line in getattr(suite, "MISSING", ()):
             print(f"  skipped: {line}")
         goals = chosen(getattr(suite, "GOALS", ()), arguments.only)
+        shows_cases = not goals or getattr(suite, "SHOWS_CASES", False)
+        wanted = [*cases_of(goals), *(chosen(suite.CASES, arguments.only) if shows_cases else [])]
         failed: dict[str, str] = {}
         records = measure(
             name,
             arguments.runs or getattr(suite, "RUNS", 5),
             progress,
-            only=cases_of(goals) if goals else chosen(suite.CASES, arguments.only),
+            only=wanted,
             quick=arguments.quick,
             against=arguments.against and arguments.against.resolve(),
             failed=failed if goals else None,
         )
         progress("")
-        if goals:
-            print(verdicts(goals, records, {**suite.SKIPPED, **failed}))
-        else:
+        if shows_cases:
             for record in records:
                 print(row(record))
+            for case, why in failed.items():
+                print(f"  {case}: {why.strip().splitlines()[-1]}")
+        if goals:
+            print(verdicts(goals, records, {**suite.SKIPPED, **failed}))
         if arguments.json:
             write(arguments.json, records)
     return 0

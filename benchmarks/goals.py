@@ -98,7 +98,7 @@ def verdicts(goals: Iterable[Goal], records: Iterable[Record], missing: Mapping[
         sign = "%" if goal.alone else ""
         lines.append(
             f"  {goal.name:{width}} {figure(verdict.ours):>9} {figure(verdict.peer):>9} {unit:3} "
-            f"{figure(verdict.median) + sign:>8} {ends:>19} {goal.at_most:>6g}  {'yes' if verdict.reached else 'no'}"
+            f"{figure(verdict.median) + sign:>8} {ends:>19} {goal.at_most:>6.3g}  {'yes' if verdict.reached else 'no'}"
         )
         judged += 1
         reached += verdict.reached

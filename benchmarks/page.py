@@ -10,12 +10,13 @@ from __future__ import annotations
 import argparse
 import json
 import re
-from collections.abc import Callable, Mapping
+import statistics
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from benchmarks.bench_goals import GOALS
+from benchmarks import bench_goals, bench_links
 from benchmarks.figures import Records, caption, cell, figure, measured_on
-from benchmarks.goals import judge
+from benchmarks.goals import Goal, judge
 from benchmarks.measure import ROOT, Record, read
 from benchmarks.works import WORKS
 
@@ -26,6 +27,8 @@ PAGE = ROOT / "docs" / "speed.md"
 SOURCE = ROOT / "docs" / "speed.jsonl"
 BLOCK = re.compile(r"(?P<begin><!-- (?P<name>[a-z]+) -->\n).*?(?P<end><!-- end -->)", re.DOTALL)
 OURS = "hfg, functions"
+SIZES = ("100 B", "6.2 MB")
+FIGURES = {"rate": "a second", "latency": "one way, µs"}
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
@@ -89,16 +92,68 @@ def threads(records: Records) -> str:
     return f"{table(['', 's'], rows)}\n\n{caption(records)}"
 
 
-def goals(records: Records) -> str:
+def goals(records: Records, of: Sequence[Goal] = bench_goals.GOALS) -> str:
     """What is to be reached: in each round ours over the other's, the median of that, and whether it is enough."""
     rows = []
-    for goal in GOALS:
+    for goal in of:
         if all(side.case in records for side in goal.sides):
             verdict = judge(goal, records)
             sign = " %" if goal.alone else ""
             ends = f"{figure(min(verdict.judged))} to {figure(max(verdict.judged))}"
-            rows.append([goal.name, figure(verdict.median) + sign, ends, f"{goal.at_most:g}{sign}"])
+            rows.append([goal.name, figure(verdict.median) + sign, ends, f"{goal.at_most:.3g}{sign}"])
     return f"{table(['ours / theirs', 'median', 'lowest to highest', 'at most'], rows)}\n\n{caption(records)}"
+
+
+def links(records: Records) -> str:
+    """From one process to another, nothing lost."""
+    return crossing(records, "")
+
+
+def leaky(records: Records) -> str:
+    """From one process to another, nobody waits."""
+    return crossing(records, "leaky, ")
+
+
+def crossing(records: Records, kind: str) -> str:
+    """How many arrive a second, and how old they are when they come slowly: two columns for each size."""
+    titles = {f"{size}, {what}": f"{size}: {title}" for size in SIZES for what, title in FIGURES.items()}
+    named = {tuple(case.split(" | ")): record for case, record in records.items()}
+    columns = [kind + column for column in titles if any(found == kind + column for _, found in named)]
+    rows = list(dict.fromkeys(row for row, column in named if column in columns))
+    body = [
+        [row, *(arrival(found) if (found := named.get((row, column))) else "" for column in columns)] for row in rows
+    ]
+    head = ["", *(titles[column.removeprefix(kind)] for column in columns)]
+    shown = {case: record for case, record in records.items() if case.split(" | ")[1] in columns}
+    return f"{table(head, body)}\n\n{caption(shown)}"
+
+
+def arrival(record: Record) -> str:
+    """A rate with its spread and, where nobody waits, how old they are; or a latency; and what was lost, if any was."""
+    figures = {name: statistics.median(values) for name, values in record.figures.items()}
+    if "wall" in figures:
+        text = f"{1e6 / figures['wall']:,.0f} ({record.spread:.0%})"
+    else:
+        text = f"{figure(figures['p50'])} / {figure(figures['p99'])} ({record.spread:.0%})"
+    if figures["lost"] <= 0:
+        return text
+    age = f", {figure(figures['p50'])} µs old" if "wall" in figures else ""
+    return f"{text}{age}; {figures['lost']:.1f} % lost"
+
+
+def apart(records: Records) -> str:
+    """Heavy work on two cores, and activity over a cut."""
+    work = records["examples/three_processes.py | seconds"]
+    moves = records["activity over an edge that is cut | one way"]
+    one = statistics.median(work.figures["one process"])
+    times = statistics.median(b / a for a, b in zip(work.values, work.figures["one process"], strict=True))
+    rows = [
+        [f"{work.size} pictures in three processes, s", cell(work)],
+        ["the same graph in one process, s", figure(one)],
+        ["how many times as fast", figure(times)],
+        ["activity over an edge that is cut, one way, µs", cell(moves)],
+    ]
+    return f"{table(['', ''], rows)}\n\n{caption({record.case: record for record in (work, moves)})}"
 
 
 def seconds(records: Records) -> str:
@@ -138,6 +193,10 @@ TABLES: dict[str, tuple[str, Callable[[Records], str]]] = {
     "day": ("bench_virtual_day", seconds),
     "files": ("bench_files", seconds),
     "profile": ("profile_hop", profile),
+    "links": ("bench_links", links),
+    "leaky": ("bench_links", leaky),
+    "linkgoals": ("bench_links", lambda records: goals(records, bench_links.GOALS)),
+    "apart": ("bench_links", apart),
 }
 """What may stand in `<!-- NAME -->`: the suite it needs, and who writes it."""
 

@@ -13,13 +13,14 @@ from typing import Any
 
 import pytest
 
-from benchmarks import bench_goals, bench_peers, figures, page, profile_hop, threaded
+from benchmarks import bench_goals, bench_links, bench_peers, figures, page, profile_hop, threaded
 from benchmarks.__main__ import SUITES
 from benchmarks.goals import Goal, Side, judge, verdicts
 from benchmarks.measure import BEFORE, ROOT, Record, measure, one, read, write
 from benchmarks.meters import Arrivals, Laps
 from benchmarks.nodes import through
 from benchmarks.ours import Kind, run
+from benchmarks.parcels import Job, Post
 from benchmarks.works import WORKS
 
 MODULES = {name: importlib.import_module(f"benchmarks.{name}") for name in (*SUITES, "bench_peers", "bench_goals")}
@@ -55,11 +56,54 @@ def test_every_peer_takes_part_or_is_named_as_missing() -> None:
         assert (peer in rows) != (f"{peer} is not installed" in bench_peers.MISSING), peer
 
 
-def test_every_goal_has_its_cases_or_the_reason_why_not() -> None:
-    assert bench_goals.GOALS
-    for goal in bench_goals.GOALS:
+@pytest.mark.parametrize("suite", [bench_goals, bench_links])
+def test_every_goal_has_its_cases_or_the_reason_why_not(suite: Any) -> None:
+    assert suite.GOALS
+    for goal in suite.GOALS:
         for side in goal.sides:
-            assert (side.case in bench_goals.CASES) != (side.case in bench_goals.SKIPPED), side.case
+            assert (side.case in suite.CASES) != (side.case in suite.SKIPPED), side.case
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        "hfg edge, window 8 | 100 B, rate",
+        "hfg edge, latest | leaky, 6.2 MB, latency",
+        "hfg link, window 8 | 100 B, latency",
+        "hfg publish and subscribe, window 8 | 100 B, rate",
+        "Zenoh, express puts | 100 B, rate",
+        "shared memory and semaphores | 6.2 MB, rate",
+    ],
+)
+def test_what_one_process_sends_another_has(case: str) -> None:
+    figures = bench_links.CASES[case].run(TOKENS)
+    assert isinstance(figures, dict)
+    assert 0 < figures["p50"] <= figures["p99"]
+    assert ("wall" in figures) == case.endswith("rate")
+    assert figures["lost"] == 0 or "leaky" in case
+
+
+def test_letters_that_are_lost_count_only_where_they_may_be() -> None:
+    lossless, leaky = Post(Job("letter", 5)), Post(Job("letter", 5, leaky=True))
+    for number in (-1, 0, 1, 2):
+        lossless.take(number, 0)
+    with pytest.raises(RuntimeError, match="number 4 has arrived behind 2"):
+        lossless.take(4, 0)
+    with pytest.raises(RuntimeError, match="3 of 5 have arrived"):
+        lossless.figures()
+    for number in (0, 1, 2, 4):
+        leaky.take(number, 0)
+    assert leaky.is_over
+    assert leaky.figures()["lost"] == pytest.approx(20)
+
+
+def test_rates_and_ages_and_losses_stand_in_one_cell() -> None:
+    rate = RECORD._replace(figures={"wall": [10.0, 20.0], "p50": [300.0, 300.0], "p99": [1.0, 1.0], "lost": [0.0, 0.0]})
+    age = RECORD._replace(figures={"p50": [300.0, 330.0], "p99": [1.0, 1.0], "lost": [0.0, 0.0]})
+    assert page.arrival(rate) == "66,667 (67%)"
+    assert page.arrival(age) == "315 / 1.00 (10%)"
+    rate.figures["lost"] = [50.0, 50.0]
+    assert page.arrival(rate) == "66,667 (67%), 300 µs old; 50.0 % lost"
 
 
 def test_the_camera_finds_the_same_in_groups_as_by_hand() -> None:

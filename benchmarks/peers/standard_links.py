@@ -1,0 +1,109 @@
+"""Two processes with the standard library alone: a pipe, and slots in shared memory that semaphores guard.
+
+Nothing is lost; the one that sends waits. What a leaky one would be is not tried.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from multiprocessing.shared_memory import SharedMemory
+from typing import Any
+
+import numpy as np
+
+from benchmarks.parcels import HEAD, SHAPE, Job, Picture, Post, letter, opened, picture, picture_bytes
+
+__all__ = ["pipe", "ring"]
+
+SLOTS = 8
+CONTEXT = multiprocessing.get_context("spawn")
+
+
+def pipe(job: Job) -> dict[str, float]:
+    """`multiprocessing.Pipe`, bytes."""
+    there, here = CONTEXT.Pipe()
+
+    def take(post: Post) -> None:
+        received = here.recv_bytes()
+        if job.what == "letter":
+            post.take_letter(received)
+        else:
+            picture = np.frombuffer(here.recv_bytes(), np.uint8).reshape(SHAPE)
+            post.take_picture(*opened(received), picture)
+
+    return run(job, take, send_to_pipe, there)
+
+
+def send_to_pipe(job: Job, pipe: Any) -> None:
+    """Send: the other process."""
+    for number in job.numbers():
+        pipe.send_bytes(letter(number))
+        if job.what == "picture":
+            pipe.send_bytes(picture_bytes())
+    pipe.recv_bytes()
+
+
+def ring(job: Job) -> dict[str, float]:
+    """Slots in shared memory: what has arrived is looked at where it lies, and its slot given back then."""
+    size = HEAD.size + (len(letter(0)) if job.what == "letter" else len(picture_bytes()))
+    memory = SharedMemory(create=True, size=SLOTS * size)
+    buffer = view_of(memory)
+    free, full = CONTEXT.Semaphore(SLOTS), CONTEXT.Semaphore(0)
+    turn = 0
+
+    def take(post: Post) -> None:
+        nonlocal turn
+        full.acquire()
+        begin = turn * size
+        if job.what == "letter":
+            post.take_letter(buffer[begin + HEAD.size : begin + size])
+        else:
+            view: Picture = np.ndarray(SHAPE, np.uint8, buffer, begin + HEAD.size)
+            post.take_picture(*opened(buffer[begin : begin + HEAD.size]), view)
+        turn = (turn + 1) % SLOTS
+        free.release()
+
+    try:
+        return run(job, take, send_to_ring, memory.name, size, free, full)
+    finally:
+        buffer.release()
+        memory.close()
+        memory.unlink()
+
+
+def view_of(memory: SharedMemory) -> memoryview:
+    """Give its bytes."""
+    assert memory.buf is not None
+    return memory.buf
+
+
+def send_to_ring(job: Job, name: str, size: int, free: Any, full: Any) -> None:
+    """Send: the other process."""
+    memory = SharedMemory(name)
+    buffer = view_of(memory)
+    turn = 0
+    for number in job.numbers():
+        free.acquire()
+        begin = turn * size
+        if job.what == "letter":
+            buffer[begin + HEAD.size : begin + size] = letter(number)
+        else:
+            HEAD.pack_into(buffer, begin, *opened(letter(number)))
+            np.copyto(np.ndarray(SHAPE, np.uint8, buffer, begin + HEAD.size), picture())
+        turn = (turn + 1) % SLOTS
+        full.release()
+    buffer.release()
+    memory.close()
+
+
+def run(job: Job, take: Callable[[Post], None], send: Callable[..., None], *arguments: Any) -> dict[str, float]:
+    """Begin the other process, and take all that it sends."""
+    post = Post(job)
+    process = CONTEXT.Process(target=send, args=(job, *arguments), daemon=True)
+    process.start()
+    while not post.is_over:
+        take(post)
+    process.terminate()
+    process.join()
+    return post.figures()
