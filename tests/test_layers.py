@@ -98,9 +98,19 @@ WINGS = {
         "hfg.engine.face": 6,
         "hfg.engine": 7,
     },
+    "hfg.parts": {
+        "hfg.parts.model": 0,
+        "hfg.parts.transports": 0,
+        "hfg.parts.running": 1,
+        "hfg.parts.steering": 2,
+        "hfg.parts.processes": 3,
+        "hfg.parts.hosts": 4,
+        "hfg.parts.distribution": 5,  # the face, which composes the wings
+        "hfg.parts": 6,
+    },
 }
 NAMED_FROM_BELOW = "hfg.graph.graph"  # nodes and edges give users their graph, so its name stands in annotations
-WITHOUT_CIRCLES = ("hfg.graph", "hfg.activity", "hfg.engine", "hfg.links")
+WITHOUT_CIRCLES = ("hfg.graph", "hfg.activity", "hfg.engine", "hfg.links", "hfg.parts")
 WAITING = {"asyncio", "anyio", "trio"}
 ORACLE_MUST_NOT_SHARE = ("hfg.ports", "hfg.activity", "hfg.engine")
 
@@ -257,7 +267,8 @@ def test_the_oracle_shares_no_code_with_the_accused(module: str) -> None:
 
 def test_the_table_names_only_what_exists_or_is_planned() -> None:
     planned = {"hfg.files", "hfg.recording", "hfg.studio"}
-    missing = {name for name in (*FLOORS, *WINGS["hfg.graph"], *WINGS["hfg.engine"]) if name not in HFG} - planned
+    named = {*FLOORS}.union(*WINGS.values())
+    missing = {name for name in named if name not in HFG} - planned
     assert not missing, f"FLOORS names modules that are gone: {sorted(missing)}"
 
 
@@ -292,6 +303,20 @@ def fields_of(module: str, name: str) -> set[str]:
 WORKERS_FIELDS = fields_of("hfg.engine.model.worker", "Worker") - {"path", "index"}
 """(Many things have a path or an index.)"""
 EDGES_FIELDS = {"token", "held", "sent", "dropped", "drained", "ended", "live", "working", "deepest", "full", "grown"}
+
+
+HOT = "hfg.engine.fusion.slots"
+"""A call of a slot is so short that one more call for each field would cost a tenth of it."""
+
+
+@pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.engine.fusion") and name != HOT])
+def test_fast_paths_change_nodes_by_the_names_of_their_transitions(module: str) -> None:
+    for one in ast.walk(ast.parse(HFG[module].read_text(encoding="utf-8"))):
+        if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store | ast.Del):
+            is_nodes = isinstance(one.value, ast.Name) and one.value.id not in ("self", "core", "edge")
+            assert not (is_nodes and one.attr in WORKERS_FIELDS), (
+                f"{module}:{one.lineno} writes {ast.unparse(one)}: give `Worker` a transition"
+            )
 
 
 @pytest.mark.parametrize("module", [name for name in HFG if name.startswith("hfg.engine.rules")])

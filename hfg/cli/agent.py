@@ -1,4 +1,7 @@
-"""`hfg agent`: lets this host run parts of graphs, until it is ended. Stands on `hfg.parts.agent` and `hosting`."""
+"""`hfg agent`: lets this host run parts of graphs, until it is ended.
+
+Stands on `hfg.parts.hosts.agent` and `hosting`.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +19,9 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.options import SettingsOption
-from hfg.parts.agent import Agent
-from hfg.parts.hosting import Computer, Journal, logs_folder
-from hfg.parts.rings import sweep_runs
+from hfg.parts.hosts.agent import Agent
+from hfg.parts.hosts.hosting import Computer, Journal, logs_folder
+from hfg.parts.running.rings import sweep_runs
 from hfg.parts.transports import transport
 
 __all__ = ["agent", "session_settings"]

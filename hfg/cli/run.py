@@ -87,20 +87,24 @@ def run(
         live_table(table and not json and clock is Clock.real) as live,
     ):
         interrupt.before_leaving.append(live.leave)
-        options = {
-            "until_s": until,
-            "debug": debug,
-            "policy": policy,
-            "seed": seed,
-            "trace": write,
-            "settings": settings,
-        }
 
         def begin(run: Run) -> None:
             output.when_broken = partial(asyncio.get_running_loop().call_soon_threadsafe, run.stop)
             live.begin(run)
 
-        report, error = execute(graph, target, clock, interrupt, begin, **options)
+        report, error = execute(
+            graph,
+            target,
+            clock,
+            interrupt,
+            begin,
+            until_s=until,
+            debug=debug,
+            policy=policy,
+            seed=seed,
+            trace=write,
+            settings=settings,
+        )
     if output.broken is not None:
         raise output.broken
     if json and report is not None:

@@ -1,6 +1,6 @@
 """`hfg ps`, `hfg deploy`, `hfg logs`, `hfg restart` and `hfg stop`: agents and runs of a realm, from any of its hosts.
 
-Stands on `hfg.parts.realm`.
+Stands on `hfg.parts.hosts.realm`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hfg.cli.options import AllowOption, ArgOption, ParamOption, SettingsOption,
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import encode
 from hfg.errors import HfgError, NoAnswer, QueryRefused, TargetError, TransportError
-from hfg.parts.realm import (
+from hfg.parts.hosts.realm import (
     FINDS_S,
     AgentIs,
     Chunk,

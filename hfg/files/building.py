@@ -7,7 +7,7 @@ only follows from that is not. Stands on `reading`, `boxes`, `missing` and `allo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -250,6 +250,12 @@ def _filling(read: Read, parts: Mapping[str, type[FileBox]], path: Path) -> Call
     return fill
 
 
+def _is_of(names: Set[str], port: str) -> bool:
+    """Whether that is the path of a port of one of these nodes."""
+    name, dot, _ = port.partition(".")
+    return bool(dot) and name in names
+
+
 def _nodes(box: BoxDocument, key: Key) -> Iterator[tuple[Key, NodeDocument]]:
     """All nodes of a document, with where they stand."""
     waiting = [(key, box)]
@@ -299,7 +305,7 @@ class _Making:
         self.key = key
         self.parts = parts
         self.outermost: Graph = _NOBODY
-        self.gated: list[tuple[Graph, str, GateDocument, Key, set[str]]] = []
+        self.gated: list[tuple[Graph, str, GateDocument, Key, Set[str]]] = []
 
     def wrong(self, key: Key, error: object, path: str | None = None) -> None:
         """Report something."""
@@ -326,17 +332,7 @@ class _Making:
         if key == self.key:
             self.outermost = graph
         if isinstance(box, Document):
-            for name, group in box.groups.items():
-                with self.told((*key, "groups", name), f'group "{name}"'):
-                    graph.group(
-                        name,
-                        threads=group.threads,
-                        policy=group.policy,
-                        seed=group.seed,
-                        process=group.process,
-                        host=group.host,
-                        ledger=group.ledger,
-                    )
+            self.add_groups(graph, box, key)
         if owner is None:
             self.declare(graph, box, key)
         for name, node in box.nodes.items():
@@ -344,23 +340,38 @@ class _Making:
                 self.add(graph, box, name, node, (*key, "nodes", name))
         lost = {name for name in (*box.nodes, *self.named(key)) if name not in graph.nodes}  # what is wrong was told
         for number, edge in enumerate(box.edges):
-            if any(dot and name in lost for name, dot, _ in (end.partition(".") for end in (edge.source, edge.target))):
-                continue
-            with self.told((*key, "edges", number), f"{edge.source} -> {edge.target}"):
-                self.connect(level_of(graph), edge, owner, (*key, "edges", number))
-        for name, inner in box.promotes.items():
-            for path in inner:
-                if path.partition(".")[0] in lost:
-                    continue
+            if not (_is_of(lost, edge.source) or _is_of(lost, edge.target)):
+                with self.told((*key, "edges", number), f"{edge.source} -> {edge.target}"):
+                    self.connect(level_of(graph), edge, owner, (*key, "edges", number))
+        for name, path in ((name, path) for name, inner in box.promotes.items() for path in inner):
+            if path.partition(".")[0] not in lost:
                 with self.told((*key, "promotes", name)):
                     self.promote(graph, box, owner, name, path, (*key, "promotes", name))
+        self.note_gates(graph, box, key, lost)
+        if key == self.key:
+            self.gate_all()
+
+    def add_groups(self, graph: Graph, document: Document, key: Key) -> None:
+        """Declare the groups of a whole graph."""
+        for name, group in document.groups.items():
+            with self.told((*key, "groups", name), f'group "{name}"'):
+                graph.group(
+                    name,
+                    threads=group.threads,
+                    policy=group.policy,
+                    seed=group.seed,
+                    process=group.process,
+                    host=group.host,
+                    ledger=group.ledger,
+                )
+
+    def note_gates(self, graph: Graph, box: BoxDocument, key: Key, lost: Set[str]) -> None:
+        """Note the gates in a graph; they are made when all is there."""
         for name, node in box.nodes.items():
             if isinstance(graph.nodes.get(name), MissingNode):
                 node = msgspec.structs.replace(node, inside={})
             for path, said, at in self.gates(name, node, (*key, "nodes", name)):
                 self.gated.append((graph, path, said, at, lost))
-        if key == self.key:
-            self.gate_all()
 
     def gates(self, name: str, node: NodeDocument, key: Key) -> Iterator[tuple[str, GateDocument, Key]]:
         """The gates of a node and of what is inside of it."""

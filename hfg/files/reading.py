@@ -120,20 +120,26 @@ class _Reading:
             case inspect.ListType(item_type=inner):
                 return self.list(found, inner, key)
             case inspect.UnionType(types=types):
-                if found.value is None and any(isinstance(one, inspect.NoneType) for one in types):
-                    return None
-                inners = [one for one in types if not isinstance(one, inspect.NoneType)]
-                is_switch = isinstance(found.value, bool)  # of those with two, one is true or false
-                fits = [one for one in inners if isinstance(one, inspect.BoolType) == is_switch]
-                return self.value(found, (fits or inners)[0], key)
+                return self.one_of(found, types, key)
             case inspect.LiteralType(values=values):
-                if found.value in values:
-                    return found.value
-                words = ", ".join(str(one) for one in values)
-                return self.wrong(
-                    found, key, f"{_last(key)} is one of {words}, got {_what(found)}{_meant(found.value, values)}"
-                )
+                return self.choice(found, values, key)
         return self.scalar(found, expected, key)
+
+    def one_of(self, found: Located, types: tuple[inspect.Type, ...], key: Key) -> Any:
+        if found.value is None and any(isinstance(one, inspect.NoneType) for one in types):
+            return None
+        inners = [one for one in types if not isinstance(one, inspect.NoneType)]
+        is_switch = isinstance(found.value, bool)  # of those with two, one is true or false
+        fits = [one for one in inners if isinstance(one, inspect.BoolType) == is_switch]
+        return self.value(found, (fits or inners)[0], key)
+
+    def choice(self, found: Located, values: tuple[bool | str | int | None, ...], key: Key) -> Any:
+        if found.value in values:
+            return found.value
+        words = ", ".join(str(one) for one in values)
+        return self.wrong(
+            found, key, f"{_last(key)} is one of {words}, got {_what(found)}{_meant(found.value, values)}"
+        )
 
     def scalar(self, found: Located, expected: inspect.Type, key: Key) -> Any:
         value = found.value

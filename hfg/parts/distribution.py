@@ -27,15 +27,15 @@ from hfg.errors import HfgError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph, cut
 from hfg.logs import Log
-from hfg.parts.agreement import Agreement, Question, Rest
-from hfg.parts.asking import Asking
-from hfg.parts.channels import Carrier, Channel, name_of
-from hfg.parts.clocks import RunClock, machine
-from hfg.parts.failing import as_error
-from hfg.parts.inheriting import keeping, remembering
-from hfg.parts.ledgers import Entry, Ledger, ledger_of
-from hfg.parts.lives import LIMIT, WITHIN_S
-from hfg.parts.messages import (
+from hfg.parts.hosts.realm import PartIs
+from hfg.parts.hosts.standing import Standing
+from hfg.parts.model.agreement import Agreement, Question, Rest
+from hfg.parts.model.clocks import RunClock, machine
+from hfg.parts.model.failing import as_error
+from hfg.parts.model.inheriting import keeping, remembering
+from hfg.parts.model.ledgers import Entry, Ledger, ledger_of
+from hfg.parts.model.lives import LIMIT, WITHIN_S
+from hfg.parts.model.messages import (
     Ask,
     AskTime,
     Call,
@@ -58,14 +58,14 @@ from hfg.parts.messages import (
     TellTime,
     Told,
 )
-from hfg.parts.other import Launcher, Other
-from hfg.parts.part import Part
-from hfg.parts.realm import PartIs
-from hfg.parts.rings import sweep_run, sweep_runs
-from hfg.parts.run import Counts, CutRun
-from hfg.parts.sieve import sieve
-from hfg.parts.standing import Standing
-from hfg.parts.worker import FIRST_LIFE
+from hfg.parts.model.sieve import sieve
+from hfg.parts.processes.other import Launcher, Other
+from hfg.parts.processes.worker import FIRST_LIFE
+from hfg.parts.running.channels import Carrier, Channel, name_of
+from hfg.parts.running.part import Part
+from hfg.parts.running.rings import sweep_run, sweep_runs
+from hfg.parts.steering.asking import Asking
+from hfg.parts.steering.run import Counts, CutRun
 
 __all__ = ["Distribution", "distribute"]
 
@@ -464,8 +464,8 @@ def distribute(
     from hfg.files import text_of
     from hfg.files.building import modules_of
     from hfg.files.describing import describe
-    from hfg.parts.abroad import AgentLauncher, deployed_as
-    from hfg.parts.launching import LoopLauncher, ProcessLauncher
+    from hfg.parts.hosts.abroad import AgentLauncher, deployed_as
+    from hfg.parts.processes.launching import LoopLauncher, ProcessLauncher
 
     cutting = cut(flat)
     launcher: Launcher

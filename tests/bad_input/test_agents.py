@@ -11,7 +11,7 @@ import pytest
 import hfg
 from hfg.cli import main, runs
 from hfg.errors import FileError, GraphError, UsageError
-from hfg.parts import hosting
+from hfg.parts.hosts import hosting
 from tests.transports.zenoh.conftest import free_port
 
 pytest.importorskip("zenoh", reason="agents speak over Zenoh")

@@ -12,10 +12,9 @@ import pytest
 import hfg
 from hfg.engine.face.watching import Answer, Question
 from hfg.errors import NoAnswer, QueryRefused, TransportError
-from hfg.parts import launching
-from hfg.parts.abroad import AgentLauncher
-from hfg.parts.agent import Agent
-from hfg.parts.realm import (
+from hfg.parts.hosts.abroad import AgentLauncher
+from hfg.parts.hosts.agent import Agent
+from hfg.parts.hosts.realm import (
     GONE_S,
     Check,
     Chunk,
@@ -38,6 +37,7 @@ from hfg.parts.realm import (
     agent_place,
     ask,
 )
+from hfg.parts.processes import launching
 from hfg_transports.memory import MemorySession, Network
 
 T = TypeVar("T")
@@ -166,16 +166,20 @@ def test_parts_run_on_the_hosts_that_their_groups_name(world: World) -> None:
     assert all(len(computer.forgotten) == 1 for computer in world.computers.values())
 
 
-def test_a_host_without_an_agent_is_named_with_those_that_have_one(world: World) -> None:
+def refused(world: World, sentence: str, *, agent: str) -> None:
+    """Let a chain run of which a node lives on the host "arm", with an agent here; see why it is not begun."""
+
     async def scene() -> None:
-        await world.agent("leg")
+        await world.agent(agent)
         await hfg.run_async(chain("arm"), clock="virtual")
 
-    with pytest.raises(
-        TransportError,
-        match='^host "arm" has no agent that can be reached from here; there are agents of "leg": run `hfg agent` on',
-    ):
+    with pytest.raises(TransportError, match=f"^{sentence}"):
         play(world, scene)
+
+
+def test_a_host_without_an_agent_is_named_with_those_that_have_one(world: World) -> None:
+    sentence = 'host "arm" has no agent that can be reached from here; there are agents of "leg": run `hfg agent` on'
+    refused(world, sentence, agent="leg")
     assert not world.computers["leg"].begun
 
 
@@ -376,15 +380,8 @@ def test_types_of_the_program_itself_are_not_found_on_other_hosts(
 ) -> None:
     monkeypatch.setattr("hfg.files.building.modules_of", lambda _: {"__main__": "numbers"})
 
-    async def scene() -> None:
-        await world.agent("arm")
-        await hfg.run_async(chain("arm"), clock="virtual")
-
-    with pytest.raises(
-        TransportError,
-        match='^host "arm" cannot import the type of "numbers", which is in the program itself .*into a module, and',
-    ):
-        play(world, scene)
+    sentence = 'host "arm" cannot import the type of "numbers", which is in the program itself .*into a module, and'
+    refused(world, sentence, agent="arm")
 
 
 def test_what_is_asked_in_vain_of_a_run_is_refused_with_what_there_is(world: World) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import hfg
 from hfg.errors import RunError
-from hfg.parts import launching
+from hfg.parts.processes import launching
 from hfg_transports.memory import Faults, Network
 from tests.parts.test_from_outside import fed, through
 from tests.semantics.nodes import drive

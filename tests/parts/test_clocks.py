@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hfg
-from hfg.parts import worker
-from hfg.parts.clocks import DRIFT, Offset
+from hfg.parts.model.clocks import DRIFT, Offset
+from hfg.parts.processes import worker
 
 
 @pytest.mark.rule("T5")

@@ -9,7 +9,7 @@ import pytest
 import hfg
 from hfg.errors import EncodingError
 from hfg.graph.flat import flatten
-from hfg.parts.crossing import Crossing
+from hfg.parts.steering.crossing import Crossing
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import (
     EventTriggered,

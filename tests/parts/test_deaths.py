@@ -11,9 +11,9 @@ import pytest
 
 import hfg
 from hfg.graph.flat import cut, flatten
-from hfg.parts import launching
-from hfg.parts.inheriting import Alignment, inheriting
-from hfg.parts.lives import Deaths
+from hfg.parts.model.inheriting import Alignment, inheriting
+from hfg.parts.model.lives import Deaths
+from hfg.parts.processes import launching
 from hfg_transports.memory import Faults, Network
 
 LEDGER: dict[str, list[int]] = {}
@@ -256,8 +256,8 @@ def test_only_parts_that_answer_each_token_with_one_inherit_positions() -> None:
     assert inheriting(cut(flatten(graph))) == {"relay0"}
 
 
-class Summing(hfg.Node):
-    """Has a last word."""
+class LastWord(hfg.Node):
+    """Says one thing more when nothing more comes."""
 
     value = hfg.Input(int)
     out = hfg.Output(int)
@@ -273,7 +273,7 @@ class Summing(hfg.Node):
 def test_who_has_a_last_word_at_its_end_has_no_position_for_it() -> None:
     graph = hfg.Graph()
     graph.group("summing", process=True)
-    summing = graph.add(Summing(), group="summing")
+    summing = graph.add(LastWord(), group="summing")
     graph.connect(graph.add(numbers(count=3)).out, summing.value)
     graph.connect(summing.out, graph.output("out", int))
     assert inheriting(cut(flatten(graph))) == frozenset()

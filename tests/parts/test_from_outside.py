@@ -122,28 +122,29 @@ def test_what_this_side_can_refuse_is_refused_at_once_and_nothing_is_set() -> No
     assert with_run(fed(), body) == [2]
 
 
-@pytest.mark.rule("F8", "P10", "L1")
-def test_a_signal_from_outside_goes_into_a_slot_of_another_process_and_an_event_comes_back() -> None:
-    async def body(run: hfg.Run) -> Any:
+def heard_of(place: str, value: int, **said: Any) -> hfg.Token[Any]:
+    """Trigger a slot or event of another process from outside, and give what its event `large` says then."""
+
+    async def body(run: hfg.Run) -> hfg.Token[Any]:
         heard = asyncio.create_task(run.wait_for("scaler.large"))
         await asyncio.sleep(0)
-        await run.trigger("scaler.again", 21, stamp=7.0)
-        token = await heard
-        return token.value, token.stamp
+        await run.trigger(place, value, **said)
+        return await heard
 
-    assert with_run(fed(), body) == (42, 7.0)
+    token: hfg.Token[Any] = with_run(fed(), body)
+    return token
+
+
+@pytest.mark.rule("F8", "P10", "L1")
+def test_a_signal_from_outside_goes_into_a_slot_of_another_process_and_an_event_comes_back() -> None:
+    token = heard_of("scaler.again", 21, stamp=7.0)
+    assert (token.value, token.stamp) == (42, 7.0)
 
 
 @pytest.mark.rule("F8", "P10", "L1")
 def test_an_event_of_another_process_is_triggered_as_its_node_would() -> None:
-    async def body(run: hfg.Run) -> Any:
-        heard = asyncio.create_task(run.wait_for("scaler.large"))
-        await asyncio.sleep(0)
-        await run.trigger("scaler.large", 3, activity=1)
-        token = await heard
-        return token.value, token.activity
-
-    assert with_run(fed(), body) == (3, 1)
+    token = heard_of("scaler.large", 3, activity=1)
+    assert (token.value, token.activity) == (3, 1)
 
 
 @pytest.mark.rule("R5", "L1")

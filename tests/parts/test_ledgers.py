@@ -12,7 +12,7 @@ import pytest
 import hfg
 from hfg.errors import RunError
 from hfg.graph.flat import cut, flatten
-from hfg.parts.ledgers import LedgerFile
+from hfg.parts.model.ledgers import LedgerFile
 from tests.parts.test_deaths import at, at_random, killed, numbers, relay
 
 __all__ = ["killed"]  # the fixture

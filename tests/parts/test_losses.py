@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 import hfg
-from hfg.parts import launching
-from hfg.parts.agreement import Account, Agreement, Answer, Question, Rest
+from hfg.parts.model.agreement import Account, Agreement, Answer, Question, Rest
+from hfg.parts.processes import launching
 from hfg.trace import TokenSent, TraceEvent
 from hfg_transports.memory import Faults, Network
+from tests.parts.test_deaths import LastWord
 
 EDGE = "ticker.tick -> show.value"
 
@@ -87,26 +88,13 @@ def test_signals_that_were_lost_on_the_way_are_counted_and_the_run_ends(over: An
     assert (edge.sent, edge.dropped, edge.untaken) == (31, 30 - len(found), 0)
 
 
-class Closing(hfg.Node):
-    """Tells when nothing more comes."""
-
-    value = hfg.Input(int)
-    out = hfg.Output(int)
-
-    def process(self, value: int) -> int:
-        return value
-
-    def end(self) -> None:
-        self.out.send(-1)
-
-
 @pytest.mark.rule("F13", "L2")
 @pytest.mark.parametrize("seed", range(10))
 def test_that_nothing_more_comes_is_never_lost(over: Any, seed: int) -> None:
     over(Network(Faults(loss=0.6, delay_s=(0.0, 0.004)), seed=seed))
     graph = hfg.Graph()
     graph.group("far", process=True)
-    source, ticker, last = graph.add(numbers(count=3)), graph.add(Ticker()), graph.add(Closing(), group="far")
+    source, ticker, last = graph.add(numbers(count=3)), graph.add(Ticker()), graph.add(LastWord(), group="far")
     graph.connect(source.out, ticker.value)
     graph.connect(ticker.tick, last.value, overflow="drop_oldest")
     graph.connect(last.out, graph.output("out", int))

@@ -13,9 +13,8 @@ from hfg.engine.face.composition import Composition
 from hfg.engine.runtime.settings import Settings
 from hfg.graph.flat import MAIN, cut, flatten
 from hfg.links.running import LinkSender
-from hfg.parts.agreement import Answer, Question, Rest
-from hfg.parts.channels import Carrier, Channel, name_of
-from hfg.parts.messages import (
+from hfg.parts.model.agreement import Answer, Question, Rest
+from hfg.parts.model.messages import (
     Ask,
     Begin,
     Call,
@@ -35,8 +34,9 @@ from hfg.parts.messages import (
     pack,
     unpack,
 )
-from hfg.parts.part import Part
-from hfg.parts.sieve import sieve
+from hfg.parts.model.sieve import sieve
+from hfg.parts.running.channels import Carrier, Channel, name_of
+from hfg.parts.running.part import Part
 from hfg.token import Token
 from hfg.trace import NodeEnded, TokenProcessed, TokenSent, TokenTaken, TraceEvent
 from hfg_transports.memory import Network

@@ -17,8 +17,8 @@ import pytest
 import hfg
 from hfg.encoding import TokenCodec
 from hfg.errors import EncodingError
-from hfg.parts.messages import Sees, Shares
-from hfg.parts.rings import Borrowing, Lending, LendingCounts, segment_of, segments_of, sweep_run, sweep_runs
+from hfg.parts.model.messages import Sees, Shares
+from hfg.parts.running.rings import Borrowing, Lending, LendingCounts, segment_of, segments_of, sweep_run, sweep_runs
 from hfg.sharedmemory import Ring, unavailable
 from hfg.token import Token
 
@@ -87,7 +87,7 @@ def test_nothing_more_leaves_until_the_consumer_has_said_whether_it_can_open_the
 
 
 def test_no_more_tokens_leave_than_find_a_slot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hfg.parts.rings._LARGEST", 5 * LARGE)
+    monkeypatch.setattr("hfg.parts.running.rings._LARGEST", 5 * LARGE)
     edge = Edge(window=64)
     try:
         edge.send(LARGE)

@@ -72,42 +72,52 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
         raise UsageError(f'{level.title} runs as a part of the whole: run graph "{level.whole.root.name}"')
     if level.whole.run is not None:
         raise UsageError(f'graph "{graph.name}" runs already: a graph has one run at a time; build a second graph')
-    loop = asyncio.get_running_loop()
-    if clock == "virtual" and not isinstance(loop, VirtualTimeLoop):
+    is_virtual = isinstance(asyncio.get_running_loop(), VirtualTimeLoop)
+    if is_virtual:
+        _need_no_real_clock(settings)
+        settings.watch = False
+    elif clock == "virtual":
         raise UsageError(
             'clock="virtual" needs a loop in virtual time: hfg.run(graph, clock="virtual"), or '
             "asyncio.Runner(loop_factory=hfg.VirtualTimeLoop).run(main()) around the whole program"
         )
-    if isinstance(loop, VirtualTimeLoop):
-        if settings.watch_said and settings.watch:
-            raise UsageError(
-                "watch= needs the real clock: in virtual time a run is over before anybody looks; leave watch= out, or "
-                'write clock="real"'
-            )
-        settings.watch = False
-        if settings.settings is not None:
-            raise UsageError(
-                "settings= needs the real clock: in virtual time all parts of a graph share one loop; leave settings= "
-                'out, or write clock="real"'
-            )
     flat = flatten(graph)
     _need_use_of_seed(flat, settings)
+    _need_no_problem(flat)
+    if settings.until_s is not None and is_virtual:
+        _refuse_endless(flat)
+    others = None
+    if settings.settings is not None or any(group.process for group in flat.groups.values()):
+        said = {name: getattr(settings, name) for name in ("debug", "policy", "seed", "fast", "block_warning_s")}
+        others = Composition.distribute(graph, flat, said, is_virtual, settings.settings)
+    parts = Composition(flat if others is None else others.flat, settings, others)
+    run: Run = Run(graph, parts) if others is None else others.face(graph)
+    level.whole.begin_run(run)
+    return run, parts
+
+
+def _need_no_real_clock(settings: Settings) -> None:
+    """In virtual time, what looks at the real clock would be without effect."""
+    if settings.watch_said and settings.watch:
+        raise UsageError(
+            "watch= needs the real clock: in virtual time a run is over before anybody looks; leave watch= out, or "
+            'write clock="real"'
+        )
+    if settings.settings is not None:
+        raise UsageError(
+            "settings= needs the real clock: in virtual time all parts of a graph share one loop; leave settings= "
+            'out, or write clock="real"'
+        )
+
+
+def _need_no_problem(flat: FlatGraph) -> None:
+    """Refuse a graph with errors; what else the checks found is logged."""
     problems = check_flat(flat)
     if any(problem.severity == "error" for problem in problems):
         raise CheckFailed(problems)
     for problem in problems:
         if problem.severity == "warning":
             _GRAPH.warning('"%s": %s: %s; %s', problem.path, problem.what, problem.why, problem.remedy)
-    if settings.until_s is not None and isinstance(loop, VirtualTimeLoop):
-        _refuse_endless(flat)
-    others = None
-    if settings.settings is not None or any(group.process for group in flat.groups.values()):
-        said = {name: getattr(settings, name) for name in ("debug", "policy", "seed", "fast", "block_warning_s")}
-        others = Composition.distribute(graph, flat, said, isinstance(loop, VirtualTimeLoop), settings.settings)
-    parts = Composition(flat if others is None else others.flat, settings, others)
-    run: Run = Run(graph, parts) if others is None else others.face(graph)
-    level.whole.begin_run(run)
-    return run, parts
 
 
 def _need_use_of_seed(flat: FlatGraph, settings: Settings) -> None:

@@ -109,7 +109,7 @@ class Region:
             if worker.region is not None:
                 worker.region.dissolve()
         for worker in self.order:
-            worker.region = self
+            worker.be_fused(self)
         self.core.regions.add(self)
 
     def _write(self, *, measured: bool) -> Wave:
@@ -202,7 +202,7 @@ class Region:
         if self in self.core.regions:
             self.core.regions.discard(self)
             for worker in self.order:
-                worker.region = None
+                worker.be_fused(None)
             for worker in self.order:
                 self._respecialise(worker)
 
@@ -225,10 +225,9 @@ class Region:
             spread += self.spread[number]
             self.silent[number] = self.spread[number] = 0
             if number in called:  # by a marker a slot is not called (T4)
-                worker.call_number += waves - silent
+                worker.was_called(waves - silent)
             else:
-                worker.firings += waves
-                worker.silent += silent
+                worker.has_fired(waves, silent)
 
     # --- the end of a wave --------------------------------------------------------------------------------------------
 
@@ -247,8 +246,7 @@ class Region:
         if head.placed and (head.outputs.missing or head.inputs.missing):
             head.unplace()  # what came in while the wave ran gave it a place; F1 does not hold behind the wave
         if head.outputs.missing:
-            head.held = True
-            head.taken = self.held_entries
+            head.hold(self.held_entries)
         elif self.held_entries:
             if len(self.order) > 1:  # then those behind it free its outputs, and by that it lets go of what it took
                 agenda.consider(head)
@@ -257,7 +255,8 @@ class Region:
             self.dissolve()
         elif self._wave is self._measured and all(worker.meter.left <= 0 for worker in self.order):
             self._wave = self._plain
-            head.step = self.step = self._plain.step
+            self.step = self._plain.step
+            head.go_by(self.step)
         if gave_way:
             agenda.idle_again(head)
             self._go_on(called_off)
@@ -268,7 +267,8 @@ class Region:
         """What was measured has been read: measure the next waves."""
         if self._measured is not None and self._wave is not self._measured and self.head.step is self.step:
             self._wave = self._measured
-            self.head.step = self.step = self._measured.step
+            self.step = self._measured.step
+            self.head.go_by(self.step)
 
     def _let_follow(self, candidates: Sequence[Worker]) -> None:
         """Those outside whom the wave has enabled go next, in the order R2 prescribes."""
@@ -344,7 +344,8 @@ class Region:
         self._exits[k] += 1
         waves = self.head.firings + self.waves - self._formed_at
         if self._exits[k] >= _MOST_EXITS and self._exits[k] * 8 > waves:
-            self.order[k].unfit = self.doomed = True
+            self.order[k].fit_no_more()
+            self.doomed = True
 
     def materialise(self, k: int, found: dict[str, Any]) -> Worker:
         """Members before k have fired and k is amid its firing: let the interpreted way see it so."""
@@ -363,16 +364,10 @@ class Region:
                     silent_calls.add(edge)
         self._write_barriers(k, silent_calls)
         worker = self.order[k]
-        worker.ticket += 1
-        worker.stamp = stamp
         if k in self.schedule.called:
-            worker.call_number += 1
-            worker.busy = "call"
-            worker.call_edge = worker.slot_edges[0]
+            worker.begin_call(worker.slot_edges[0], stamp)
         else:
-            worker.firings += 1
-            worker.busy = "firing"
-            worker.taken = worker.live_inputs if k else self.held_entries
+            worker.be_amid_firing(worker.live_inputs if k else self.held_entries, stamp)
         self._queue_behind(k)
         self.core.speaker = worker
         return worker
@@ -384,27 +379,27 @@ class Region:
             return False
         edge.token = Token(NO_MESSAGE if value is None else value, 0, stamp, edge.sent)
         if called:
-            target.calls.append(edge)  # type: ignore[union-attr]
+            target.expect_call(edge)
         else:
             target.inputs.missing -= 1
-            target.special = target.special or value is None
+            if value is None:
+                target.mark_special()
         return True
 
     def _count(self, j: int, found: dict[str, Any]) -> None:
         """Member j has fired, or was called, in the wave that does not come to its end."""
         worker = self.order[j]
         if j not in self.schedule.called:
-            worker.firings += 1
-        else:
-            worker.call_number += found.get(self.schedule.local(worker.slot_edges[0])) is not None
+            worker.has_fired(1)
+        elif found.get(self.schedule.local(worker.slot_edges[0])) is not None:
+            worker.was_called(1)
 
     def _queue_behind(self, k: int) -> None:
         """Who stands behind member k is enabled by now, or by an outside edge that was waited for (R2)."""
         behind = self.schedule.behind[k]
         for worker in behind:
             if worker in self.schedule.position and (worker.calls or agenda.place(worker)):
-                worker.queued = True
-                self.core.followers.append(worker)
+                worker.go_behind_wave()
         self._let_follow(behind)
 
     def _write_barriers(self, k: int, silent_calls: Collection[SyncEdge] = ()) -> None:
@@ -423,11 +418,8 @@ class Region:
                 if to is not None:
                     edge.held = edge.live and (to >= k or not done[to]) and edge not in silent_calls
                 missing += edge.held
-            worker.outputs.missing = missing
-            worker.held = missing > 0
+            worker.wait_for_taking(missing, worker.live_inputs if j else self.held_entries)
             done[j] = not missing
-            if missing:
-                worker.taken = worker.live_inputs if j else self.held_entries
 
     # --- code that waits --------------------------------------------------------------------------------------------
 
@@ -449,7 +441,7 @@ class Region:
         lender: Any = self._lender
         self.amid = "firing"
         for worker in self.order:
-            worker.busy = "firing"
+            worker.be_in_wave()
         code = self.core.code
         lender.set_out()
         self._after = code.late(lender, _nothing_more)
@@ -475,7 +467,9 @@ class Region:
         if gave_way:
             lender.come_back()
             self._rest()
-        lender.carrier, worker.carrier = worker.carrier, lender.carrier  # whoever cancels the node means this code
+        own, lent = worker.carrier, lender.carrier
+        lender.be_carried(own)
+        worker.be_carried(lent)  # whoever cancels the node means this code
         self.detached = True
         self._note_exit(k)
         self.materialise(k, found)
@@ -497,7 +491,7 @@ class Region:
             self.amid = ""
             self.called_off = False
             for worker in self.order:
-                worker.busy = ""
+                worker.rest()
             if self.head.placed and len(self.order) > 1:  # by what came in meanwhile; but it waits for the wave (F5)
                 self.head.unplace()
 
@@ -535,7 +529,8 @@ class Region:
         """
         if worker.slot_edges or not self.is_calling(worker):  # (what a slot handler may not do is for others to say)
             return False
-        worker.speaks = self.doomed = True
+        worker.speak_by_itself()
+        self.doomed = True
         self.flags.append("speaks")
         return True
 

@@ -83,11 +83,11 @@ def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
             try:
                 result = handler(token.value)
             except Exception as error:
-                _call_taken(worker, edge)
+                worker.be_amid_call(edge)
                 errors.fail_call(worker, edge.port_name, error)
                 return
             if type(result) is CoroutineType:
-                _call_taken(worker, edge)
+                worker.be_amid_call(edge)
                 await_call(worker, edge.port_name, result)
                 return
             worker.stamp = None
@@ -99,14 +99,6 @@ def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
             idle_again(worker)
 
     return step
-
-
-def _call_taken(worker: Worker, edge: EventEdge | SyncEdge) -> None:
-    """A call by the fast path goes on as one like any other."""
-    worker.queued = False
-    worker.busy = "call"
-    worker.call_edge = edge
-    worker.ticket += 1
 
 
 def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None]:
@@ -199,7 +191,6 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
 def _give_activity(worker: Worker, target: Worker) -> None:
     """A5: what carries activity takes it from the sender; it stays its right until the call is over (A3)."""
     if worker.active:
-        worker.active = worker.node._active = False
-        worker.right = worker.stamp is not None
+        worker.give_away_activity()
     bring_activity(target)
     derive_scopes(worker.core)

@@ -27,9 +27,8 @@ def specialise(worker: Worker) -> None:
     if region is not None:
         region.dissolve()  # which asks for each of its members, now or behind the call under way
         return
-    worker.step = _step_of(worker)
-    if worker.halt is not None:
-        worker.step = worker.halt(worker.step)
+    step = _step_of(worker)
+    worker.go_by(step if worker.halt is None else worker.halt(step))
 
 
 def _step_of(worker: Worker) -> Step:
@@ -66,9 +65,9 @@ def _until_warm(worker: Worker, alone: Step) -> Step:
         ):
             found = schedule(worker)
             if found is None or (threaded and len(found.order) == 1):  # in a thread that is one job a wave as it is
-                worker.step = alone
+                worker.go_by(alone)
             else:
-                worker.step = (ThreadRegion if threaded else Region)(found, specialise).step
+                worker.go_by((ThreadRegion if threaded else Region)(found, specialise).step)
             worker.step(worker)
         else:
             alone(worker)
@@ -78,4 +77,4 @@ def _until_warm(worker: Worker, alone: Step) -> Step:
 
 def _leave_lying(worker: Worker) -> None:
     """A graph output: its token lies there until somebody reads it (P10)."""
-    worker.queued = False
+    worker.dequeued()

@@ -120,16 +120,16 @@ class ThreadRegion(Region):
         if not self._may_begin():
             self.decline(head)
             return
-        head.queued = head.placed = False
+        head.no_turn()
         arguments: list[Any] = list(head.unset)
         tokens = [(edge, firing.take(edge)) for edge in self.entries]
         for edge, token in tokens:
             arguments[edge.position] = token.value
         stamp = self.core.now() if head.is_source else max(token.stamp for _, token in tokens)
         for worker in self.order:
-            worker.busy = "firing"
+            worker.be_in_wave()
         for worker in self._speaking:
-            worker.stamp = stamp
+            worker.stamp_with(stamp)
         for edge in self.entries:
             make_room(edge)
         if head.paced:
@@ -192,13 +192,11 @@ class ThreadRegion(Region):
     def _rest(self) -> None:
         """Nobody's code is under way any more; all but the head may be had."""
         for worker in self.order[1:]:
-            worker.busy = ""
+            worker.rest()
         for worker in self._speaking:
-            worker.stamp = None
-            worker.right = False
+            worker.leave()
             if worker is not self.head:  # whose own was the one in flight
-                worker.job = None
-                worker.node._active = worker.active
+                worker.leave_job()
         thread = self._thread
         if any(thread.silent) or any(thread.spread):
             for number in range(len(self.order)):
@@ -212,11 +210,10 @@ class ThreadRegion(Region):
         self.waves += done
         if head.outputs.missing:
             head.unplace()
-            head.held = True
-            head.taken = self.held_entries
+            head.hold(self.held_entries)
         elif self.held_entries:
             if not self.flags:  # those behind it free its outputs, and by that it lets go of what it took
-                head.busy = ""
+                head.rest()
                 if head.placed:
                     head.enqueue()
                 else:
@@ -247,7 +244,7 @@ class ThreadRegion(Region):
             raise error  # a fault of ours
         if error is None and not self.flags:
             self._note_exit(k)
-        head.busy = ""
+        head.rest()
         worker = self.materialise(k, left.found)
         if head.outputs.missing:
             head.unplace()

@@ -57,15 +57,10 @@ def waiting_step(worker: Worker) -> Step:
             if token.stamp > stamp:
                 stamp = token.stamp
             arguments[edge.position] = token.value
-        worker.queued = worker.placed = False
         for edge in edges:
             edge.token = None
         inputs.missing = count
-        worker.firings += 1
-        worker.ticket += 1
-        worker.busy = "firing"
-        worker.stamp = stamp
-        worker.taken = held
+        worker.fire_plainly(held, stamp)
         if pipelined:
             release(pipelined)
         carrier = worker.carrier

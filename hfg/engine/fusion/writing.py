@@ -123,7 +123,7 @@ def _values(region: Region, k: int, result: Any) -> list[Any] | None:
         return None
     if any(type(value) in _EXCEPTIONAL for value, _, _ in entries):
         return None
-    worker.written = None
+    worker.take_written()
     return [None if entry is None else entry[0] for entry in written]
 
 

@@ -621,6 +621,86 @@ class Worker(Vertex):
         """Its coroutines run in this dormant task from now on; None: the next one makes another."""
         self.carrier = carrier
 
+    # --- by a fast path (see the wing `fusion`) ----------------------------------------------------------------------
+
+    def go_by(self, step: Callable[[Worker], None]) -> None:
+        """This is what it does from now on when it has its turn."""
+        self.step = step
+
+    def be_fused(self, region: Region | None) -> None:
+        """A region fuses its firings with those of others; None: none does any more."""
+        self.region = region
+
+    def fit_no_more(self) -> None:
+        """What it does is hardly ever plain: no region takes it any more."""
+        self.unfit = True
+
+    def speak_by_itself(self) -> None:
+        """Its code sends amid its calls, so a region says before each of them that it runs."""
+        self.speaks = True
+
+    def be_in_wave(self) -> None:
+        """It is busy for as long as the wave of its region is under way; that disturbs no region."""
+        self.busy = "firing"
+
+    def stamp_with(self, stamp: float) -> None:
+        """What its code sends by itself in a wave is of this time."""
+        self.stamp = stamp
+
+    def has_fired(self, times: int, silently: int = 0) -> None:
+        """Count firings that a region has seen to."""
+        self.firings += times
+        self.silent += silently
+
+    def was_called(self, times: int) -> None:
+        """Count slot calls that a region has seen to."""
+        self.call_number += times
+
+    def hold(self, edges: tuple[Any, ...]) -> None:
+        """F5: what it has sent is not processed by all; from these edges it took, and they are released by that."""
+        self.held = True
+        self.taken = edges
+
+    def wait_for_taking(self, missing: int, edges: tuple[Any, ...]) -> None:
+        """F5: so many edges hold what it has sent, perhaps none; see `hold`."""
+        self.outputs.missing = missing
+        self.held = missing > 0
+        if missing:
+            self.taken = edges
+
+    def be_amid_firing(self, edges: tuple[Any, ...], stamp: float) -> None:
+        """A firing that a region had begun is one like any other from here on; what has come in meanwhile stays."""
+        self.ticket += 1
+        self.firings += 1
+        self.busy = "firing"
+        self.took(edges, stamp)
+
+    def be_amid_call(self, edge: Edge) -> None:
+        """A call that was begun and counted already is one like any other from here on."""
+        self.queued = False
+        self.busy = "call"
+        self.call_edge = edge
+        self.ticket += 1
+
+    def fire_plainly(self, edges: tuple[Any, ...], stamp: float) -> None:
+        """It has had its turn, and fires with plain values: see `begin_firing` and `took`."""
+        self.queued = self.placed = False
+        self.firings += 1
+        self.ticket += 1
+        self.busy = "firing"
+        self.stamp = stamp
+        self.taken = edges
+
+    def go_behind_wave(self) -> None:
+        """It has its turn when the wave that leaves is out of the way (R2)."""
+        self.queued = True
+        self.core.followers.append(self)
+
+    def give_away_activity(self) -> None:
+        """A5: what it sends has taken its activity, to which it has a right until its call is over (A3)."""
+        self.active = self.node._active = False
+        self.right = self.stamp is not None
+
     # --- activity (A3, A5, A9) ----------------------------------------------------------------------------------------
 
     def become(self, active: bool) -> None:
@@ -803,6 +883,10 @@ class Worker(Vertex):
         """Somebody waits at its barriers: each firing is to be seen there."""
         self.observed = True
         self.changed()
+
+    def be_measured(self, meter: object) -> None:
+        """This meter measures its code from now on; its step is to be chosen anew."""
+        self.meter = meter
 
     def changed(self) -> None:
         """Its wiring, or somebody's interest in it, is another: how it does its next piece of work is chosen anew."""

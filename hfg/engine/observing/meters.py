@@ -138,13 +138,13 @@ class Meter:
     def measure(self) -> None:
         """From now on the node's code is measured; its step is to be chosen anew."""
         worker = self.worker
-        worker.meter = self
+        worker.be_measured(self)
         if worker.iteration is None and worker.process is not None:
             kind = worker.type.process_kind
             if kind in ("generator", "async generator"):
                 worker.process = self._generators(self.code)
                 if worker.generator is not None:
-                    worker.generator = self._drawn(worker.generator)
+                    worker.keep_generator(self._drawn(worker.generator))
             else:
                 worker.process = self._calls(self.code)
         self.measure_slots()

@@ -284,27 +284,48 @@ def group_spec(
         raise GraphError(f"a group needs a name, got {name!r}")
     at = f'group "{name}"'
     host = "" if host is None else host
+    _need_place(at, process, host)
+    process = process or bool(host)
+    if threads is None:
+        threads = 0 if process or name == "loop" else 1
+    _need_threads(at, threads)
+    if name == "loop":
+        _need_nothing_own(at, threads, process)
+    ledger = os.fspath(ledger) if isinstance(ledger, os.PathLike) else ledger
+    _need_ledger(at, ledger, process)
+    _need_choice(at, "policy", policy, POLICY, GraphError)
+    if seed is not None:
+        _need_whole(at, "seed", seed, None, GraphError)
+    return GroupSpec(name, threads, policy, seed, process, host, ledger)  # type: ignore[arg-type]  # checked above
+
+
+def _need_place(at: str, process: object, host: object) -> None:
     if type(process) is not bool:
         raise GraphError(f"{at}: process must be True or False, got {process!r}; host= names another host than this")
     if type(host) is not str or "/" in host:
         raise GraphError(f'{at}: host must be the name of an agent, as in host="arm", got {host!r}')
-    process = process or bool(host)
-    if threads is None:
-        threads = 0 if process or name == "loop" else 1
+
+
+def _need_threads(at: str, threads: object) -> None:
     if type(threads) is not int or threads < 0:
         raise GraphError(
             f"{at}: threads must be 0 (on the loop), 1 (a thread of its own) or the number of its threads, "
             f"got {threads!r}; with n threads up to n of its nodes run at the same time"
         )
-    if name == "loop" and threads:
+
+
+def _need_nothing_own(at: str, threads: int, process: bool) -> None:
+    if threads:
         raise GraphError(
             f'{at}: it is the event loop itself and takes no thread; declare another, graph.group("work", threads=1)'
         )
-    if name == "loop" and process:
+    if process:
         raise GraphError(
             f'{at}: it is the event loop of the program itself; declare another, graph.group("vision", process=True)'
         )
-    ledger = os.fspath(ledger) if isinstance(ledger, os.PathLike) else ledger
+
+
+def _need_ledger(at: str, ledger: object, process: bool) -> None:
     if type(ledger) is not bool and (type(ledger) is not str or not ledger):
         raise GraphError(
             f'{at}: ledger must be True (kept by the run) or the path of a file, as in ledger="writer.ledger", '
@@ -312,10 +333,6 @@ def group_spec(
         )
     if ledger and not process:
         raise GraphError(f"{at}: ledger= keeps what a process has done, and this group has none; add process=True")
-    _need_choice(at, "policy", policy, POLICY, GraphError)
-    if seed is not None:
-        _need_whole(at, "seed", seed, None, GraphError)
-    return GroupSpec(name, threads, policy, seed, process, host, ledger)  # type: ignore[arg-type]  # checked above
 
 
 def _is_number(value: object) -> TypeGuard[int | float]:

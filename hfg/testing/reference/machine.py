@@ -171,6 +171,22 @@ class ReferenceMachine(Editing):
 
         Also the queues that grow inside of what iterates, where it is quiet whatever the others do (F8, G4).
         """
+        found = self.moves_at_the_border()
+        for index, station in enumerate(self.stations):
+            if only is not None and index not in only:
+                continue
+            found += [Move("task", station.path, number=task.number) for task in self.tasks_in_turn(station)]
+            for flight in station.flights:
+                found += self.moves_of(flight, index, station)
+            if station.flights and not station.is_concurrent:
+                continue
+            move = self.next_of(index)
+            found += [] if move is None else [move]
+            found += self.either_way(index, move)
+        return found
+
+    def moves_at_the_border(self) -> list[Move]:
+        """What comes from outside, what somebody outside takes, timers, and slots of the graph and of subgraphs."""
         found = [Move("feed", edge=name) for name, values in self.feeding.items() if values and self.can_feed(name)]
         found += self.timers_due()
         found += [Move("read", edge=line.edge.label) for line in self.lines if line.queue and self.is_read(line)]
@@ -178,27 +194,21 @@ class ReferenceMachine(Editing):
             line = self.next_call(owner)
             if line is not None and not self.full_lines(owner):
                 found.append(Move("call", self.path_of(owner), line.edge.label))
-        for index, station in enumerate(self.stations):
-            if only is not None and index not in only:
-                continue
-            found += [Move("task", station.path, number=task.number) for task in self.tasks_in_turn(station)]
-            for flight in station.flights:
-                number = flight.number if station.is_concurrent and flight.what == "firing" else 0
-                if self.can_go_on(flight):
-                    found.append(Move("go on", station.path, number=number))
-                elif flight.elements is not None:
-                    inside = self.all_inside(index)
-                    line = None if self.is_moving_inside(index, inside) else self.queue_to_grow(inside)
-                    found += [] if line is None else [Move("grow", edge=line.edge.label)]
-                limit = station.leaf.options.max_duration_s
-                if limit is not None and self.is_limited(flight) and self.is_over(flight.began + limit):
-                    found.append(Move("time out", station.path, number=number))
-            if station.flights and not station.is_concurrent:
-                continue
-            move = self.next_of(index)
-            if move is not None:
-                found.append(move)
-            found += self.either_way(index, move)
+        return found
+
+    def moves_of(self, flight: Flight, index: int, station: Station) -> list[Move]:
+        """How a firing or call that is under way may go on."""
+        found = []
+        number = flight.number if station.is_concurrent and flight.what == "firing" else 0
+        if self.can_go_on(flight):
+            found.append(Move("go on", station.path, number=number))
+        elif flight.elements is not None:
+            inside = self.all_inside(index)
+            line = None if self.is_moving_inside(index, inside) else self.queue_to_grow(inside)
+            found += [] if line is None else [Move("grow", edge=line.edge.label)]
+        limit = station.leaf.options.max_duration_s
+        if limit is not None and self.is_limited(flight) and self.is_over(flight.began + limit):
+            found.append(Move("time out", station.path, number=number))
         return found
 
     def is_limited(self, flight: Flight) -> bool:

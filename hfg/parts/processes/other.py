@@ -10,9 +10,9 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, Protocol
 
 from hfg.errors import HfgError, UsageError
-from hfg.parts.channels import Channel
-from hfg.parts.lives import Deaths
-from hfg.parts.messages import Begin, Closed, Message
+from hfg.parts.model.lives import Deaths
+from hfg.parts.model.messages import Begin, Closed, Message
+from hfg.parts.running.channels import Channel
 from hfg.transport import Session
 
 __all__ = ["Launched", "Launcher", "Other"]

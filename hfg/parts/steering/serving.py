@@ -20,9 +20,9 @@ from hfg.engine.observing.report import edge_reports, node_reports
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
-from hfg.parts.crossing import Crossing
-from hfg.parts.failing import as_failed
-from hfg.parts.messages import Call, Failed, Message, Parcel, Result, Seen, Sight
+from hfg.parts.model.failing import as_failed
+from hfg.parts.model.messages import Call, Failed, Message, Parcel, Result, Seen, Sight
+from hfg.parts.steering.crossing import Crossing
 from hfg.token import Token
 from hfg.trace import RunEnded, RunPaused, RunResumed, RunStarted, TraceEvent
 

@@ -21,11 +21,11 @@ from hfg.graph.flat import CutEdge
 from hfg.links import Outbox
 from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
-from hfg.parts.failing import codec_of
-from hfg.parts.inheriting import Arrived, Where
-from hfg.parts.messages import Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, pack, unpack
-from hfg.parts.part import Part
-from hfg.parts.rings import Borrowing, Lending, segment_of
+from hfg.parts.model.failing import codec_of
+from hfg.parts.model.inheriting import Arrived, Where
+from hfg.parts.model.messages import Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, pack, unpack
+from hfg.parts.running.part import Part
+from hfg.parts.running.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
 from hfg.token import Token
 from hfg.transport import Delivery, EncodedToken, Position, Session

@@ -17,9 +17,8 @@ from typing import Any, Final, TypeVar
 
 from hfg.errors import HfgError, NoAnswer, QueryRefused, TransportError
 from hfg.logs import Log
-from hfg.parts.agent import WAITS_S
-from hfg.parts.other import Launched, Launcher
-from hfg.parts.realm import (
+from hfg.parts.hosts.agent import WAITS_S
+from hfg.parts.hosts.realm import (
     FINDS_S,
     GONE_S,
     AgentIs,
@@ -38,6 +37,7 @@ from hfg.parts.realm import (
     myself,
     named,
 )
+from hfg.parts.processes.other import Launched, Launcher
 from hfg.transport import Session
 
 __all__ = ["AgentLauncher", "deployed_as"]

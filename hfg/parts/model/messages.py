@@ -14,8 +14,8 @@ from typing import Any, Final, Literal, TypeAlias
 import msgspec
 
 from hfg.engine.observing.report import EdgeReport, NodeReport
-from hfg.parts.agreement import Answer, Question, Rest
-from hfg.parts.clocks import RunClock
+from hfg.parts.model.agreement import Answer, Question, Rest
+from hfg.parts.model.clocks import RunClock
 from hfg.trace import (
     ActivityChanged,
     ActivityLost,

@@ -32,8 +32,8 @@ from hfg.graph.editing.commands import Command
 from hfg.graph.flat import MAIN, CutEdge
 from hfg.graph.structure.edge import Edge, PortEnd
 from hfg.nodetype import Node
-from hfg.parts.asking import Asking, Standing
-from hfg.parts.messages import Seen
+from hfg.parts.model.messages import Seen
+from hfg.parts.steering.asking import Asking, Standing
 from hfg.ports import EventPort, ParameterPort, Port
 from hfg.token import Token
 from hfg.trace import Consumer

@@ -19,9 +19,9 @@ from typing import Any, Final
 import msgspec
 
 from hfg.errors import TransportError
-from hfg.parts.launching import Begun, PartProcess, beat_of
-from hfg.parts.realm import Chunk, Deploy, Missing, Start, run_id
-from hfg.parts.rings import sweep_run
+from hfg.parts.hosts.realm import Chunk, Deploy, Missing, Start, run_id
+from hfg.parts.processes.launching import Begun, PartProcess, beat_of
+from hfg.parts.running.rings import sweep_run
 from hfg.transport import Session
 
 __all__ = ["Computer", "Deployed", "Journal", "is_importable", "logs_folder"]

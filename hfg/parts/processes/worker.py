@@ -21,13 +21,11 @@ from hfg.graph import Graph
 from hfg.graph.flat import MAIN, cut, flatten
 from hfg.graph.structure.level import level_of
 from hfg.logs import Log
-from hfg.parts.agreement import Rest
-from hfg.parts.channels import Carrier, Channel, name_of
-from hfg.parts.clocks import Offset, RunClock, machine
-from hfg.parts.failing import as_failed
-from hfg.parts.inheriting import inheriting, keeping, remembering
-from hfg.parts.keeping import Keeper, read
-from hfg.parts.messages import (
+from hfg.parts.model.agreement import Rest
+from hfg.parts.model.clocks import Offset, RunClock, machine
+from hfg.parts.model.failing import as_failed
+from hfg.parts.model.inheriting import inheriting, keeping, remembering
+from hfg.parts.model.messages import (
     Ask,
     AskTime,
     Begin,
@@ -48,10 +46,12 @@ from hfg.parts.messages import (
     TellTime,
     Told,
 )
-from hfg.parts.part import Part
-from hfg.parts.rings import sweep_run
-from hfg.parts.serving import Serving
-from hfg.parts.sieve import sieve
+from hfg.parts.model.sieve import sieve
+from hfg.parts.running.channels import Carrier, Channel, name_of
+from hfg.parts.running.keeping import Keeper, read
+from hfg.parts.running.part import Part
+from hfg.parts.running.rings import sweep_run
+from hfg.parts.steering.serving import Serving
 from hfg.transport import Session
 
 __all__ = ["FIRST_LIFE", "Worker"]

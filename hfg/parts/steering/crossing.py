@@ -16,8 +16,8 @@ from hfg.engine.observing.encoding import text
 from hfg.errors import EncodingError, HfgError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
-from hfg.parts.failing import codec_of
-from hfg.parts.messages import Parcel, Passed, PlainEvent, Sight
+from hfg.parts.model.failing import codec_of
+from hfg.parts.model.messages import Parcel, Passed, PlainEvent, Sight
 from hfg.ports import Port
 from hfg.token import Token
 from hfg.trace import (
@@ -151,5 +151,6 @@ class Crossing:
         """Give the port by which it comes there; for an edge that is not drawn, that behind the arrow of its label."""
         if place in self._ports:
             return self._ports[place]
-        port: Any = self._graph[place.rpartition(" -> ")[2]]
-        return port  # type: ignore[no-any-return]
+        port = self._graph[place.rpartition(" -> ")[2]]
+        assert isinstance(port, Port)
+        return port

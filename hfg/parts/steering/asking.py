@@ -23,9 +23,9 @@ from hfg.graph.flat.flat_graph import ROOT, FlatEdge
 from hfg.graph.structure.edge import Edge as DrawnEdge
 from hfg.logs import Log
 from hfg.nodetype import Node
-from hfg.parts.crossing import Crossing
-from hfg.parts.failing import as_error
-from hfg.parts.messages import Call, Failed, Result, Seen
+from hfg.parts.model.failing import as_error
+from hfg.parts.model.messages import Call, Failed, Result, Seen
+from hfg.parts.steering.crossing import Crossing
 
 __all__ = ["Asking", "Homes", "Standing"]
 

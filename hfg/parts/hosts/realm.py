@@ -208,22 +208,24 @@ class Started(msgspec.Struct, frozen=True):
     process: int
 
 
-class Begins(msgspec.Struct, frozen=True):
+class _OfAPart(msgspec.Struct, frozen=True):
+    """A verb for one life of a part of a run."""
+
+    run: str
+    part: str
+    life: int
+
+
+class Begins(_OfAPart, frozen=True):
     """The nodes of a part are let go: it may be expected to answer from now on -> Done."""
 
     verb: ClassVar[str] = "rw/begins"
-    run: str
-    part: str
-    life: int
 
 
-class Wait(msgspec.Struct, frozen=True):
+class Wait(_OfAPart, frozen=True):
     """Wait until a part is gone, for a while -> Gone."""
 
     verb: ClassVar[str] = "rw/wait"
-    run: str
-    part: str
-    life: int
 
 
 class Gone(msgspec.Struct, frozen=True):
@@ -232,13 +234,10 @@ class Gone(msgspec.Struct, frozen=True):
     how: str
 
 
-class End(msgspec.Struct, frozen=True):
+class End(_OfAPart, frozen=True):
     """See to it that a part is gone -> Done."""
 
     verb: ClassVar[str] = "rw/end"
-    run: str
-    part: str
-    life: int
 
 
 class ReadLog(msgspec.Struct, frozen=True):
@@ -331,11 +330,7 @@ def serve(session: Session, place: str, answers: Mapping[Any, Callable[[Any], Aw
 
         return reply
 
-    return [session.answer(f"{place}/{_verb(kind)}", answering(kind, answer)) for kind, answer in answers.items()]
-
-
-def _verb(kind: type) -> str:
-    return str(kind.verb)  # type: ignore[attr-defined]  # all that are asked have one
+    return [session.answer(f"{place}/{kind.verb}", answering(kind, answer)) for kind, answer in answers.items()]
 
 
 class Realm:

@@ -15,7 +15,7 @@ import msgspec
 
 from hfg.errors import HfgError, TransportError, UsageError, in_words
 from hfg.logs import Log
-from hfg.parts.realm import (
+from hfg.parts.hosts.realm import (
     GONE_S,
     AgentIs,
     Begins,

@@ -22,10 +22,10 @@ import msgspec
 
 from hfg.errors import TransportError, UsageError, in_words
 from hfg.graph import Graph
-from hfg.parts.channels import name_of
-from hfg.parts.messages import Open
+from hfg.parts.model.messages import Open
+from hfg.parts.processes.worker import Worker
+from hfg.parts.running.channels import name_of
 from hfg.parts.transports import transport
-from hfg.parts.worker import Worker
 from hfg.transport import Buffer, Session
 
 __all__ = ["BEAT_S", "STARTS_S", "Begun", "LoopLauncher", "PartProcess", "ProcessLauncher", "beat_of", "build_graph"]
@@ -312,7 +312,12 @@ class PartProcess:
 
     @classmethod
     async def begin(
-        cls, part: str, begun: msgspec.Struct, *, module: str = "hfg.parts.process", keeps_output: bool = False
+        cls,
+        part: str,
+        begun: msgspec.Struct,
+        *,
+        module: str = "hfg.parts.processes.process",
+        keeps_output: bool = False,
     ) -> PartProcess:
         """Begin it.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
-from hfg.graph.flat import LINK, MAIN, Cutting, FlatGraph, FlatNode
+from hfg.graph.flat import LINK, MAIN, Cutting, FlatEdge, FlatGraph, FlatNode
 from hfg.graph.flat.order import strongly_connected
 
 __all__ = ["Alignment", "Arrived", "Where", "inheriting", "keeping", "remembering"]
@@ -74,12 +74,15 @@ def _is_one_to_one(flat: FlatGraph) -> bool:
     return (
         not flat.gates
         and any(edge.source.node == LINK for edge in flat.edges)
-        and all(edge.source.kind == "output" and edge.target.kind == "input" for edge in flat.edges)
-        and all(edge.source.node >= 0 or edge.source.node == LINK for edge in flat.edges)
-        and not any(edge.active for edge in flat.edges)
+        and all(map(_carries_data, flat.edges))
         and all(node.index in fed and _answers_each(node, node.index in sending) for node in flat.nodes)
         and _hangs_together(flat)
     )
+
+
+def _carries_data(edge: FlatEdge) -> bool:
+    is_of_data = edge.source.kind == "output" and edge.target.kind == "input"
+    return is_of_data and not edge.active and (edge.source.node >= 0 or edge.source.node == LINK)
 
 
 def _hangs_together(flat: FlatGraph) -> bool:

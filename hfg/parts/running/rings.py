@@ -21,7 +21,7 @@ from hfg.encoding import ArrayHead, Lease, TokenCodec
 from hfg.encoding.arrays import array_problem
 from hfg.errors import SharedMemoryError, UsageError
 from hfg.logs import Log
-from hfg.parts.messages import Sees, Shares
+from hfg.parts.model.messages import Sees, Shares
 from hfg.sharedmemory import Reader, Ring, RingCounts, segment_name, sweep, unavailable
 from hfg.token import Token
 

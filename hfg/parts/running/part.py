@@ -19,9 +19,9 @@ from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph.flat import CutEdge
-from hfg.parts.agreement import Account, Answer, Question, Rest
-from hfg.parts.inheriting import Alignment, Arrived, Where
-from hfg.parts.keeping import Keeper
+from hfg.parts.model.agreement import Account, Answer, Question, Rest
+from hfg.parts.model.inheriting import Alignment, Arrived, Where
+from hfg.parts.running.keeping import Keeper
 from hfg.ports.edges import EventEdge
 from hfg.token import Token
 

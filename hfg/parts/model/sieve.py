@@ -20,11 +20,10 @@ def sieve(part: str, edges: Iterable[CutEdge]) -> Callable[[TraceEvent], bool]:
     coming = {edge.label for edge in edges if edge.target == part}
 
     def is_told(event: TraceEvent) -> bool:
-        kind = type(event)
-        if kind is TokenTaken:
-            return event.edge not in leaving  # type: ignore[attr-defined]
-        if kind is TokenSent or kind is TokenProcessed:
-            return event.edge not in coming  # type: ignore[attr-defined]
+        if isinstance(event, TokenTaken):
+            return event.edge not in leaving
+        if isinstance(event, TokenSent | TokenProcessed):
+            return event.edge not in coming
         return True
 
     return is_told

@@ -16,7 +16,7 @@ from hfg.engine import Run
 from hfg.engine.face.watching import Door
 from hfg.engine.face.watching import Question as Asked
 from hfg.engine.observing.encoding import encode
-from hfg.parts.realm import (
+from hfg.parts.hosts.realm import (
     Done,
     Look,
     PartIs,

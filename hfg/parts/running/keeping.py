@@ -27,7 +27,7 @@ from hfg.engine.runtime.engine import Engine
 from hfg.errors import EncodingError, HfgError, RunError
 from hfg.links import Outbox
 from hfg.nodetype import Node
-from hfg.parts.inheriting import Where
+from hfg.parts.model.inheriting import Where
 from hfg.ports import Port
 from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.token import Token
@@ -362,42 +362,51 @@ class Keeper:
 
     def _go_on(self, kept: Snapshot) -> None:
         core = self._engine.core
+        edges = {edge.label: edge for edge in core.edges}
+        self._end_again(kept)
+        for label, found in kept.edges.items():
+            if label in self._inlets:  # on which new tokens lie already
+                edges[label].end(found.ended)
+            else:
+                edges[label].clear()
+                edges[label].go_on(found.sent, ended=found.ended)
+        for worker in core.workers:
+            core.upstairs.rewire(worker)
+        since = len(core.followers)
+        for label, found in kept.edges.items():
+            self._lay_again(edges[label], found)
+        let_follow(core, since)
+        for worker in core.workers:
+            consider(worker)
+        self._say_ends(kept)
+
+    def _end_again(self, kept: Snapshot) -> None:
         for path, is_pending in kept.ended.items():
-            worker = core.by_path[path]
+            worker = self._engine.core.by_path[path]
             worker.end()
             if is_pending:
                 worker.promise_end(None)
             else:
                 worker.take_deferred()
             drain_left(worker.in_edges)
-        edges = {edge.label: edge for edge in core.edges}
-        for label, found in kept.edges.items():
-            edge = edges[label]
-            if label in self._inlets:  # on which new tokens lie already
-                edge.end(found.ended)
+
+    def _lay_again(self, edge: AnyEdge, found: KeptEdge) -> None:
+        """Lay the tokens on an edge that lay there."""
+        hint = getattr(edge.source_port, "type", Any)
+        for packed, activity, stamp in found.tokens:
+            value = self._unpack(packed, hint, f'a value on "{edge.label}"')
+            if isinstance(edge, EventEdge):
+                enqueue(edge, value, activity, stamp)
             else:
-                edge.clear()
-                edge.go_on(found.sent, ended=found.ended)
-        for worker in core.workers:
-            core.upstairs.rewire(worker)
-        since = len(core.followers)
-        for label, found in kept.edges.items():
-            edge = edges[label]
-            hint = getattr(edge.source_port, "type", Any)
-            for packed, activity, stamp in found.tokens:
-                value = self._unpack(packed, hint, f'a value on "{label}"')
-                if isinstance(edge, EventEdge):
-                    enqueue(edge, value, activity, stamp)
-                else:
-                    put(edge, value, activity, stamp)
-                    source: Worker = edge.source
-                    if source.outputs.missing and source.placed:
-                        source.unplace()
-            if isinstance(edge, EventEdge) and found.end_sent:
-                edge.say_end()
-        let_follow(core, since)
-        for worker in core.workers:
-            consider(worker)
+                put(edge, value, activity, stamp)
+                source: Worker = edge.source
+                if source.outputs.missing and source.placed:
+                    source.unplace()
+        if isinstance(edge, EventEdge) and found.end_sent:
+            edge.say_end()
+
+    def _say_ends(self, kept: Snapshot) -> None:
+        core = self._engine.core
         for path, is_pending in kept.ended.items():
             worker = core.by_path[path]
             if not is_pending:

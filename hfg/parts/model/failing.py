@@ -16,7 +16,7 @@ from hfg.encoding import TokenCodec
 from hfg.encoding.wire import Place, View
 from hfg.errors import EncodingError, Failure, HfgError, NodeError, RunError
 from hfg.frames import users_part
-from hfg.parts.messages import Failed
+from hfg.parts.model.messages import Failed
 from hfg.ports import Port
 from hfg.token import Token
 

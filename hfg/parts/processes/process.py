@@ -1,4 +1,6 @@
-"""The process of one part: `python -m hfg.parts.process`, begun by a launcher, which says on its input what to serve.
+"""The process of one part: `python -m hfg.parts.processes.process`, begun by a launcher.
+
+That says on its standard input what to serve.
 
 When its standard input ends, whoever began it is gone, and it goes too, whatever it does.
 """
@@ -27,10 +29,10 @@ import msgspec
 from hfg.engine import PunctualLoop
 from hfg.errors import HfgError, RunError, TransportError, in_words
 from hfg.graph import Graph
-from hfg.parts.launching import BEAT_S, Begun, build_graph
-from hfg.parts.messages import Logged, Open
+from hfg.parts.model.messages import Logged, Open
+from hfg.parts.processes.launching import BEAT_S, Begun, build_graph
+from hfg.parts.processes.worker import Worker
 from hfg.parts.transports import transport
-from hfg.parts.worker import Worker
 from hfg.transport import Session, Traffic
 
 __all__ = ["main"]
@@ -46,7 +48,7 @@ def main() -> None:
     try:
         begun = msgspec.json.decode(line, type=Begun)
     except msgspec.DecodeError:
-        raise SystemExit("hfg.parts.process serves a part of a run and is begun by that; use hfg run") from None
+        raise SystemExit("this process serves a part of a run, which begins it; use hfg run") from None
     sys.path[:] = begun.path
     sys.argv[:] = begun.argv
     if isinstance(sys.stdout, io.TextIOWrapper):
