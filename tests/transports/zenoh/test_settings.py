@@ -147,6 +147,14 @@ def test_whoever_says_so_listens_to_everybody() -> None:
     assert not problems_of(Settings(listen=("tcp/0.0.0.0:7447",), insecure=True))
 
 
+@pytest.mark.parametrize(
+    ("address", "mode"), [("tcp/127.0.0.1:7447", "peer"), ("tcp/[::1]:7447", "peer"), ("tcp/10.0.0.1:7447", "client")]
+)
+def test_who_meets_at_an_agent_of_another_host_speaks_through_that(address: str, mode: str) -> None:
+    """Those behind it listen for programs of their own host alone, so no connection can be made to them."""
+    assert configuration(Settings(connect=(address,)), "peer", wait_s=1)["mode"] == mode
+
+
 def test_who_listens_everywhere_is_reached_from_within_at_loopback() -> None:
     told = configuration(Settings(listen=("tcp/0.0.0.0:7447",), insecure=True), "client", wait_s=1)
     assert told["connect/endpoints"] == ["tcp/127.0.0.1:7447"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from hfg_transports.zenoh.names import Keys
-from hfg_transports.zenoh.settings import Access, Mode, Settings, Tls
+from hfg_transports.zenoh.settings import Access, Mode, Settings, Tls, is_loopback
 
 __all__ = ["LONG", "configuration", "listens", "targets"]
 
@@ -31,8 +31,10 @@ def configuration(settings: Settings, mode: Mode, *, wait_s: float) -> dict[str,
       mode: how the session takes part.
       wait_s: how long a client waits for an agent.
     """
-    if mode == "peer" and settings.tls is not None:
-        mode = "client"  # connections among peers would pass by the agent, and so by its access control
+    if mode == "peer" and (settings.tls is not None or _is_elsewhere(settings.connect)):
+        # connections among peers would pass by the agent, and so by its access control; and where that is on another
+        # host, none can be made to those behind it, which listen for programs of their own host alone
+        mode = "client"
     told: dict[str, Any] = {
         "mode": mode,
         "scouting/multicast/enabled": False,  # nothing is looked for on the network
@@ -97,6 +99,10 @@ def targets(settings: Settings, mode: Mode) -> list[str]:
         return list(settings.connect)
     meet = settings.meet if mode == "peer" and settings.tls is None else ()
     return [*(_reachable(address) for address in settings.listen), *meet]
+
+
+def _is_elsewhere(addresses: tuple[str, ...]) -> bool:
+    return any(not is_loopback(address) for address in addresses)
 
 
 def _reachable(address: str) -> str:
