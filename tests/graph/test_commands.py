@@ -537,6 +537,28 @@ def test_an_operator_says_what_it_was_made_of_and_equals_one_made_the_same() -> 
 # --- notes ---
 
 
+@pytest.mark.rule("P2", "R4")
+def test_a_refused_edit_leaves_the_edge_that_it_would_have_doubled() -> None:
+    """What goes straight from one port to another would go there through a subgraph as well."""
+
+    class Box(hfg.Subgraph):
+        one = hfg.slot(type=int)
+        told = hfg.Event(int)
+
+        def build(self, graph: hfg.Graph) -> None:
+            """Connects nothing."""
+
+    graph = hfg.Graph()
+    source, box, tally = graph.add(Counter()), graph.add(Box()), graph.add(Tally())
+    graph.connect(source.told, tally.note)
+    graph.connect(source.told, box.one)
+    graph.connect(box.told, tally.note)
+    before = drawn(graph)
+    with pytest.raises(GraphError, match="connected twice"):
+        graph.edit(c.Connect("box.one.inner", "box.told.inner"), c.Dissolve("box"))
+    assert drawn(graph) == before
+
+
 @pytest.mark.rule("R4")
 def test_notes_go_with_their_node_and_are_undone_like_all_else() -> None:
     graph = chain()

@@ -71,7 +71,7 @@ def robot(graph: Graph) -> Robot:
 def refused(graph: Graph, *sentence: str, call: Callable[[], Any] | None = None, **connect: Any) -> None:
     """The connect is refused with a sentence that holds all these parts, and the graph stays as it was."""
     tables = level_of(graph).connections
-    before = (list(graph.edges), dict(tables.into), set(tables.pairs))
+    before = (list(graph.edges), dict(tables.into), dict(tables.pairs))
     with pytest.raises(errors.ConnectionError) as error:
         graph.connect(**connect) if call is None else call()
     message = str(error.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 
 from hfg import errors
@@ -17,7 +18,7 @@ class Connections:
     Attributes:
       edges: in order of connecting.
       into: the edge into each target that takes one alone.
-      pairs: the ends of all other edges.
+      pairs: the ends of all other edges, and how many have them: amid an edit that is about to be refused, more than one.
     """
 
     __slots__ = ("_at", "_order", "edges", "into", "pairs")
@@ -25,7 +26,7 @@ class Connections:
     def __init__(self) -> None:
         self.edges: list[Edge] = []
         self.into: dict[TargetEnd, Edge] = {}
-        self.pairs: set[tuple[SourceEnd, TargetEnd]] = set()
+        self.pairs: Counter[tuple[SourceEnd, TargetEnd]] = Counter()
         self._order: Sequence[Edge] | None = None  # from the first edit on, which is to cost what it touches
         self._at: dict[object, dict[Edge, None]] = {}  # by the nodes at their ends, once there is an order
 
@@ -131,17 +132,21 @@ class Connections:
         if is_single(edge.target):
             self.into[edge.target] = edge
         else:
-            self.pairs.add((edge.source, edge.target))
+            self.pairs[edge.source, edge.target] += 1
 
     def _forget(self, edge: Edge) -> None:
         if self.into.get(edge.target) is edge:
             del self.into[edge.target]
-        self.pairs.discard((edge.source, edge.target))
+        pair = edge.source, edge.target
+        if self.pairs[pair] > 1:
+            self.pairs[pair] -= 1
+        else:
+            del self.pairs[pair]
 
     def check_invariants(self) -> None:
         """Fail if the index is not that of the edges; for tests."""
         assert self.into == {edge.target: edge for edge in self.edges if is_single(edge.target)}
-        assert self.pairs == {(edge.source, edge.target) for edge in self.edges if not is_single(edge.target)}
+        assert self.pairs == Counter((edge.source, edge.target) for edge in self.edges if not is_single(edge.target))
         if self._order is not None:
             assert self._order.items == self.edges
             assert set().union(*self._at.values()) == set(self.edges)
