@@ -11,8 +11,7 @@ import typer
 from hfg.cli import show
 from hfg.cli.options import AllowOption, ArgOption, TargetArgument
 from hfg.cli.target import load_graph
-from hfg.errors import UsageError
-from hfg.graph.drawing import FORMATS
+from hfg.errors import GraphError, UsageError
 
 __all__ = ["draw"]
 
@@ -20,24 +19,36 @@ __all__ = ["draw"]
 def draw(
     target: TargetArgument,
     out: Annotated[
-        Path | None, typer.Argument(help="a file that ends in .mmd or .dot; without it, standard output")
+        Path | None, typer.Argument(help="a file that ends in .svg, .mmd or .dot; without it, standard output")
     ] = None,
+    depth: Annotated[
+        int | None, typer.Option(metavar="N", help="Show so many subgraphs inside each other open; 0 folds all.")
+    ] = None,
+    fold: Annotated[
+        list[str] | None, typer.Option(metavar="PATH", help="Show this subgraph folded; may be given more than once.")
+    ] = None,
+    active: Annotated[
+        list[str] | None, typer.Option(metavar="PATH", help="Show this node as active; may be given more than once.")
+    ] = None,
+    ports: Annotated[
+        Literal["used", "all"], typer.Option(help="Which ports an SVG shows: those that edges lead to, or all.")
+    ] = "used",
     arg: ArgOption = None,
     allow: AllowOption = None,
     format: Annotated[  # noqa: A002 - the word users know
-        Literal["mmd", "dot"], typer.Option("--format", help="What goes to standard output: Mermaid or Graphviz.")
-    ] = "mmd",
+        Literal["svg", "mmd", "dot"] | None,
+        typer.Option("--format", help="SVG, Mermaid or Graphviz; by default what the file ends in, else Mermaid."),
+    ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
     """Draw a graph without running it."""
     show.set_debug(debug)
     graph = load_graph(target, arg or [], allow)
-    if out is None:
-        sys.stdout.write(FORMATS[f".{format}"](graph))
-        return 0
     try:
-        graph.draw(out)
-    except UsageError as error:
+        text = graph.draw(out, depth=depth, fold=fold or (), active=active, ports=ports, format=format)
+    except (GraphError, UsageError) as error:
         show.sentence(str(error))
         return 2
+    if out is None:
+        sys.stdout.write(text)
     return 0

@@ -3,7 +3,7 @@
     graph       Graph: the face, which composes the wings
     editing     edits as data: commands, their steps, undo and redo, reloading of modules
     checks      what only the whole shows: of edges, flow, nodes
-    drawing     what is to be seen of a graph, as Mermaid or DOT
+    drawing     what is to be seen of a graph, as SVG, Mermaid or DOT
     flat        one graph without subgraphs, as a runner and the checks see it
     structure   what a graph is made of: nodes, edges, groups, gates, subgraphs, the ports of the whole
 

@@ -11,14 +11,14 @@ import copy
 import os
 from collections.abc import Callable, Iterable
 from types import ModuleType
-from typing import Any, Final, Never, TypeVar, overload
+from typing import Any, Final, Literal, Never, TypeVar, overload
 
 from reactivex import Observable
 from typing_extensions import TypeForm
 
 from hfg.errors import UsageError
 from hfg.graph.checks.checking import check
-from hfg.graph.drawing.formats import draw
+from hfg.graph.drawing.formats import draw, view_of
 from hfg.graph.editing import transactions
 from hfg.graph.editing.commands import Command
 from hfg.graph.editing.telling import as_commands
@@ -429,20 +429,35 @@ class Graph:
         """Look for what keeps the graph from working, or probably does; errors first."""
         return check(self)
 
-    def draw(self, path: str | os.PathLike[str] | None = None) -> str:
+    def draw(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        depth: int | None = None,
+        fold: Iterable[Node | str] = (),
+        active: Iterable[Node | str] | None = None,
+        ports: Literal["used", "all"] = "used",
+        format: Literal["svg", "mmd", "dot"] | None = None,  # noqa: A002 - the word users know
+    ) -> str:
         """Draw it and give the text of the drawing; in a notebook a graph is shown by itself.
 
-        Double or thick lines are active edges, dashed ones begin at events; nodes that are active in a run have a thick
-        border.
+        An SVG has the notation of the paper: inputs left, outputs right, slots on top, events at the bottom; dark
+        squares are synchronous, light circles asynchronous, double lines active edges. What is active in a run has a
+        thick border.
 
         Args:
-          path: a file that ends in ".mmd" (Mermaid) or ".dot" (Graphviz); without it nothing is written and the text is
-            Mermaid.
+          path: a file that ends in ".svg", ".mmd" (Mermaid) or ".dot" (Graphviz); without it nothing is written.
+          depth: so many subgraphs inside each other are shown open, 0 shows all of them folded; None folds none.
+          fold: subgraphs, or their paths, that are folded whatever the depth.
+          active: which nodes and subgraphs are shown as active, as `run.active()` gives them; None: those that are now.
+          ports: "all" shows those, too, that no edge leads to.
+          format: "svg", "mmd" or "dot", whatever the file is called; without a file and this the text is Mermaid.
 
         Raises:
-          UsageError: the file has another ending, or cannot be written.
+          GraphError: a node is not in the graph, or is to be folded and no subgraph.
+          UsageError: the file has another ending, or cannot be written, or an argument is none of its kind.
         """
-        return draw(self, path)
+        return draw(self, path, format=format, view=view_of(self, depth, fold, active, ports))
 
     # --- editing ---
 
@@ -537,8 +552,8 @@ class Graph:
         """
         transactions.reload(self, module)
 
-    def _repr_markdown_(self) -> str:
-        return f"```mermaid\n{self.draw()}```\n"
+    def _repr_svg_(self) -> str:
+        return self.draw(format="svg")
 
     def __repr__(self) -> str:
         return f"<{self._level.title}: {len(self.nodes)} nodes, {len(self.edges)} edges>"

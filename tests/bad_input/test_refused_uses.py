@@ -532,7 +532,17 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "no such path": (lambda: build()["nobody"], NO_NODE),
     "no such port": (lambda: build()["count.vlue"], '"count" has no port "vlue"; did you mean "value"?'),
     "a number as a path": (lambda: build()[3], 'a path is a text such as "fetch/go_to.goal", g'),  # type: ignore[index]
-    "draw a pdf": (lambda: build().draw("x.pdf"), 'cannot be drawn into "x.pdf": a drawing ends in .mmd or .dot'),
+    "draw a pdf": (lambda: build().draw("x.pdf"), 'cannot be drawn into "x.pdf": a drawing ends in .svg or .mmd or .'),
+    "draw as a pdf": (lambda: build().draw(format="pdf"), "cannot be drawn into format='pdf': a drawing ends in .svg"),  # type: ignore[arg-type]
+    "draw into nothing": (lambda: build().draw("\0.svg"), "embedded null byte; name a file in a folder that you can w"),
+    "draw half open": (lambda: build().draw(depth=-1), "depth= says how many subgraphs inside each other are shown op"),
+    "draw open": (lambda: build().draw(depth=True), "are shown open, 0 or more, got True"),
+    "draw some ports": (lambda: build().draw(ports="some"), 'ports= is "used", those that edges lead to, or "all", g'),  # type: ignore[arg-type]
+    "fold a text": (lambda: build().draw(fold="count"), 'fold= takes a list of nodes or paths, as in fold=["fetch"]'),
+    "fold nobody": (lambda: build().draw(fold=["nobody"]), NO_NODE),
+    "fold a node": (lambda: build().draw(fold=["count"]), '"count" cannot be folded, for it is no subgraph; leave it'),
+    "show 3 as active": (lambda: build().draw(active=[3]), "active= takes its nodes or their paths, got 3; add it fir"),  # type: ignore[list-item]
+    "show a stranger": (lambda: build().draw(active=[inc()]), "active= takes its nodes or their paths, got <inc()>; a"),
     "draw a number": (lambda: build().draw(3), 'is drawn into a file, as in graph.draw("gra'),  # type: ignore[arg-type]
     "a graph called 3": (lambda: hfg.Graph(3), "a graph needs a name that is a text and not"),  # type: ignore[arg-type]
     "gate by nobody": (lambda: build_gate(), "write graph.gate(detector, by=fetch)"),
@@ -667,9 +677,13 @@ LINES = {
     "check missing.py": "missing.py: does not exist",
     "check text.txt": "text.txt is no Python file",
     "check steps.py more": "Got unexpected extra argument(s) (more)",
-    "draw steps.py x.pdf": 'graph "steps" cannot be drawn into "x.pdf": a drawing ends in .mmd or .dot',
-    "draw steps.py x": 'graph "steps" cannot be drawn into "x": a drawing ends in .mmd or .dot; rename the file',
-    "draw steps.py --format pdf": "Invalid value for '--format': 'pdf' is not one of 'mmd', 'dot'",
+    "draw steps.py x.pdf": 'graph "steps" cannot be drawn into "x.pdf": a drawing ends in .svg or .mmd or .dot',
+    "draw steps.py x": 'graph "steps" cannot be drawn into "x": a drawing ends in .svg or .mmd or .dot; rename',
+    "draw steps.py --format pdf": "Invalid value for '--format': 'pdf' is not one of 'svg', 'mmd', 'dot'",
+    "draw steps.py --fold nobody": 'graph "steps" has no node "nobody"',
+    "draw steps.py --fold third": '"third" cannot be folded, for it is no subgraph; leave it out of fold=',
+    "draw steps.py --depth -1": "depth= says how many subgraphs inside each other are shown open, 0 or more, got -1",
+    "draw steps.py --ports some": "Invalid value for '--ports': 'some' is not one of 'used', 'all'",
     "draw missing.py": "missing.py: does not exist",
     "draw steps.py nowhere/x.mmd": "No such file or directory; name a file in a folder that you can write to",
     "nodes missing": 'there is no module, family or node type "missing" here or installed',

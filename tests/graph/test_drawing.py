@@ -192,12 +192,12 @@ def test_the_ending_says_what_is_written(tmp_path: Path) -> None:
         file = tmp_path / f"g{ending}"
         assert graph.draw(file) == write(graph)
         assert file.read_text(encoding="utf-8") == write(graph)
-    with pytest.raises(UsageError, match=r"a drawing ends in \.mmd or \.dot; rename the file"):
-        graph.draw(tmp_path / "g.svg")
+    with pytest.raises(UsageError, match=r"a drawing ends in \.svg or \.mmd or \.dot; rename the file"):
+        graph.draw(tmp_path / "g.png")
     with pytest.raises(UsageError, match="No such file or directory; name a file in a folder"):
         graph.draw(tmp_path / "nowhere" / "g.mmd")
 
 
 def test_a_notebook_shows_a_graph_by_itself() -> None:
     graph = hfg.Graph()
-    assert graph._repr_markdown_() == f"```mermaid\n{graph.draw()}```\n"
+    assert graph._repr_svg_() == graph.draw(format="svg")

@@ -1,47 +1,104 @@
-"""Draws graphs: Mermaid for pages and notebooks, DOT for Graphviz.
+"""Draws graphs as text: SVG to look at, Mermaid for pages, DOT for Graphviz.
 
-Active edges are thick or double, edges from events are dashed, subgraphs are boxes; states are tinted, those that are
-active in a run have a thick border. Stands on `picture`.
+In Mermaid and DOT active edges are thick or double, edges from events are dashed, subgraphs are boxes; states are
+tinted, those that are active in a run have a thick border. Stands on `picture` and `svg`.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from hfg.errors import UsageError
-from hfg.graph.drawing.picture import Arrow, Box, Look, Picture, Shape, picture
-from hfg.graph.structure.level import level_of
+from hfg.errors import GraphError, UsageError
+from hfg.graph.drawing.picture import EVERYTHING, Arrow, Box, Look, Picture, Shape, View, picture
+from hfg.graph.drawing.svg import svg
+from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.pointing import meant, node_at
+from hfg.graph.structure.subgraph import is_box
+from hfg.nodetype import Node
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph
 
-__all__ = ["FORMATS", "dot", "draw", "mermaid"]
+__all__ = ["FORMATS", "dot", "draw", "mermaid", "view_of"]
 
 
-def draw(graph: Graph, path: str | os.PathLike[str] | None = None) -> str:
-    """Draw a graph into a file; see `Graph.draw`."""
-    if path is None:
-        return mermaid(graph)
+def draw(
+    graph: Graph,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    format: str | None = None,  # noqa: A002 - the word users know
+    view: View = EVERYTHING,
+) -> str:
+    """Draw a graph, into a file if one is named; see `Graph.draw`."""
     title = level_of(graph).title
+    if path is None:
+        return _writer(title, f".{format}", f"format={format!r}")(graph, view) if format else mermaid(graph, view)
     if not isinstance(path, str | os.PathLike):
-        raise UsageError(f'{title} is drawn into a file, as in graph.draw("graph.mmd"), got {path!r:.80}')
+        raise UsageError(f'{title} is drawn into a file, as in graph.draw("graph.svg"), got {path!r:.80}')
     file = Path(path)
-    write = FORMATS.get(file.suffix)
-    if write is None:
-        endings = " or ".join(FORMATS)
-        raise UsageError(f'{title} cannot be drawn into "{file}": a drawing ends in {endings}; rename the file')
-    text = write(graph)
+    text = _writer(title, f".{format}" if format else file.suffix, f'"{file}"')(graph, view)
     try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
+        file.write_text(text, encoding="utf-8", errors="replace")
+    except (OSError, ValueError) as error:
+        said = error.strerror if isinstance(error, OSError) else error
         raise UsageError(
-            f'{title} cannot be drawn into "{file}": {error.strerror}; name a file in a folder that you can write to'
+            f'{title} cannot be drawn into "{file}": {said}; name a file in a folder that you can write to'
         ) from error
     return text
+
+
+def _writer(title: str, ending: str, what: str) -> Callable[[Graph, View], str]:
+    write = FORMATS.get(ending)
+    if write is None:
+        endings = " or ".join(FORMATS)
+        raise UsageError(f"{title} cannot be drawn into {what}: a drawing ends in {endings}; rename the file")
+    return write
+
+
+def view_of(
+    graph: Graph,
+    depth: int | None,
+    fold: Iterable[Node | str],
+    active: Iterable[Node | str] | None,
+    ports: str,
+) -> View:
+    """Check what somebody wants to see.
+
+    Raises:
+      GraphError: a node is not in the graph, or one that is no subgraph is to be folded.
+      UsageError: something else is none of its kind.
+    """
+    level = level_of(graph)
+    if depth is not None and (type(depth) is not int or depth < 0):
+        raise UsageError(
+            f"{level.title}: depth= says how many subgraphs inside each other are shown open, 0 or more, got {depth!r}"
+        )
+    if ports not in ("used", "all"):
+        raise UsageError(f'{level.title}: ports= is "used", those that edges lead to, or "all", got {ports!r}')
+    folded = _nodes(level, "fold", fold)
+    for node in folded:
+        if not is_box(node):
+            raise GraphError(f'"{node.place.path}" cannot be folded, for it is no subgraph; leave it out of fold=')
+    shown = None if active is None else frozenset(_nodes(level, "active", active))
+    return View(depth, frozenset(folded), shown, ports == "all")
+
+
+def _nodes(level: Level, what: str, given: Iterable[Node | str]) -> list[Node]:
+    if isinstance(given, str | Node) or not isinstance(given, Iterable):
+        raise UsageError(
+            f'{level.title}: {what}= takes a list of nodes or paths, as in {what}=["fetch"], got {given!r:.80}'
+        )
+    found: list[Node] = []
+    for one in given:
+        node: Any = meant(level, one, node_at)
+        if not isinstance(node, Node) or not level.holds(node):
+            raise GraphError(f"{level.title}: {what}= takes its nodes or their paths, got {one!r:.80}; add it first")
+        found.append(node)
+    return found
 
 
 # --- Mermaid ---
@@ -66,9 +123,9 @@ _SHAPES: Final[Mapping[Look, tuple[str, str]]] = MappingProxyType(
 )
 
 
-def mermaid(graph: Graph) -> str:
+def mermaid(graph: Graph, view: View = EVERYTHING) -> str:
     """Draw a graph as the text of a Mermaid flowchart."""
-    seen = picture(graph)
+    seen = picture(graph, view)
     lines = ["flowchart LR"]
     depth = 0
     for level, item in seen.items:
@@ -131,9 +188,9 @@ _DOT_SHAPES: Final[Mapping[Look, str]] = MappingProxyType(
 )
 
 
-def dot(graph: Graph) -> str:
+def dot(graph: Graph, view: View = EVERYTHING) -> str:
     """Draw a graph as the text of a DOT file, for Graphviz."""
-    seen = picture(graph)
+    seen = picture(graph, view)
     lines = [
         f"digraph {_escaped(seen.title)} {{",
         '    graph [rankdir=LR, fontname="sans-serif"]',
@@ -177,4 +234,6 @@ def _dot_line(arrow: Arrow) -> str:
     return ", ".join(parts)
 
 
-FORMATS: Final[Mapping[str, Callable[[Graph], str]]] = MappingProxyType({".mmd": mermaid, ".dot": dot})
+FORMATS: Final[Mapping[str, Callable[[Graph, View], str]]] = MappingProxyType(
+    {".svg": svg, ".mmd": mermaid, ".dot": dot}
+)

@@ -1,20 +1,21 @@
 """What is to be seen of a graph: boxes, shapes and arrows, before anybody has chosen a format.
 
 Edges are drawn as they were connected; the ports of subgraphs, and those of the whole graph, are shapes of their own,
-so an arrow never begins or ends at a box. Nothing recurses: graphs may be as deep as they like. Stands on `structure`;
-changes nothing there.
+so an arrow never begins or ends at a box. What lies in a folded subgraph is not seen, and whatever leads there leads to
+the subgraph. Nothing recurses: graphs may be as deep as they like. Stands on `structure`; changes nothing there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeGuard
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, TypeGuard
 
 import msgspec
 
 from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, is_feed, is_port
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.options import DEFAULT_CAPACITY, EdgeOptions, NodeOptions
 from hfg.graph.structure.subgraph import inside, is_box
 from hfg.nodetype import Node
@@ -23,11 +24,46 @@ from hfg.ports import InnerSource, InnerTarget, Port
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph
 
-__all__ = ["Arrow", "Box", "Look", "Picture", "Shape", "picture"]
+__all__ = ["EVERYTHING", "Arrow", "Box", "Look", "Picture", "Pin", "Shape", "View", "picture"]
 
 Look: TypeAlias = Literal["node", "port", "start", "stop", "feed"]
 
-_LONGEST = 40  # characters of an initial value
+_LAST: Final = 1_000_000  # ports that every node has are behind its own
+_LONGEST: Final = 40  # characters of an initial value
+
+
+class View(msgspec.Struct, frozen=True):
+    """What somebody wants to see of a graph.
+
+    Attributes:
+      depth: so many subgraphs inside each other are open, all others folded; None opens all.
+      folded: these subgraphs are, whatever the depth.
+      active: these nodes and subgraphs are shown as active; None: those that are, in a run.
+      all_ports: ports are shown that nothing is connected to, too.
+    """
+
+    depth: int | None = None
+    folded: frozenset[Node] = frozenset()
+    active: frozenset[Node] | None = None
+    all_ports: bool = False
+
+
+EVERYTHING: Final = View()
+
+
+class Pin(msgspec.Struct, frozen=True):
+    """Where an arrow meets a node: one of its ports.
+
+    Attributes:
+      kind: "input", "output", "slot", "event" or "parameter"; "gate" and "active" are the two ends of a gate.
+      order: where it is among the ports that the node's type declares of this kind.
+      is_plain: it is the only port that it could be, so nobody needs its name.
+    """
+
+    kind: str
+    name: str
+    order: int = 0
+    is_plain: bool = False
 
 
 class Shape(msgspec.Struct):
@@ -35,40 +71,81 @@ class Shape(msgspec.Struct):
 
     Attributes:
       id: "n0", "n1", ... in order of appearance.
-      label: lines of text, as users wrote it.
+      name: as users wrote it.
+      details: what else is said about it, a line each.
+      path: of the node; "" for ports.
+      type_name: of the node, or what kind of port it is.
+      group: where the node runs.
+      pins: the ports of the node that are shown even if no arrow meets them.
       is_state: an active edge begins or ends here.
       is_active: it is active now, in a run.
+      is_enabled: it is at the start of a run.
+      is_folded: it is a subgraph with something inside that is not shown.
     """
 
     id: str
-    label: str
+    name: str
     look: Look
+    details: list[str] = []
+    path: str = ""
+    type_name: str = ""
+    group: str = "loop"
+    pins: list[Pin] = []
     is_state: bool = False
     is_active: bool = False
+    is_enabled: bool = True
+    is_folded: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name and details as lines of text."""
+        return "\n".join([self.name, *self.details])
 
 
 class Box(msgspec.Struct):
-    """A subgraph; what is in it follows it with a greater depth."""
+    """A subgraph; what is in it follows it with a greater depth. Its attributes are those of a shape."""
 
     id: str
-    label: str
+    name: str
+    details: list[str] = []
+    path: str = ""
+    type_name: str = ""
+    group: str = "loop"
+    is_active: bool = False
+    is_enabled: bool = True
+
+    @property
+    def label(self) -> str:
+        """Name and details as lines of text."""
+        return "\n".join([self.name, *self.details])
 
 
 class Arrow(msgspec.Struct):
     """An edge or a gate.
 
     Attributes:
+      tail: the shape where it begins.
+      head: the shape where it ends.
+      label: its ports, as far as they need a name, and its options.
+      out_of: the port of the node at which it begins; None if the shape is the port.
+      into: the same for its end.
+      said: its options alone.
       is_signal: it begins at an event.
       is_active: it transports activity: the double line of the paper.
       is_gate: it is no edge; the tail is the state, the head what rests meanwhile.
+      is_back: initial tokens lie on it, with which a circle of data begins.
     """
 
     tail: str
     head: str
     label: str
+    out_of: Pin | None = None
+    into: Pin | None = None
+    said: str = ""
     is_signal: bool = False
     is_active: bool = False
     is_gate: bool = False
+    is_back: bool = False
 
 
 class Picture(msgspec.Struct):
@@ -76,29 +153,36 @@ class Picture(msgspec.Struct):
 
     Attributes:
       items: boxes and shapes, each with its depth, the content of a box behind it.
+      groups: all groups of the graph in their order.
     """
 
     title: str
     items: list[tuple[int, Box | Shape]]
     arrows: list[Arrow]
+    groups: list[str]
 
 
-def picture(graph: Graph) -> Picture:
+def picture(graph: Graph, view: View = EVERYTHING) -> Picture:
     """Look at a graph, or at the inside of a subgraph alone."""
-    return _Look(level_of(graph)).picture
+    return _Look(level_of(graph), view).picture
 
 
 class _Look:
-    """One walk through a graph and all that is inside."""
+    """One walk through a graph and all that is open inside."""
 
-    def __init__(self, level: Level) -> None:
+    def __init__(self, level: Level, view: View) -> None:
         self.level = level
-        self.picture = Picture(level.path or level.name, [], [])
+        self.view = view
+        self.open, self.hidden_in = _opened(level, view)
+        self.lit = _lit(level, view)
+        self.picture = Picture(level.path or level.name, [], [], list(level.whole.groups.by_name))
         self.ids: dict[Any, str] = {}  # of nodes, and of ports that are drawn by themselves
         self.shapes: dict[str, Shape] = {}
         self.boxes = 0
-        self.edges = [edge for one in _depth_first(level) for edge in one.edges]
-        self.gates = [gate for one in _depth_first(level) for gate in one.gates]
+        self.edges = [edge for one in self.open for edge in one.edges]
+        gates = [(gate, self._seen(gate)) for one in _depth_first(level) for gate in one.gates]
+        # A node may be its own gate; a gate between two that are folded into one box is not seen.
+        self.gates = [seen for gate, seen in gates if seen.by is not seen.target or gate.by not in self.hidden_in]
         self.on_boxes = _ports_of_boxes(self.edges)
         for gate in self.gates:
             for node, what in ((gate.target, "gate"), (gate.by, "active")):
@@ -110,8 +194,13 @@ class _Look:
             self._edge(edge)
         for gate in self.gates:
             self._gate(gate)
-        for one in _depth_first(level):
+        for one in self.open:
             self._promotions(one)
+
+    def _seen(self, gate: Gate) -> Gate:
+        """Let a gate lead to and from what is seen of its two nodes."""
+        target, by = (self.hidden_in.get(node, node) for node in (gate.target, gate.by))
+        return Gate(target, by, gate.idle_rate_hz)
 
     def _own_ports(self) -> None:
         """Draw the ports of the whole: inputs and outputs always, the others where they are used."""
@@ -120,51 +209,95 @@ class _Look:
         for port in (ports.start, *ports.inputs.values(), *ports.outputs.values(), ports.stop, ports.abort):
             if id(port) in used or port.kind in ("input", "output"):
                 look: Look = "start" if port is ports.start else "stop" if port.kind == "slot" else "port"
-                self._shape(0, port, port.name, look)
+                self._shape(0, port, port.name, look, port.kind)
         for port, name in self.on_boxes.get(self.level.owner, {}).items():  # the inside of a subgraph, drawn alone
-            self._shape(0, port, name, "port")
+            self._port_of_box(0, port, name)
 
     def _nodes(self) -> None:
-        stack = [iter(self.level.nodes.items())]
+        stack = [(iter(self.level.nodes.items()), self._group_around())]
+        insides = set(self.open)
         while stack:
             depth = len(stack) - 1
-            for name, node in stack[-1]:
-                ports = self.on_boxes.get(node, {})
-                inner = inside(node)
-                if inner is None or not (inner.nodes or ports):
-                    self._shape(depth, node, _node_label(name, node._options), "node")
+            nodes, around = stack[-1]
+            for name, node in nodes:
+                options, ports, inner = node._options, self.on_boxes.get(node, {}), inside(node)
+                group = options.group or around
+                if inner is None or inner not in insides or not (inner.nodes or ports):
+                    self._node(depth, name, node, group)
                     continue
-                self.picture.items.append((depth, Box(f"g{self.boxes}", _box_label(name, node._options))))
+                box = Box(f"g{self.boxes}", name, _details(options), inner.path, node._type.qualname, group)
+                box.is_active, box.is_enabled = self._is_active(node), options.enabled
+                self.picture.items.append((depth, box))
                 self.boxes += 1
                 for port, port_name in ports.items():
-                    self._shape(depth + 1, port, port_name, "port")
-                stack.append(iter(inner.nodes.items()))
+                    self._port_of_box(depth + 1, port, port_name)
+                stack.append((iter(inner.nodes.items()), group))
                 break
             else:
                 stack.pop()
 
+    def _group_around(self) -> str:
+        """Where nodes of the outermost level run that name no group."""
+        level: Level | None = self.level
+        while level is not None and level.owner is not None:
+            if level.owner._options is not None and level.owner._options.group:
+                return str(level.owner._options.group)
+            level = level.around
+        return "loop"
+
+    def _node(self, depth: int, name: str, node: Node, group: str) -> None:
+        inner = inside(node)
+        shape = self.shapes[self._shape(depth, node, name, "node", node._type.qualname)]
+        shape.details, shape.path, shape.group = _details(node._options), path_of(node), group
+        shape.is_enabled, shape.is_folded = node._options.enabled, inner is not None and bool(inner.nodes)
+        if self.view.all_ports:
+            declared = _declared(node)
+            shape.pins = [Pin(*port, order) for port, order in declared.items() if port[0] != "parameter"]
+
+    def _port_of_box(self, depth: int, port: Port | tuple[Node, str], name: str) -> None:
+        self._shape(depth, port, name, "port", port.kind if isinstance(port, Port) else port[1])
+
+    def _is_active(self, node: Node) -> bool:
+        return node in self.lit
+
     def _edge(self, edge: Edge) -> None:
         ends = self._end(edge.source), self._end(edge.target)
         is_signal = is_feed(edge.source) or edge.source.kind in ("event", "slot")
-        label = ", ".join(part for part in (_ports_label(edge), *_options(edge.options)) if part)
-        self.picture.arrows.append(Arrow(*ends, label, is_signal, edge.active))
+        said = ", ".join(_options(edge.options))
+        label = ", ".join(part for part in (_ports_label(edge), said) if part)
+        pins = self._pin(edge.source, _source_name(edge.source)), self._pin(edge.target, _target_name(edge.target))
+        arrow = Arrow(*ends, label, *pins, said, is_signal, edge.active, is_back=bool(edge.options.initial))
+        self.picture.arrows.append(arrow)
         for end in ends:
             if edge.active and self.shapes[end].look == "node":
                 self.shapes[end].is_state = True
 
     def _end(self, end: SourceEnd) -> str:
         if not is_port(end):
-            return self.ids[end] if end in self.ids else self._shape(0, end, "observable", "feed")
+            return self.ids[end] if end in self.ids else self._shape(0, end, "observable", "feed", "observable")
         port = _outside(end)
         return self.ids[port] if port in self.ids else self.ids[port.node]
 
+    def _pin(self, end: SourceEnd, needed_name: str) -> Pin | None:
+        if not is_port(end) or _outside(end) in self.ids:
+            return None
+        order = _declared(end.node).get((end.kind, end.name), _LAST) if isinstance(end.node, Node) else 0
+        is_plain = not needed_name and not is_box(end.node) and not self.view.all_ports
+        return Pin(end.kind, end.name, order, is_plain)
+
     def _gate(self, gate: Gate) -> None:
-        by, target = (
-            self.ids[node] if node in self.ids else self.ids[node, what]
-            for node, what in ((gate.by, "active"), (gate.target, "gate"))
-        )
-        label = "gate" if gate.idle_rate_hz is None else f"gate, else {gate.idle_rate_hz:g} Hz"
-        self.picture.arrows.append(Arrow(by, target, label, is_gate=True))
+        (by, out_of), (target, into) = self._end_of_gate(gate.by, "active"), self._end_of_gate(gate.target, "gate")
+        said = "" if gate.idle_rate_hz is None else f"else {gate.idle_rate_hz:g} Hz"
+        label = f"gate, {said}" if said else "gate"
+        self.picture.arrows.append(Arrow(by, target, label, out_of, into, said, is_gate=True))
+
+    def _end_of_gate(self, node: Node, what: str) -> tuple[str, Pin | None]:
+        if node in self.ids:
+            is_node = self.shapes[self.ids[node]].look == "node"
+            return self.ids[node], Pin(what, what, is_plain=True) if is_node else None
+        if (node, what) in self.ids:
+            return self.ids[node, what], None
+        return self._shape(0, node, path_of(node), "feed", "node outside of what is drawn"), None
 
     def _promotions(self, level: Level) -> None:
         """Lead a drawn parameter of a subgraph to those that it stands for."""
@@ -173,14 +306,51 @@ class _Look:
         for name, ports in level.promotions.by_name.items():
             outer = self.ids.get(level.owner.ports.parameters[name])
             if outer is not None:
-                self.picture.arrows += [Arrow(outer, self._end(inner), f"→ {inner.name}") for inner in ports]
+                self.picture.arrows += [
+                    Arrow(outer, self._end(inner), f"→ {inner.name}", None, self._pin(inner, inner.name))
+                    for inner in ports
+                ]
 
-    def _shape(self, depth: int, of: object, label: str, look: Look) -> str:
-        shape = Shape(f"n{len(self.shapes)}", label, look, is_active=isinstance(of, Node) and of.active)
+    def _shape(self, depth: int, of: object, name: str, look: Look, type_name: str) -> str:
+        shape = Shape(f"n{len(self.shapes)}", name, look, type_name=type_name)
+        shape.is_active = isinstance(of, Node) and self._is_active(of)
         self.picture.items.append((depth, shape))
         self.shapes[shape.id] = shape
         self.ids[of] = shape.id
         return shape.id
+
+
+def _opened(level: Level, view: View) -> tuple[list[Level], Mapping[Node, Node]]:
+    """Give the levels that are seen, the outer ones first, each box before the next; and who is hidden in which box."""
+    opened: list[Level] = []
+    hidden: dict[Node, Node] = {}
+    waiting: list[tuple[Level, int, Node | None]] = [(level, 0, None)]
+    while waiting:
+        one, depth, within = waiting.pop()
+        if within is None:
+            opened.append(one)
+        else:
+            hidden.update(dict.fromkeys(one.nodes.values(), within))
+        for node in reversed(one.nodes.values()):
+            inner = inside(node)
+            if inner is not None:
+                is_folded = node in view.folded or (view.depth is not None and depth >= view.depth)
+                waiting.append((inner, depth + 1, within or (node if is_folded else None)))
+    return opened, hidden
+
+
+def _lit(level: Level, view: View) -> set[Node]:
+    """Give who is shown as active: also the subgraphs around them, which are so, too (rule G2)."""
+    shown: Iterable[Node] = view.active or ()
+    if view.active is None:
+        shown = (node for one in _depth_first(level) for node in one.nodes.values() if node.active)
+    found: set[Node] = set()
+    for node in shown:
+        one: Node | None = node
+        while one is not None and one not in found:
+            found.add(one)
+            one = None if one._place is None else level_of(one._place.graph).owner
+    return found
 
 
 def _depth_first(level: Level) -> Iterator[Level]:
@@ -208,10 +378,24 @@ def _outside(end: PortEnd) -> Port:
     return end.outer if isinstance(end, InnerSource | InnerTarget) else end
 
 
+def _declared(node: Node) -> dict[tuple[str, str], int]:
+    """Give the ports that a node's type declares, by kind and name, numbered in their order."""
+    type_ = node._type
+    slots = [name for name, slot in type_.slots.items() if slot.handler_name or type_.is_subgraph]
+    kinds: tuple[tuple[str, Iterable[str]], ...] = (
+        ("input", type_.inputs),
+        ("output", type_.outputs),
+        ("slot", slots),
+        ("event", type_.events),
+        ("parameter", type_.parameters),
+    )
+    return {(kind, name): order for kind, names in kinds for order, name in enumerate(names)}
+
+
 # --- labels ---
 
 
-def _node_label(name: str, options: NodeOptions) -> str:
+def _details(options: NodeOptions) -> list[str]:
     said = []
     if options.max_rate_hz is not None:
         said.append(f"{options.max_rate_hz:g} Hz")
@@ -219,12 +403,9 @@ def _node_label(name: str, options: NodeOptions) -> str:
         said.append(f"active for {options.active_for_s:g} s")
     if not options.enabled:
         said.append("disabled")
-    return "\n".join([name, *said])
-
-
-def _box_label(name: str, options: NodeOptions) -> str:
-    each = ", ".join(options.iterate_over)
-    return _node_label(name, options) + (f"\nfor each of {each}" if each else "")
+    if options.iterate_over:
+        said.append(f"for each of {', '.join(options.iterate_over)}")
+    return said
 
 
 def _ports_label(edge: Edge) -> str:
