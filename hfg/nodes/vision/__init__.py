@@ -1,10 +1,11 @@
-"""What is found in pictures: people, faces, bar codes, markers, chessboards, keypoints, depth.
+"""What is found in pictures: people, faces, bar codes, markers, signs, chessboards, keypoints, depth.
 
 These are OpenCV's objects: each keeps a detector or a matcher that is costly to make. `hfg.nodes.cv` has its functions.
 
     _detecting     PeopleDetector, CascadeDetector, BarcodeReader, MarkerDetector, ChessboardFinder, qr_code
     _keypoints     KeypointDetector, match_descriptors
     _depth         StereoDepth, CameraCalibration
+    _marks         find_bullseyes, find_quadrilaterals
     _improving     EqualizeLocally
     _drawing       draw_boxes
 """
@@ -28,9 +29,11 @@ from hfg.nodes.vision._detecting import (  # noqa: E402
 from hfg.nodes.vision._drawing import draw_boxes  # noqa: E402
 from hfg.nodes.vision._improving import EqualizeLocally  # noqa: E402
 from hfg.nodes.vision._keypoints import KeypointDetector, match_descriptors  # noqa: E402
+from hfg.nodes.vision._marks import Bullseye, find_bullseyes, find_quadrilaterals  # noqa: E402
 
 __all__ = [
     "BarcodeReader",
+    "Bullseye",
     "Calibration",
     "CameraCalibration",
     "CascadeDetector",
@@ -41,6 +44,8 @@ __all__ = [
     "PeopleDetector",
     "StereoDepth",
     "draw_boxes",
+    "find_bullseyes",
+    "find_quadrilaterals",
     "match_descriptors",
     "qr_code",
 ]
