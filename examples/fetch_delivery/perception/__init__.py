@@ -24,7 +24,7 @@ value that comes, unless it says otherwise, and is silent where it has nothing t
                  wall_ahead(scan, width=) -> Wall | None                                                 node, function
                  other_robots(scan, localised) -> list[Disk]                                             node, function
     localising   Localise()   scan, odometry -> localised; slot sightings(list[Sighting]); ~> lost, found
-    signs        SignMap()    sightings, localised -> signs: dict[int, Sign(x, y, theta, sigma, count)]; the digits
+    signs        SignMap()    sightings, localised -> signs: dict[int, Sign(x, y, theta, sigma, sightings)]; the digits
     stations     StationMap() targets, localised -> filling: list[Station], delivery: list[Station]; from bull's-eyes
                  octagon_sides(scan, localised) -> list[Station]        the sides that the scan shows    node, function
                  delivery_station(sign) -> Station      where the bull's-eye beside a digit is           function

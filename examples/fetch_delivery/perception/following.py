@@ -1,0 +1,200 @@
+"""Along a path: the next step of a robot that drives in every direction, at nothing faster than it can brake."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+import hfg
+from examples.fetch_delivery.messages import Scan, Twist
+from examples.fetch_delivery.perception.laser import foreign
+from examples.fetch_delivery.perception.planning import RADIUS, Path
+from examples.fetch_delivery.perception.records import Localised, wrapped
+from hfg.nodes.robotics import scan_points
+
+_FORESIGHT: Final = 0.35  # seconds: how far ahead on the path the robot aims, beside _LEAST_AHEAD
+_LEAST_AHEAD: Final = 0.15
+_LOOK: Final = 1.0  # metres before the goal, from where on the robot turns to its heading
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How a path is followed.
+
+    Attributes:
+      speed: in m/s.
+      turning: in rad/s; slow, for pictures are blurred by it.
+      braking: in m/s2; less than the motors can, for what is ahead may come nearer.
+      wall: the gap that is kept from walls, in metres.
+      robot: the gap that is kept from other robots.
+      near: how near to the goal is there, in metres.
+      aligned: and how near to its heading, in radians.
+    """
+
+    speed: float = 0.6
+    turning: float = 1.0
+    braking: float = 0.5
+    wall: float = 0.04
+    robot: float = 0.1
+    near: float = 0.04
+    aligned: float = 0.04
+
+
+LIMITS: Final = Limits()
+
+
+def follow(path: Path, localised: Localised, scan: Scan, speed: float = 0.0, limits: Limits = LIMITS) -> Twist | None:
+    """Give the velocity for the next moment, in the robot's frame; None if the robot is there.
+
+    Args:
+      path: in the map frame.
+      localised: where the robot is.
+      scan: what is around it now; nothing in it is driven at faster than it could brake.
+      speed: how fast the robot was; the faster, the farther ahead on the path it aims.
+      limits: how fast it may be, and how near to what.
+    """
+    pose = localised.pose
+    remaining, aim = _ahead(path.points, pose[:2], _LEAST_AHEAD + _FORESIGHT * speed)
+    turn = float(wrapped(path.heading - pose[2]))
+    if remaining < limits.near and abs(turn) < limits.aligned:
+        return None
+    way = aim - pose[:2]
+    far = float(np.hypot(way[0], way[1]))
+    if remaining > _LOOK:
+        turn = float(wrapped(math.atan2(way[1], way[0]) - pose[2]))
+    wanted = min(limits.speed, math.sqrt(2 * limits.braking * remaining), 2.5 * remaining)
+    velocity = way / max(far, 1e-6) * wanted
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    velocity = np.array([cos * velocity[0] + sin * velocity[1], cos * velocity[1] - sin * velocity[0]])
+    velocity = held_back(velocity, localised, scan, limits)
+    omega = max(-limits.turning, min(limits.turning, 2.0 * turn))
+    return Twist(float(velocity[0]), float(velocity[1]), omega)
+
+
+def held_back(velocity: Any, localised: Localised, scan: Scan, limits: Limits = LIMITS) -> Any:
+    """Take from a velocity in the robot's frame what would lead too fast at anything in the scan."""
+    points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
+    far = np.hypot(points[:, 0], points[:, 1])
+    near = far < 1.2 + RADIUS
+    walls, gaps = points[near], far[near] - RADIUS - limits.wall
+    others = _in_frame(foreign(scan, localised), localised.pose)
+    others_far = np.hypot(others[:, 0], others[:, 1])
+    close = others_far < 1.2 + RADIUS
+    normals = np.concatenate([walls / far[near, None], others[close] / others_far[close, None]])
+    gaps = np.concatenate([gaps, others_far[close] - RADIUS - limits.robot])
+    # Nearer than it should be, a robot backs off slowly.
+    most = np.where(gaps > 0, np.sqrt(2 * limits.braking * np.maximum(gaps, 0)), np.maximum(gaps, -0.1))
+    for _ in range(6):
+        if not len(gaps):
+            break
+        over = normals @ velocity - most
+        worst = int(np.argmax(over))
+        if over[worst] <= 1e-6:
+            break
+        velocity = velocity - over[worst] * normals[worst]
+    return velocity
+
+
+def _in_frame(places: Any, pose: Any) -> Any:
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    return (places - pose[:2]) @ np.array([[cos, -sin], [sin, cos]])
+
+
+def _ahead(points: Any, place: Any, foresight: float) -> tuple[float, Any]:
+    """Give how long the rest of the path is, and the point on it that lies so far ahead."""
+    steps = np.diff(points, axis=0)
+    lengths = np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)
+    share = np.clip(((place - points[:-1]) * steps).sum(1) / lengths**2, 0, 1)
+    nearest = points[:-1] + share[:, None] * steps
+    off = np.hypot(nearest[:, 0] - place[0], nearest[:, 1] - place[1])
+    at = len(off) - 1 - int(np.argmin(off[::-1]))  # of equal ones the one nearer to the goal
+    gone = np.concatenate([[0.0], np.cumsum(lengths)])
+    here = float(gone[at] + share[at] * lengths[at])
+    remaining = float(gone[-1]) - here + float(off[at])
+    aim = min(here + foresight, float(gone[-1]))
+    index = min(int(np.searchsorted(gone, aim, side="right")) - 1, len(steps) - 1)
+    return remaining, points[index] + steps[index] * ((aim - gone[index]) / lengths[index])
+
+
+class FollowPath(hfg.Node):
+    """Follow a path.
+
+    Fires once for each pose with the scan of its time; it is silent without a path. A new path takes the place of the
+    old one without a stop. The last command is to stand.
+
+    Attributes:
+      speed: top speed.
+      near: how near to the goal is there.
+      aligned: and how near to its heading.
+      patience: so long may the robot come no nearer to the goal before `blocked` tells.
+      localised: where the robot is.
+      scan: of the same time.
+      command: the velocity.
+      path: what is to be followed.
+      stop: follow nothing any more, and stand.
+      arrived: the robot is at the goal.
+      blocked: it came no nearer for so many seconds; it goes on trying.
+    """
+
+    speed = hfg.Parameter(0.6, unit="m/s")
+    near = hfg.Parameter(0.04, unit="m")
+    aligned = hfg.Parameter(0.04, unit="rad")
+    patience = hfg.Parameter(3.0, unit="s")
+    localised = hfg.Input(Localised)
+    scan = hfg.Input(Scan)
+    command = hfg.Output(Twist)
+    arrived = hfg.Event()
+    blocked = hfg.Event(float)
+
+    way: hfg.State[Any] = hfg.State(None)
+    last: hfg.State[Any] = hfg.State(None)
+    best = hfg.State(math.inf)
+    since = hfg.State(0.0)
+
+    def process(self, localised: Localised, scan: Scan) -> Twist | None:
+        """Take one step."""
+        if self.way is None:
+            stopping, self.last = self.last is not None, None
+            return Twist() if stopping else None
+        speed = math.hypot(self.last.vx, self.last.vy) if self.last is not None else 0.0
+        limits = Limits(speed=self.speed, near=self.near, aligned=self.aligned)
+        twist = follow(self.way, localised, scan, speed, limits)
+        if twist is None:
+            self.way = self.last = None
+            self.best = math.inf
+            self.arrived.trigger()
+            return Twist()
+        self._watch(localised, scan.stamp)
+        self.last = twist
+        return twist
+
+    def _watch(self, localised: Localised, now: float) -> None:
+        goal = self.way.points[-1]
+        remaining = _ahead(self.way.points, localised.pose[:2], 0.0)[0]
+        remaining += 0.3 * abs(float(wrapped(self.way.heading - localised.pose[2])))
+        goal_moved = self.best == math.inf or np.hypot(*(goal - self._goal())) > 0.1
+        if goal_moved or remaining < self.best - 0.05:
+            self.best, self.since = remaining, now
+            self.goal_was = goal
+        elif now - self.since > self.patience:
+            self.since = now
+            self.best = remaining
+            self.blocked.trigger(remaining)
+
+    def _goal(self) -> Any:
+        return self.goal_was
+
+    goal_was: hfg.State[Any] = hfg.State(None)
+
+    @hfg.slot
+    def path(self, path: Path) -> None:
+        """Follow this one."""
+        self.way = path
+
+    @hfg.slot
+    def stop(self) -> None:
+        """Follow nothing."""
+        self.way, self.best = None, math.inf

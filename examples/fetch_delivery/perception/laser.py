@@ -1,0 +1,103 @@
+"""What the laser sees besides the arena's shape: an obstacle, a wall ahead, other robots."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Final
+
+import numpy as np
+from annotated_types import Interval
+
+import hfg
+from examples.fetch_delivery.messages import Scan
+from examples.fetch_delivery.perception import shape
+from examples.fetch_delivery.perception.records import Localised, Wall
+from hfg.nodes.robotics import Disk, find_disks, nearest_obstacle, scan_points
+
+_ROBOT: Final = 0.25  # its radius
+
+
+@hfg.node
+def obstacle_ahead(
+    scan: Scan,
+    *,
+    direction: Annotated[float, Interval(ge=-math.pi, le=math.pi)] = 0.0,
+    width: Annotated[float, Interval(gt=0, le=2 * math.pi)] = 0.7,
+) -> float:
+    """Give how far from the robot's centre the nearest thing in a sector is; infinite if there is none.
+
+    Args:
+      scan: of the laser.
+      direction: of the middle of the sector, counter-clockwise from straight ahead.
+      width: of the whole sector.
+
+    Returns:
+      out: in metres.
+    """
+    return nearest_obstacle.function(
+        scan.ranges, scan.angles, direction=direction, width=width, max_range=scan.max_range
+    )
+
+
+@hfg.node
+def wall_ahead(scan: Scan, *, width: Annotated[float, Interval(gt=0, le=math.pi)] = 0.7) -> Wall | None:
+    """Measure the straight wall ahead, through whatever few points stand before it.
+
+    Args:
+      scan: of the laser.
+      width: of the sector in which it is looked for.
+
+    Returns:
+      out: silence if there is no wall, or nothing straight.
+    """
+    points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
+    points = points[np.abs(np.arctan2(points[:, 1], points[:, 0])) <= width / 2]
+    for bound in (0.3, 0.08, 0.04):
+        if len(points) < 6:
+            return None
+        middle = points.mean(0)
+        normal = np.linalg.svd(points - middle)[2][1]
+        off = (points - middle) @ normal
+        points = points[np.abs(off - np.median(off)) <= bound]
+    if len(points) < 6:
+        return None
+    middle = points.mean(0)
+    normal = np.linalg.svd(points - middle)[2][1]
+    distance = float(middle @ normal)
+    if distance < 0:
+        distance, normal = -distance, -normal
+    angle = math.atan2(normal[1], normal[0])
+    return Wall(distance, angle) if abs(angle) < 1.2 else None
+
+
+@hfg.node
+def other_robots(scan: Scan, localised: Localised) -> list[Disk]:
+    """Find other robots: round, and before the walls where nothing should be.
+
+    Args:
+      scan: of the laser.
+      localised: where the robot was then.
+
+    Returns:
+      out: in the map frame, in the order of the beams; empty while the pose is in doubt.
+    """
+    if not localised.sure:
+        return []
+    places = foreign(scan, localised)
+    disks = find_disks.function(places, localised.pose[None, :2], radius=_ROBOT, tolerance=0.05)
+    return [one for one in disks if _is_free(one)]
+
+
+def foreign(scan: Scan, localised: Localised) -> Any:
+    """Give the points of a scan that are not part of the arena, in the map frame, in the order of the beams."""
+    points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
+    cos, sin = math.cos(localised.pose[2]), math.sin(localised.pose[2])
+    places = points @ np.array([[cos, sin], [-sin, cos]]) + localised.pose[:2]
+    inside, outside = shape.distances(places)
+    return places[(inside > 0.12) & (outside > 0.12)]
+
+
+def _is_free(disk: Disk) -> bool:
+    """Say whether a robot could stand there."""
+    inside, outside = shape.distances(np.array([disk.x, disk.y]))
+    return bool(inside > _ROBOT - 0.1 and outside > _ROBOT - 0.1)

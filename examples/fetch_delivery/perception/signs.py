@@ -1,0 +1,73 @@
+"""Where the digits hang: sightings in the map frame, gathered in a mixture of Gaussians for each digit."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import hfg
+from examples.fetch_delivery.perception import shape
+from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station, wrapped
+from hfg.nodes.robotics import Landmark, LandmarkMixture
+
+BESIDE = 0.11  # the angle by which a digit hangs to the left of its bull's-eye, seen from the middle of the arena
+
+
+def landmark(seen: Sighting, localised: Localised) -> Landmark:
+    """Give a sighting in the map frame, with how sure it is: the pose is not, and far signs are small."""
+    x, y = localised.place(seen.x, seen.y)
+    arm = seen.distance**2 * float(localised.covariance[2, 2])
+    pose = float(localised.covariance[0, 0] + localised.covariance[1, 1]) / 2
+    sigma = math.sqrt((0.01 + 0.015 * seen.distance) ** 2 + pose + arm)
+    heading = float(wrapped(seen.facing + localised.pose[2]))
+    return Landmark(seen.label, x, y, heading, sigma)
+
+
+def delivery_station(sign: Sign) -> Station:
+    """Give the station that a digit belongs to: its bull's-eye hangs on the wall, to the right of the digit."""
+    at = math.atan2(sign.y, sign.x) - BESIDE
+    x, y = shape.WALL_APOTHEM * math.cos(at), shape.WALL_APOTHEM * math.sin(at)
+    return Station(x, y, float(wrapped(at + math.pi)), int(sign.sightings))
+
+
+class SignMap(hfg.Node):
+    """Learn where the digits are.
+
+    Fires once for each list of sightings with the pose of its time. While the pose is in doubt nothing is learned: a
+    robot that has lost itself would move all signs.
+
+    Attributes:
+      least: so many sightings make a digit known.
+      sightings: digits in the robot's frame.
+      localised: where the robot was then.
+      signs: the digits that are known, by their number.
+      forget: the number of a digit that was not where it should be; 0 forgets all.
+    """
+
+    least = hfg.Parameter(2.0)
+    sightings = hfg.Input(list[Sighting])
+    localised = hfg.Input(Localised)
+    signs = hfg.Output(dict[int, Sign])
+
+    mixture: hfg.State[Any] = hfg.State(None)
+
+    def setup(self) -> None:
+        """Begin with no signs."""
+        self.mixture = LandmarkMixture()
+
+    def process(self, sightings: list[Sighting], localised: Localised) -> dict[int, Sign]:
+        """Learn, and tell what is known."""
+        if localised.sure:
+            for one in sightings:
+                seen = landmark(one, localised)
+                if one.label.isdecimal() and abs(math.hypot(seen.x, seen.y) - shape.WALL_APOTHEM) < 0.6:
+                    self.mixture.learn(seen)
+        return {
+            int(label): Sign(one.x, one.y, one.heading, one.sigma, one.sightings)
+            for label, one in self.mixture.known(self.least).items()
+        }
+
+    @hfg.slot
+    def forget(self, digit: int) -> None:
+        """Forget a digit, or all."""
+        self.mixture.forget(str(digit) if digit else None)
