@@ -10,10 +10,11 @@ value that comes, unless it says otherwise, and is silent where it has nothing t
     records      Sighting(label, x, y, facing, score)   a sign, in the robot's frame: label "bullseye" or "1" ... "4";
                      .bearing, .distance; facing is where the panel looks in the robot's frame, NaN if unknown
                  Cube(state, station)                   state "none", "unreadable" or "number"; station 1 ... 4, else 0
-                 Localised(pose, covariance, quality, sure, stamp)   `sure` is false while lost or in doubt
+                 Localised(pose, covariance, quality, sure, stamp)   `sure` is false while lost or in doubt;
+                     .fits: the scan fits, be it the right one of the places that look the same or not
                  Wall(distance, angle)                  a wall ahead: how far, and where it faces (0: straight at it)
                  Disk(x, y, points)                     another robot, in the map frame
-                 Station(pose, sightings)               pose on the surface, theta looks away from it, into the free
+                 Station(x, y, theta, sightings)        on the surface; theta looks away from it, into the free
                      .before(distance)                  the pose before it that faces it
     shape        WALL, OCTAGON, SEGMENTS                the arena as the rules give it, in the map frame
     sighting     find_targets(image) -> list[Sighting]          bull's-eyes                              node, function
@@ -23,13 +24,15 @@ value that comes, unless it says otherwise, and is silent where it has nothing t
     laser        obstacle_ahead(scan, direction=, width=) -> float      nearest in a sector, inf: free   node, function
                  wall_ahead(scan, width=) -> Wall | None                                                 node, function
                  other_robots(scan, localised) -> list[Disk]                                             node, function
-    localising   Localise()   scan, odometry -> localised; slot sightings(list[Sighting]); ~> lost, found
+    localising   Localise()   scan, odometry -> localised; slots sightings(list[Sighting]), signs(dict);
+                     ~> lost, found
     signs        SignMap()    sightings, localised -> signs: dict[int, Sign(x, y, theta, sigma, sightings)]; the digits
     stations     StationMap() targets, localised -> filling: list[Station], delivery: list[Station]; from bull's-eyes
                  octagon_sides(scan, localised) -> list[Station]        the sides that the scan shows    node, function
                  delivery_station(sign) -> Station      where the bull's-eye beside a digit is           function
-    planning     plan(start, goal, others) -> path | None       path: array (n, 2), the last is the goal node, function
-    following    follow(path, heading, pose, scan, ...) -> Twist        one step, omnidirectional        function
-                 FollowPath() slot go(path: array (n, 3)); localised, scan -> command: Twist;
-                     ~> arrived, blocked(float), progress; slot stop
+    planning     plan(start, goal, others) -> points | None     the last is the goal                     function
+                 PlanPath() slots goal(pose), stop; localised, others -> path: Path(points, heading); ~> no_path
+    following    follow(path, localised, scan, speed, limits) -> Twist | None      one step; None: there function
+                 held_back(velocity, localised, scan, limits)   what leads at nothing too fast           function
+                 FollowPath() slots path(Path), stop; localised, scan -> command: Twist; ~> arrived, blocked(float)
 """

@@ -52,22 +52,35 @@ def wall_ahead(scan: Scan, *, width: Annotated[float, Interval(gt=0, le=math.pi)
     """
     points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
     points = points[np.abs(np.arctan2(points[:, 1], points[:, 0])) <= width / 2]
-    for bound in (0.3, 0.08, 0.04):
+    points = _straightest(points)
+    for _ in range(2):
         if len(points) < 6:
             return None
         middle = points.mean(0)
         normal = np.linalg.svd(points - middle)[2][1]
-        off = (points - middle) @ normal
-        points = points[np.abs(off - np.median(off)) <= bound]
+        points = points[np.abs((points - middle) @ normal) <= 0.04]
     if len(points) < 6:
         return None
-    middle = points.mean(0)
-    normal = np.linalg.svd(points - middle)[2][1]
     distance = float(middle @ normal)
     if distance < 0:
         distance, normal = -distance, -normal
     angle = math.atan2(normal[1], normal[0])
     return Wall(distance, angle) if abs(angle) < 1.2 else None
+
+
+def _straightest(points: Any) -> Any:
+    """Give the points on the line through two of them that has most points on it."""
+    some = points[:: max(1, len(points) // 24)]
+    first, second = np.triu_indices(len(some), max(1, len(some) // 4))
+    along = some[second] - some[first]
+    length = np.hypot(along[:, 0], along[:, 1])
+    if not len(length) or length.max() < 0.05:
+        return points[:0]
+    keep = length >= 0.05
+    along, base = along[keep] / length[keep, None], some[first][keep]
+    normals = np.stack([-along[:, 1], along[:, 0]], 1)
+    on = np.abs(points @ normals.T - (base * normals).sum(1)) <= 0.04
+    return points[on[:, int(on.sum(0).argmax())]]
 
 
 @hfg.node
@@ -79,9 +92,9 @@ def other_robots(scan: Scan, localised: Localised) -> list[Disk]:
       localised: where the robot was then.
 
     Returns:
-      out: in the map frame, in the order of the beams; empty while the pose is in doubt.
+      out: in the map frame, in the order of the beams; empty while the scan does not fit to the pose.
     """
-    if not localised.sure:
+    if not localised.fits:
         return []
     places = foreign(scan, localised)
     disks = find_disks.function(places, localised.pose[None, :2], radius=_ROBOT, tolerance=0.05)

@@ -55,7 +55,8 @@ class Localiser:
             return None
         if not self.sure and not self.lost:
             self._compare(points)
-        return Localised(self.pose.copy(), self.covariance.copy(), self.quality, self.sure, scan.stamp)
+        sure = self.sure and not self._bad  # from the first scan that does not fit, not only when it has given up
+        return Localised(self.pose.copy(), self.covariance.copy(), self.quality, sure, scan.stamp)
 
     def seen(self, sightings: list[Sighting], signs: dict[int, Sign]) -> None:
         """Let digits whose places are known say which of the places that look the same is the right one."""
@@ -103,7 +104,7 @@ class Localiser:
         pose = min((one for one, _ in found), key=lambda one: abs(one[2]))
         best = max(fit for _, fit in found)
         self.pose, self.covariance = pose, _FIRST
-        # Which of the eight it is, the robot chooses; how the octagon lies to the corners of the wall, it does not. So of
+        # Which of the eight it is, the robot chooses; how the octagon lies to the wall it does not. So of
         # each kind one is kept in mind, until more of the octagon has been seen.
         kinds = {_apart(other, pose) % 4: (other, fit - best) for other, fit in found}
         self._weigh([kind for number, kind in kinds.items() if number])
@@ -123,11 +124,14 @@ class Localiser:
             self.lost, self.sure = True, False
 
     def _search(self, points: Any) -> None:
-        """Look everywhere. Odometry prefers what is near to where it would be, as long as it is near to anything."""
+        """Look everywhere, and prefer what is near to where odometry believes to be, as long as anything is.
+
+        That has jumped, or somebody has pushed the robot: by half a metre more likely than by three.
+        """
         found = _alike(_places(points))
         if not found:
             return
-        spread = self.covariance + np.diag([0.15**2, 0.15**2, 0.1**2])
+        spread = self.covariance + np.diag([0.5**2, 0.5**2, 0.4**2])
         inverse = np.linalg.inv(spread)
         likely = []
         for pose, fit in found:

@@ -54,8 +54,9 @@ def plan(start: Any, goal: Any, others: Sequence[Disk] = ()) -> Vector | None:
 class PlanPath(hfg.Node):
     """Plan a path to a goal, and plan it anew while the robot and others move.
 
-    Fires once for each pose with the other robots of its time; it is silent without a goal, and while the pose is in
-    doubt.
+    Fires once for each pose with the other robots of its time; it is silent without a goal, and while the scan does not
+    fit to the pose. A robot that only does not know which of the places that look the same it is at drives on: walls
+    are where it believes, and signs tell the place when they come into sight.
 
     Attributes:
       every: plan with each so many-th pose.
@@ -78,7 +79,7 @@ class PlanPath(hfg.Node):
 
     def process(self, localised: Localised, others: list[Disk]) -> Path | None:
         """Plan if it is time to."""
-        if self.wanted is None or not localised.sure:
+        if self.wanted is None or not localised.fits:
             return None
         self.since += 1
         if self.since % self.every != 1 and self.every > 1:

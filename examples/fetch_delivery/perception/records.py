@@ -81,6 +81,11 @@ class Localised:
     sure: bool
     stamp: float
 
+    @property
+    def fits(self) -> bool:
+        """Whether the scan fits to the pose, be it the right one of those that look the same or not: safe to drive."""
+        return self.quality > 0.6
+
     def place(self, x: float, y: float) -> tuple[float, float]:
         """Give where a point of the robot's frame is in the map."""
         cos, sin = math.cos(self.pose[2]), math.sin(self.pose[2])
