@@ -18,7 +18,7 @@ class Connections:
     Attributes:
       edges: in order of connecting.
       into: the edge into each target that takes one alone.
-      pairs: the ends of all other edges, and how many have them: amid an edit that is about to be refused, more than one.
+      pairs: the ends of all other edges, and how many have them: more than one amid an edit that is about to be refused.
     """
 
     __slots__ = ("_at", "_order", "edges", "into", "pairs")
