@@ -1,0 +1,223 @@
+"""One robot: perception as data flow, the mission as activity (figure 19), and the arena around both.
+
+    start ══ wait_for_start ══ advance ══ fetch ══ read_cube ══ lookup ══ deliver ══ fetch ...
+                                            ║          ║          ║           ║
+                                            ║          ╚════ explore          ╚══ read_cube
+                                            ╚══ (no cube after all: read_cube.timeout)
+
+There is no state machine: what is active is the state. `deliver` and `fetch` are built of the same `Visit`.
+"""
+
+from __future__ import annotations
+
+import hfg
+from examples.fetch_delivery.messages import Odometry, Picture, Scan, Twist
+from examples.fetch_delivery.mission.driving import MoveRobot
+from examples.fetch_delivery.mission.errands import DeliverCube, Explore, FetchCube, MapLookup
+from examples.fetch_delivery.mission.world import RATE_HZ, World
+from examples.fetch_delivery.perception.cube import CubeWatch
+from examples.fetch_delivery.perception.laser import other_robots
+from examples.fetch_delivery.perception.localising import Localise
+from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station
+from examples.fetch_delivery.perception.sighting import find_targets, read_digits
+from examples.fetch_delivery.perception.signs import SignMap
+from examples.fetch_delivery.perception.stations import StationMap
+from examples.fetch_delivery.world import Fault
+from hfg.nodes import activity, flow
+from hfg.nodes.robotics import Disk
+
+
+class Perception(hfg.Subgraph):
+    """What the robot knows: where it is, who else is there, where signs and stations are, what lies in its basket.
+
+    Attributes:
+      odometry: what the wheels say.
+      scan: of the laser.
+      front: pictures of what is ahead.
+      basket: pictures of the basket.
+      ask: look anew what lies in the basket.
+      forget: the number of a sign that is not where it should be.
+      localised: where the robot is.
+      others: other robots.
+      targets: bull's-eyes that are seen.
+      signs: the digits that are known.
+      filling: the filling stations that are known.
+      number: a cube with this number lies in the basket.
+      none: no cube lies there.
+    """
+
+    odometry, scan = hfg.Input(Odometry), hfg.Input(Scan)
+    front, basket = hfg.Input(Picture), hfg.Input(Picture)
+    ask, forget = hfg.slot(type=object), hfg.slot(type=int)
+    localised, others = hfg.Output(Localised), hfg.Output(list[Disk])
+    targets, signs = hfg.Output(list[Sighting]), hfg.Output(dict[int, Sign])
+    filling = hfg.Output(list[Station])
+    number, none = hfg.Event(int), hfg.Event()
+
+    def build(self, graph: hfg.Graph) -> None:
+        """Connect what measures with what learns."""
+        localise, others = graph.add(Localise(), name="localise"), graph.add(other_robots(), name="others")
+        targets, digits = graph.add(find_targets(), name="targets"), graph.add(read_digits(), name="digits")
+        signs, stations = graph.add(SignMap(), name="signs"), graph.add(StationMap(), name="stations")
+        cube = graph.add(CubeWatch(), name="cube")
+
+        graph.connect(self.scan.inner, localise.scan)
+        graph.connect(self.odometry.inner, localise.odometry)
+        graph.connect(self.scan.inner, others.scan)
+        graph.connect(localise.localised, others.localised)
+        graph.connect(localise.localised, self.localised.inner)
+        graph.connect(others.out, self.others.inner)
+
+        # Pictures come when somebody has asked, poses ten times a second: each picture meets the pose of its moment.
+        for eyes, learner, seen in ((targets, stations, stations.targets), (digits, signs, signs.sightings)):
+            then = graph.add(flow.SampleAndHold(), name=f"then_{eyes.place.name}")
+            graph.connect(self.front.inner, eyes.image)
+            graph.connect(localise.localised, then.value)
+            graph.connect(eyes.out, then.tick)
+            graph.connect(eyes.out, seen)
+            graph.connect(then.held, learner.localised)
+        graph.connect(targets.out, self.targets.inner)
+        graph.connect(digits.out, localise.sightings)
+        graph.connect(signs.signs, localise.signs)
+        graph.connect(signs.signs, self.signs.inner)
+        graph.connect(stations.filling, self.filling.inner)
+        graph.connect(self.forget.inner, signs.forget)
+
+        graph.connect(self.basket.inner, cube.image)
+        graph.connect(self.ask.inner, cube.ask)
+        graph.connect(cube.number, self.number.inner)
+        graph.connect(cube.none, self.none.inner)
+
+
+class Robot(hfg.Subgraph):
+    """A robot with its mission.
+
+    Attributes:
+      odometry: what the wheels say.
+      scan: of the laser.
+      message: what the referee says.
+      front: pictures of what is ahead.
+      basket: pictures of the basket.
+      command: the velocity that it wants.
+      lamp: whether its lamp shall be on.
+      look_ahead: asks for a picture of what is ahead.
+      look_into_basket: asks for one of the basket.
+      begin: where activity arrives.
+      not_found: the sign of a cube was not found anywhere; the number.
+    """
+
+    odometry, scan, message = hfg.Input(Odometry), hfg.Input(Scan), hfg.Input(str)
+    front, basket = hfg.Input(Picture), hfg.Input(Picture)
+    command, lamp = hfg.Output(Twist), hfg.Output(bool)
+    look_ahead, look_into_basket = hfg.Output(object), hfg.Output(Scan)
+    begin = hfg.slot(type=object)
+    not_found = hfg.Event(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        """Figure 19."""
+        perception = graph.add(Perception(), name="perception")
+        wait_for_start = graph.add(activity.WaitForText(wanted="start"), name="wait_for_start")
+        advance = graph.add(MoveRobot(x=1.0, y=1.0), name="advance", active_for_s=10.1)
+        fetch, deliver = graph.add(FetchCube(), name="fetch"), graph.add(DeliverCube(), name="deliver")
+        read_cube = graph.add(activity.WaitForMessage(), name="read_cube", active_for_s=10.1)
+        newest, lookup = graph.add(flow.SampleAndHold(), name="newest"), graph.add(MapLookup(), name="lookup")
+        explore = graph.add(Explore(), name="explore")
+
+        self.begin.inner.activates(wait_for_start.begin)
+        wait_for_start.received.activates(advance.begin)
+        advance.done.activates(fetch.begin)
+        advance.timeout.activates(fetch.begin)
+        fetch.done.activates(read_cube.begin)
+        read_cube.received.activates(lookup.key)
+        read_cube.timeout.activates(fetch.begin)
+        lookup.sign.activates(deliver.begin)
+        lookup.unknown.activates(explore.begin)
+        explore.done.activates(read_cube.begin)
+        explore.gave_up.activates(fetch.begin)
+        deliver.done.activates(fetch.begin)
+        deliver.gave_up.activates(read_cube.begin)
+
+        graph.connect(self.message.inner, wait_for_start.message)
+        graph.connect(read_cube.received, newest.tick)
+        graph.connect(perception.signs, newest.value)
+        graph.connect(newest.held, lookup.map)
+        graph.connect(perception.number, read_cube.message)
+        graph.connect(read_cube.activated, perception.ask, overflow="latest")
+        graph.connect(lookup.sign, explore.found)
+        graph.connect(explore.gave_up, self.not_found.inner)
+        graph.connect(explore.gave_up, fetch.unwanted)
+        # A sign that could not be served is not where the map has it.
+        wrong = graph.add(flow.SampleAndHold(), name="wrong_sign")
+        graph.connect(read_cube.received, wrong.value)
+        graph.connect(deliver.gave_up, wrong.tick)
+        graph.connect(wrong.held, perception.forget)
+        for step in (wait_for_start, advance, read_cube):
+            graph.gate(step, by=step)
+        self._feed(graph)
+
+    def _feed(self, graph: hfg.Graph) -> None:
+        """Lead data to the mission, and commands from it."""
+        perception = graph["perception"]
+        for name in ("odometry", "scan", "front", "basket"):
+            graph.connect(self.ports.inputs[name].inner, perception.ports.inputs[name])
+        basket = graph.add(flow.EveryNth(n=2), name="look_again")
+        graph.connect(self.scan.inner, basket.value)
+        graph.connect(basket.out, self.look_into_basket.inner)
+        graph.gate(basket, by=graph["read_cube"])
+        graph.connect(self.odometry.inner, graph["advance"].ports.inputs["odometry"])
+        graph.connect(graph["advance"].ports.outputs["command"], self.command.inner)
+        for errand in (graph["fetch"], graph["deliver"]):
+            for name in ("odometry", "scan"):
+                graph.connect(self.ports.inputs[name].inner, errand.ports.inputs[name])
+            for name in ("localised", "others", "targets"):
+                graph.connect(perception.ports.outputs[name], errand.ports.inputs[name])
+            for name in ("number", "none"):
+                graph.connect(perception.ports.events[name], errand.ports.slots[name])
+            graph.connect(errand.ports.events["ask"], perception.ports.slots["ask"], overflow="latest")
+            graph.connect(errand.ports.outputs["command"], self.command.inner)
+            graph.connect(errand.ports.outputs["lamp"], self.lamp.inner)
+            graph.connect(errand.ports.outputs["look"], self.look_ahead.inner)
+            graph.connect(errand.ports.outputs["look_into_basket"], self.look_into_basket.inner)
+        graph.connect(perception.ports.outputs["filling"], graph["fetch"].ports.slots["stations"])
+        explore = graph["explore"]
+        for name in ("odometry", "scan"):
+            graph.connect(self.ports.inputs[name].inner, explore.ports.inputs[name])
+        for name in ("localised", "others"):
+            graph.connect(perception.ports.outputs[name], explore.ports.inputs[name])
+        graph.connect(explore.ports.outputs["command"], self.command.inner)
+        graph.connect(explore.ports.outputs["look"], self.look_ahead.inner)
+
+
+def build(
+    seed: int = 1, robots: int = 1, *, speed: float = 0.6, faults: tuple[Fault, ...] = (), gated: bool = True
+) -> hfg.Graph:
+    """Build the arena with robots in it, each with a mission of its own.
+
+    Args:
+      seed: decides what looks like chance.
+      robots: how many, one to four.
+      speed: of their motors, in m/s.
+      faults: what shall go wrong.
+      gated: pictures are taken when a step asks for them; else all the time, to see what that saves.
+    """
+    graph = hfg.Graph("fetch-delivery")
+    world = graph.add(World(seed=seed, speed=speed, faults=faults, odometry=robots), name="world", max_rate_hz=RATE_HZ)
+    for number in range(robots):
+        robot = graph.add(Robot(), name=f"robot_{number}")
+        graph.start.activates(robot.begin)
+        graph.connect(world.odometry[number], robot.odometry)
+        graph.connect(world.scan[number], robot.scan)
+        graph.connect(world.message, robot.message)
+        graph.connect(world.front[number], robot.front)
+        graph.connect(world.basket[number], robot.basket)
+        graph.connect(robot.command, world.command[number])
+        graph.connect(robot.lamp, world.lamp[number])
+        if gated:
+            graph.connect(robot.look_ahead, world.look_ahead[number])
+            graph.connect(robot.look_into_basket, world.look_into_basket[number])
+            continue
+        for camera, n in ((world.look_ahead, 2), (world.look_into_basket, 4)):
+            shutter = graph.add(flow.EveryNth(n=n))
+            graph.connect(world.scan[number], shutter.value)
+            graph.connect(shutter.out, camera[number])
+    return graph

@@ -1,0 +1,227 @@
+"""To be at a station until a cube has changed hands: what fetching and delivering share.
+
+begin ══ approach ══ go_to ══ position ══ dock ══ settle ══ lamp_on ══ wait ══ lamp_off ══ leave ══ done
+║          ║         ║                            ║
+║          ╚═════════╩══ retreat ══ gave_up        ╚═ dark ══ retreat
+╚══ gave_up
+"""
+
+from __future__ import annotations
+
+from annotated_types import Gt
+
+import hfg
+from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
+from examples.fetch_delivery.mission.driving import GoTo, MoveRobot, MoveToObstacle, PositionToTarget
+from examples.fetch_delivery.perception.laser import wall_ahead
+from examples.fetch_delivery.perception.records import Localised, Sighting, Station
+from hfg.nodes import activity, flow
+from hfg.nodes.robotics import Disk
+
+
+@hfg.node
+def always(tick: Scan, *, value: bool = False) -> bool:
+    """Give a value again and again."""
+    return value
+
+
+class SetLamp(hfg.Subgraph):
+    """Set the signal lamp, then hand the activity on (figure 17 b).
+
+    Attributes:
+      on: whether it shall be on.
+      tick: anything that comes again and again.
+      lamp: the command, once.
+      begin: where activity arrives.
+      done: it was sent.
+    """
+
+    on = hfg.Parameter(False)
+    tick = hfg.Input(Scan)
+    lamp = hfg.Output(bool)
+    begin = hfg.slot(type=object)
+    done = hfg.Event()
+
+    def build(self, graph: hfg.Graph) -> None:
+        """Put a constant before the gate that lets one value pass."""
+        value, once = graph.add(always(), name="value"), graph.add(activity.OneShotCommand(), name="once")
+        graph.connect(self.tick.inner, value.tick)
+        graph.connect(value.out, once.value)
+        graph.connect(once.out, self.lamp.inner)
+        self.begin.inner.activates(once.begin)
+        once.done.activates(self.done.inner)
+        graph.promote(self.on, value.ports.parameters["value"])
+
+
+class Approach(hfg.Node):
+    """Say from where a station is approached.
+
+    Attributes:
+      distance: how far before it that is.
+      goal: the pose.
+      station: the station, for those who look for its sign.
+      begin: the station; where activity arrives.
+    """
+
+    distance = hfg.Parameter(1.25, Gt(0), unit="m")
+    goal = hfg.Event(Vector)
+    station = hfg.Event(Station)
+
+    @hfg.slot
+    def begin(self, station: Station) -> None:
+        """Say it."""
+        self.station.trigger(station)
+        self.goal.trigger(station.before(self.distance))
+
+
+class WaitForCube(hfg.Node):
+    """Wait until somebody has put a cube into the basket, or has taken it out.
+
+    Attributes:
+      loading: whether a cube shall come, or go.
+      ask: asks the cube detection to look anew.
+      done: it has happened; with the number of the cube, 0 when there is none.
+      begin: where activity arrives.
+      unwanted: a cube with this number does not count: it is to be given back for another one.
+      number: a cube with this number lies there.
+      none: none lies there.
+    """
+
+    loading = hfg.Parameter(True)
+    ask = hfg.Event()
+    done = hfg.Event(int)
+    refused = hfg.State(0)
+
+    @hfg.slot
+    def begin(self) -> None:
+        """Look anew."""
+        self.ask.trigger()
+
+    @hfg.slot
+    def unwanted(self, number: int) -> None:
+        """Wait for another one, once."""
+        self.refused = number
+
+    @hfg.slot(while_active=True)
+    def number(self, number: int) -> None:
+        """See a cube."""
+        if self.loading and number != self.refused:
+            self.refused = 0
+            self.done.trigger(number)
+
+    @hfg.slot(while_active=True)
+    def none(self) -> None:
+        """See none."""
+        if not self.loading:
+            self.done.trigger(0)
+
+
+class Visit(hfg.Subgraph):
+    """Go to a station, stand below its ring, show the lamp until a cube has changed hands, and leave.
+
+    Attributes:
+      loading: whether a cube shall come, or go.
+      localised: where the robot is.
+      odometry: what the wheels say.
+      scan: of the laser.
+      others: other robots.
+      targets: bull's-eyes that are seen.
+      number: a cube with this number lies in the basket.
+      none: no cube lies there.
+      unwanted: a cube with this number is to be given back.
+      command: velocities.
+      lamp: whether the lamp shall be on.
+      look: asks for a picture of what is ahead.
+      look_into_basket: asks for one of the basket.
+      ask: asks the cube detection to look anew.
+      begin: the station; where activity arrives.
+      done: a cube has changed hands.
+      gave_up: it has not.
+    """
+
+    loading = hfg.Parameter(True)
+    localised, odometry, scan = hfg.Input(Localised), hfg.Input(Odometry), hfg.Input(Scan)
+    others, targets = hfg.Input(list[Disk]), hfg.Input(list[Sighting])
+    number, none, unwanted = hfg.slot(type=int), hfg.slot(type=object), hfg.slot(type=int)
+    command, lamp = hfg.Output(Twist), hfg.Output(bool)
+    look, look_into_basket = hfg.Output(object), hfg.Output(Scan)
+    ask = hfg.Event()
+    begin = hfg.slot(type=Station)
+    done, gave_up = hfg.Event(object), hfg.Event(object)
+
+    def build(self, graph: hfg.Graph) -> None:
+        """Put the steps in a row, and behind each what follows if it fails."""
+        approach, go_to = graph.add(Approach(), name="approach"), graph.add(GoTo(), name="go_to", active_for_s=60.1)
+        position = graph.add(PositionToTarget(), name="position", active_for_s=20.1)
+        dock = graph.add(MoveToObstacle(), name="dock", active_for_s=10.1)
+        settle = graph.add(activity.Wait(seconds=0.6), name="settle")
+        lamp_on, wait = (
+            graph.add(SetLamp(on=True), name="lamp_on"),
+            graph.add(WaitForCube(), name="wait", active_for_s=20.1),
+        )
+        lamp_off, leave = (
+            graph.add(SetLamp(), name="lamp_off"),
+            graph.add(MoveRobot(x=-0.7), name="leave", active_for_s=6.1),
+        )
+        dark, retreat = (
+            graph.add(SetLamp(), name="dark"),
+            graph.add(MoveRobot(x=-0.5), name="retreat", active_for_s=6.1),
+        )
+
+        self.begin.inner.activates(approach.begin)
+        approach.goal.activates(go_to.go)
+        graph.connect(approach.station, position.aim)
+        go_to.arrived.activates(position.begin)
+        position.done.activates(dock.begin)
+        dock.done.activates(settle.begin)
+        settle.done.activates(lamp_on.begin)
+        lamp_on.done.activates(wait.begin)
+        wait.done.activates(lamp_off.begin)
+        lamp_off.done.activates(leave.begin)
+        leave.done.activates(self.done.inner)
+        leave.timeout.activates(self.done.inner)
+
+        go_to.blocked.activates(self.gave_up.inner)
+        go_to.timeout.activates(self.gave_up.inner)
+        for failure in (position.lost, position.timeout, dock.timeout):
+            failure.activates(retreat.begin)
+        wait.timeout.activates(dark.begin)
+        dark.done.activates(retreat.begin)
+        retreat.done.activates(self.gave_up.inner)
+        retreat.timeout.activates(self.gave_up.inner)
+
+        self._feed(graph)
+        graph.connect(go_to.deactivated, go_to.stop)
+        graph.connect(wait.ask, self.ask.inner)
+        graph.connect(self.number.inner, wait.number)
+        graph.connect(self.none.inner, wait.none)
+        graph.connect(self.unwanted.inner, wait.unwanted)
+        graph.promote(self.loading, wait.ports.parameters["loading"])
+
+    def _feed(self, graph: hfg.Graph) -> None:
+        """Give each step the data it needs, and let those that are not active rest."""
+        wall = graph.add(wall_ahead(), name="wall")
+        shutter, basket = graph.add(flow.EveryNth(n=2), name="shutter"), graph.add(flow.EveryNth(n=4), name="basket")
+        go_to, position, dock = graph["go_to"], graph["position"], graph["dock"]
+        for drives in ("go_to", "position", "dock", "leave", "retreat"):
+            graph.connect(graph[drives].ports.outputs["command"], self.command.inner)
+            graph.gate(graph[drives], by=graph[drives])
+        for moves in ("leave", "retreat"):
+            graph.connect(self.odometry.inner, graph[moves].ports.inputs["odometry"])
+        for name in ("localised", "scan", "others"):
+            graph.connect(self.ports.inputs[name].inner, go_to.ports.inputs[name])
+        graph.connect(go_to.ports.outputs["look"], self.look.inner)
+        graph.connect(self.scan.inner, wall.scan)
+        graph.connect(self.localised.inner, position.ports.inputs["localised"])
+        graph.connect(wall.out, position.ports.inputs["wall"])
+        graph.connect(self.scan.inner, dock.ports.inputs["scan"])
+        graph.connect(self.targets.inner, position.ports.slots["see"])
+        graph.connect(self.localised.inner, shutter.value)
+        graph.connect(shutter.out, self.look.inner)
+        graph.connect(self.scan.inner, basket.value)
+        graph.connect(basket.out, self.look_into_basket.inner)
+        for gated, state in ((wall, "position"), (shutter, "position"), (basket, "wait")):
+            graph.gate(gated, by=graph[state])
+        for lamp in ("lamp_on", "lamp_off", "dark"):
+            graph.connect(self.scan.inner, graph[lamp].ports.inputs["tick"])
+            graph.connect(graph[lamp].ports.outputs["lamp"], self.lamp.inner)
