@@ -20,6 +20,7 @@ help:
 	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md;"
 	@echo "             bench-goals: what is to be reached, and whether it is; bench-links: from process to process)"
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
+	@echo "make docs-drawings   draw the graphs in README and docs anew"
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything tools have left"
 
@@ -58,6 +59,9 @@ bench-links: peers
 
 bench-docs: $(READY)
 	$(BIN)/python -m benchmarks.page $(RESULTS)
+
+docs-drawings: $(READY)
+	HFG_REDRAW=1 $(BIN)/python -m pytest -q tests/test_drawings.py
 
 docs-nodes: $(READY)
 	$(BIN)/python -m hfg.catalogue.page docs/nodes

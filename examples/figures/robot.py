@@ -1,4 +1,4 @@
-"""Figures 17 and 18 of the paper: parts of a robot's mission without a state machine (§6.1).
+"""Figures 17 to 19 of the paper: a robot's mission, and parts of it, without a state machine (§6.1).
 
 Every function builds the graph of one figure; `docs/model/robot.md` walks through them.
 Look at one with `hfg draw examples/figures/robot.py:figure_18`, run it with
@@ -7,8 +7,9 @@ Look at one with `hfg draw examples/figures/robot.py:figure_18`, run it with
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import hfg
 
@@ -186,4 +187,147 @@ def figure_18(number: int = 3) -> hfg.Graph:
     graph.connect(lookup.pose, drive.goal, active=True)
     graph.connect(lookup.unknown, explore.search, active=True)
     graph.connect(explore.timeout, detect.look, active=True)
+    return graph
+
+
+# --- figure 19: the whole mission
+
+
+NO_CUBE = 0
+"""The paper's ⊥, as far as cubes are concerned; no target is silence."""
+
+
+@hfg.node
+def target_detection() -> Iterator[Pose]:
+    """See a target sign in front of the robot, wherever it has driven to."""
+    yield from [(0.8, 0.0)] * 30
+
+
+@hfg.node
+def cube_detection(*, seen: tuple[int, ...] = (0,) * 4 + (3,) * 8 + (0,) * 4) -> Iterator[int]:
+    """Read the number on the cube in the basket, once a second."""
+    yield from seen
+
+
+@hfg.node
+def sign_detection() -> Iterator[tuple[int, Pose]]:
+    """See one sign after the other."""
+    yield from ((7, (1.0, 2.0)), (3, (4.0, 0.5)), (5, (0.0, 3.0)))
+
+
+class SignMapping(hfg.Node):
+    """Keeps where each sign was seen last."""
+
+    sign = hfg.Input(tuple[int, Pose])
+    map = hfg.Output(dict[int, Pose])
+    known = hfg.State(factory=dict[int, Pose])
+
+    def process(self, sign: tuple[int, Pose]) -> dict[int, Pose]:
+        number, pose = sign
+        self.known[number] = pose
+        return dict(self.known)
+
+
+class Wait(hfg.Node):
+    """Something that takes a while, and then passes on what it was asked for; it hears no signal without activity."""
+
+    seconds = hfg.Parameter(1.0)
+    done = hfg.Event(Any)
+
+    @hfg.slot(while_active=True)
+    async def begin(self, what: Any) -> None:
+        print(f"{hfg.now():4.1f} s  {self.place.path}")
+        await asyncio.sleep(self.seconds)
+        self.done.trigger(what)
+
+
+class PositionToTarget(hfg.Node):
+    """Drives up to the target sign that is in front, and tells when it is there."""
+
+    target = hfg.Input(Pose)
+    there = hfg.Event()
+
+    @hfg.slot
+    def begin(self) -> None:
+        """Take the activity."""
+
+    def process(self, target: Pose) -> None:
+        self.there.trigger()
+
+
+class CheckCube(hfg.Node):
+    """Waits, while it is active, for a cube in the basket, or for none."""
+
+    cube = hfg.Input(int)
+    wants_one = hfg.Parameter(True)
+    changed = hfg.Event(int)
+
+    @hfg.slot
+    def begin(self) -> None:
+        """Take the activity."""
+
+    def process(self, cube: int) -> None:
+        if (cube != NO_CUBE) == self.wants_one:
+            self.changed.trigger(cube)
+
+
+class Visit(hfg.Subgraph):
+    """Fetch Cube and Deliver Cube: drive to a station, position to its target, wait for the operator."""
+
+    begin = hfg.slot(type=object)
+    target = hfg.Input(Pose)
+    cube = hfg.Input(int)
+    wants_one = hfg.Parameter(True)
+    done = hfg.Event(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        go_to, position = graph.add(Wait(seconds=2.0), name="go_to"), graph.add(PositionToTarget())
+        check = graph.add(CheckCube())
+        graph.connect(self.target.inner, position.target)
+        graph.connect(self.cube.inner, check.cube)
+        graph.connect(self.begin.inner, go_to.begin, active=True)
+        graph.connect(go_to.done, position.begin, active=True)
+        graph.connect(position.there, check.begin, active=True)
+        graph.connect(check.changed, self.done.inner, active=True)
+        graph.gate(position, by=position)
+        graph.gate(check, by=check)
+        graph.promote(self.wants_one, check.ports.parameters["wants_one"])
+
+
+class WaitForStart(hfg.Subgraph):
+    """Figure 17 a as a part."""
+
+    begin = hfg.slot(type=object)
+    started = hfg.Event()
+
+    def build(self, graph: hfg.Graph) -> None:
+        topic, streq = graph.add(import_topic(), max_rate_hz=1), graph.add(Streq())
+        graph.connect(topic.out, streq.a)
+        graph.connect(self.begin.inner, streq.activate, active=True)
+        graph.connect(streq.equal, self.started.inner, active=True)
+
+
+def figure_19() -> hfg.Graph:
+    """The mission: wait, explore the centre, fetch a cube, look up or find its station, deliver, and again."""
+    graph = hfg.Graph("figure 19")
+    targets = graph.add(target_detection(), max_rate_hz=1)
+    cubes = graph.add(cube_detection(), max_rate_hz=1)
+    signs = graph.add(sign_detection(), max_rate_hz=0.1)
+    mapping, lookup = graph.add(SignMapping()), graph.add(MapLookup())
+    wait, explore = graph.add(WaitForStart(), name="wait_for_start"), graph.add(Wait(), name="explore")
+    fetch, deliver = graph.add(Visit(), name="fetch_cube"), graph.add(Visit(wants_one=False), name="deliver_cube")
+    find = graph.add(Wait(), name="find_delivery")
+    signs >> mapping
+    graph.connect(mapping.map, lookup.map)
+    for visit in (fetch, deliver):
+        graph.connect(targets.out, visit.target)
+        graph.connect(cubes.out, visit.cube)
+    graph.start.activates(wait.begin)
+    graph.connect(wait.started, explore.begin, active=True)
+    graph.connect(explore.done, fetch.begin, active=True)
+    graph.connect(fetch.done, lookup.key, active=True)
+    graph.connect(lookup.pose, deliver.begin, active=True)
+    graph.connect(lookup.unknown, find.begin, active=True)
+    graph.connect(find.done, lookup.key, active=True)
+    graph.connect(deliver.done, fetch.begin, active=True)
     return graph

@@ -1,4 +1,4 @@
-"""What the paper's text says about its figures 2 to 14, 17 and 18, checked on their graphs in examples/figures."""
+"""What the paper's text says about its figures 2 to 14 and 17 to 19, checked on their graphs in examples/figures."""
 
 from __future__ import annotations
 
@@ -232,3 +232,23 @@ def test_figure_18_takes_the_way_of_a_known_or_of_an_unknown_sign() -> None:
     hfg.run(unknown, clock="virtual", until_s=10)
     assert not unknown["navigate"].goals
     assert len(unknown["explore"].searched) == 13
+
+
+def test_figure_19_fetches_looks_up_finds_and_delivers_with_one_active_node_at_a_time() -> None:
+    seen = trace(robot.figure_19())
+    active: set[str] = set()
+    way: list[str] = []
+    for _, path, is_active in seen.activity():
+        active = active | {path} if is_active else active - {path}
+        assert len(active) <= 1
+        if is_active and path.partition("/")[0] != (way or [""])[-1]:
+            way.append(path.partition("/")[0])
+    looking = ["map_lookup", "find_delivery"] * 5
+    assert way == ["wait_for_start", "explore", "fetch_cube", *looking, "map_lookup", "deliver_cube", "fetch_cube"]
+    assert active == {"fetch_cube/check_cube"}
+
+
+def test_figure_19_needs_no_search_for_a_station_that_it_has_seen() -> None:
+    graph = robot.figure_19()
+    graph["cube_detection.seen"].value = (0, 0, 0, 0, 7, 7, 7, 7, 0)
+    assert trace(graph).calls("find_delivery") == []
