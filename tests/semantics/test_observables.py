@@ -12,6 +12,7 @@ import reactivex
 from reactivex import Observable, Subject, operators
 
 import hfg
+from hfg.testing import recorder, replay
 from tests.semantics.nodes import (
     Burst,
     Ear,
@@ -48,6 +49,35 @@ def test_what_comes_out_and_is_no_token_becomes_one_with_the_newest_stamp_that_w
     graph.connect(send.rang, sink.value, through=pairs)
     run(graph, fast)
     assert [(token.value, token.stamp, token.activity) for token in sink.tokens] == [([1, 2], 2, 0), ([3], 4, 0)]
+
+
+@pytest.mark.rule("P9", "F9")
+@pytest.mark.parametrize("call_first", [False, True])
+def test_what_operators_say_when_they_are_connected_enables_in_the_order_of_their_edges(call_first: bool) -> None:
+    done: list[str] = []
+
+    class Listens(hfg.Node):
+        value = hfg.Input(int)
+
+        def process(self, value: int) -> None:
+            done.append(f"fire {value}")
+
+        @hfg.slot
+        def hear(self, value: int) -> None:
+            done.append(f"call {value}")
+
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, listener = graph.add(Burst(count=0)), graph.add(Listens())
+        targets = [listener.value, listener.hear]
+        for target in reversed(targets) if call_first else targets:
+            graph.connect(source.rang, target, through=[operators.start_with(5)])
+        return graph
+
+    trace = recorder()
+    run(build(), trace=trace)
+    assert done == (["call 5", "fire 5"] if call_first else ["fire 5", "call 5"])
+    replay(build, trace)
 
 
 @pytest.mark.rule("P9")

@@ -18,7 +18,7 @@ class Connections:
     Attributes:
       edges: in order of connecting.
       into: the edge into each target that takes one alone.
-      pairs: the ends of all other edges, and how many have them: more than one amid an edit that is about to be refused.
+      pairs: the ends of all other edges, and how many have them: amid an edit that will be refused, more than one.
     """
 
     __slots__ = ("_at", "_order", "edges", "into", "pairs")

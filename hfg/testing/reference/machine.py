@@ -116,15 +116,26 @@ class ReferenceMachine(Editing):
         self.connect_ports()
         for line in self.lines:
             self.lay(line)
+        before = self.next_tick()
         self.make_operators()
         for station in self.stations:
             self.set_up(station)
-        self.note_places()  # of those before whom operators have laid something already (P9)
+        self.place_by_operators(before)
+        self.note_places()
         self.observe(RunStarted(self.now))
         self.started = True
         self.trigger(ROOT, "start", activity=1)
         self.settle()
         return self.observed_since(0)
+
+    def place_by_operators(self, before: int) -> None:
+        """What operators say when they are connected enables as it arrives, among the calls that arrive so (F9, P9)."""
+        for station in self.stations:
+            index = station.leaf.index
+            into = [line for line in self.lines if line.edge.target.owner == index and line.edge.target.kind == "input"]
+            arrived = max((line.queue[0].place for line in into if line.queue), default=before)
+            if arrived > before and self.may_fire(index):
+                station.place = arrived
 
     def observed_since(self, mark: int) -> list[TraceEvent]:
         """What was seen after the first `mark` events."""
