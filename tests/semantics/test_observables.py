@@ -69,7 +69,7 @@ def test_what_operators_say_when_they_are_connected_enables_in_the_order_of_thei
     def build() -> hfg.Graph:
         graph = hfg.Graph()
         source, listener = graph.add(Burst(count=0)), graph.add(Listens())
-        targets = [listener.value, listener.hear]
+        targets: list[Any] = [listener.value, listener.hear]
         for target in reversed(targets) if call_first else targets:
             graph.connect(source.rang, target, through=[operators.start_with(5)])
         return graph
