@@ -3,7 +3,7 @@
 Which floor stands on which; imports go down only, and asyncio begins on floor 5:
 
     7  cli      meeting   composing
-    6  nodes    files   recording   parts   catalogue     beside: testing (sees all; nobody below sees it)
+    6  nodes    files   recording   reporting   parts   catalogue     beside: testing (sees all; nobody below sees it)
     5  engine   links at work                             outside: hfg_transports (sees floors 0-1 only)
     4  activity   links   timeline
     3  graph

@@ -1,6 +1,6 @@
 """What stands on an upper floor and is asked for on a lower one: put in its place here, imported when it is used.
 
-`run.record` belongs to a run, and recording stands on the engine. Stands on both.
+`run.record` and `run.report_page` belong to a run, and what does them stands on the engine. Stands on both.
 """
 
 from __future__ import annotations
@@ -26,6 +26,13 @@ def _record(*arguments: Any, **options: Any) -> Any:
     return record(*arguments, **options)
 
 
+def _report_page(*arguments: Any, **options: Any) -> Any:
+    """Stand behind `Run.report_page`, in the same way."""
+    from hfg.reporting import report_page
+
+    return report_page(*arguments, **options)
+
+
 def _distribute(
     graph: Graph, flat: FlatGraph, options: Mapping[str, Any], virtual: bool, settings: str | None
 ) -> Distribution:
@@ -37,3 +44,4 @@ def _distribute(
 
 Composition.distribute = staticmethod(_distribute)
 Run._recorder = staticmethod(_record)
+Run._reporter = staticmethod(_report_page)

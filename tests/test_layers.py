@@ -53,6 +53,7 @@ FLOORS = {
     "hfg.nodes": 6,
     "hfg.files": 6,
     "hfg.recording": 6,
+    "hfg.reporting": 6,
     "hfg.parts": 6,
     "hfg.parts.transports": 5,  # finds them, and knows nothing of parts
     "hfg.catalogue": 6,

@@ -35,6 +35,7 @@ from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
 from hfg.engine import Run
 from hfg.engine.observing.encoding import encode
+from hfg.engine.observing.report import RunPage
 from hfg.errors import TargetError
 from hfg.graph import Graph
 from hfg.timeline import Timeline
@@ -62,6 +63,15 @@ def run(
             help="Write every event of the run, one JSON object a line; in .json, a timeline for Perfetto.",
         ),
     ] = None,
+    report_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--report",
+            metavar="FILE",
+            help="Write a page about the run, one HTML file: drawing, activity, counts, pictures.",
+        ),
+    ] = None,
+    pictures: Annotated[int, typer.Option(metavar="N", help="With --report: how many pictures it shows at most.")] = 24,
     table: Annotated[
         bool, typer.Option(help="On a terminal and the real clock, a live table of nodes while it runs.")
     ] = True,
@@ -88,8 +98,13 @@ def run(
     ):
         interrupt.before_leaving.append(live.leave)
 
+        pages: list[RunPage] = []
+
         def begin(run: Run) -> None:
             output.when_broken = partial(asyncio.get_running_loop().call_soon_threadsafe, run.stop)
+            if report_file is not None:
+                pages.append(run.report_page(report_file, pictures=pictures))
+                interrupt.before_leaving.append(pages[0].write)
             live.begin(run)
 
         report, error = execute(
@@ -105,6 +120,9 @@ def run(
             trace=write,
             settings=settings,
         )
+    for page in pages:
+        if page.error is not None:
+            show.sentence(f'the report "{page.path}" cannot be written: {page.error.strerror}')
     if output.broken is not None:
         raise output.broken
     if json and report is not None:

@@ -138,6 +138,10 @@ def _declares(**said: Any) -> type:
     return type("Declared", (hfg.Node,), {"a": hfg.Parameter(1, **said)})
 
 
+def reported(file: Any, **options: Any) -> Callable[[], Any]:
+    return lambda: hfg.run(build(), clock="virtual", begin=lambda run: run.report_page(file, **options))
+
+
 def edited(*given: Any) -> Callable[[], Any]:
     return lambda: build().edit(*given)
 
@@ -532,6 +536,14 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "no such path": (lambda: build()["nobody"], NO_NODE),
     "no such port": (lambda: build()["count.vlue"], '"count" has no port "vlue"; did you mean "value"?'),
     "a number as a path": (lambda: build()[3], 'a path is a text such as "fetch/go_to.goal", g'),  # type: ignore[index]
+    "report into a folder": (reported("."), 'cannot be written to ".": Is a directory; name a file in a folder that y'),
+    "report nowhere": (reported("nowhere/run.html"), "No such file or directory; name a file in a folder that you ca"),
+    "report into 3": (reported(3), 'goes into a file, as in run.report_page("run.html"), got 3'),
+    "report with fewer pictures": (
+        reported("x.html", pictures=-1),
+        "pictures= is a whole number from 0 to 1000, got -1",
+    ),
+    "report with dots": (reported("x.html", picture_size=1), "picture_size= is a whole number from 16 to 4096, got 1"),
     "draw a pdf": (lambda: build().draw("x.pdf"), 'cannot be drawn into "x.pdf": a drawing ends in .svg or .mmd or .'),
     "draw as a pdf": (lambda: build().draw(format="pdf"), "cannot be drawn into format='pdf': a drawing ends in .svg"),  # type: ignore[arg-type]
     "draw into nothing": (lambda: build().draw("\0.svg"), "embedded null byte; name a file in a folder that you can w"),
@@ -677,6 +689,8 @@ LINES = {
     "check missing.py": "missing.py: does not exist",
     "check text.txt": "text.txt is no Python file",
     "check steps.py more": "Got unexpected extra argument(s) (more)",
+    "run steps.py --clock virtual --report nowhere/x.html": 'cannot be written to "nowhere/x.html": No such file or d',
+    "run steps.py --clock virtual --report x.html --pictures -1": "pictures= is a whole number from 0 to 1000, got -1",
     "draw steps.py x.pdf": 'graph "steps" cannot be drawn into "x.pdf": a drawing ends in .svg or .mmd or .dot',
     "draw steps.py x": 'graph "steps" cannot be drawn into "x": a drawing ends in .svg or .mmd or .dot; rename',
     "draw steps.py --format pdf": "Invalid value for '--format': 'pdf' is not one of 'svg', 'mmd', 'dot'",

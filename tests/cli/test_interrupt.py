@@ -39,6 +39,21 @@ graph.connect(graph.start, node.begin)
 """
 
 
+REPORTED = """
+import asyncio
+import hfg
+
+class Busy(hfg.Node):
+    @hfg.slot
+    async def begin(self) -> None:
+        print("begun", flush=True)
+        {code}
+
+graph = hfg.Graph("busy")
+graph.start.activates(graph.add(Busy()).begin)
+"""
+
+
 class Process:
     """`hfg run` in a process of its own."""
 
@@ -195,3 +210,15 @@ def test_the_trace_is_whole_after_an_interrupt(process: Process, tmp_path: Path)
     lines = trace.read_text(encoding="utf-8").splitlines()
     assert '"RunStarted"' in lines[0]
     assert '"RunEnded"' in lines[-1]
+
+
+@pytest.mark.parametrize("code", ["await asyncio.sleep(1e6)", "while True: pass"], ids=["waits", "does not wait"])
+def test_the_page_of_an_interrupted_run_has_what_was_seen(process: Process, tmp_path: Path, code: str) -> None:
+    page = tmp_path / "run.html"
+    process.run(REPORTED.format(code=code), "--report", str(page))
+    process.interrupt()
+    assert process.end()[0] == 1
+    text = page.read_text(encoding="utf-8")
+    assert '<p class="outcome bad">' in text
+    assert '"path":"busy"' in text
+    assert text.endswith("</html>\n")

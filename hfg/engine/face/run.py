@@ -21,7 +21,7 @@ from hfg.engine.model.worker import UNREADY
 from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance, glance_at
 from hfg.engine.observing.recorder import RunRecording
-from hfg.engine.observing.report import Report
+from hfg.engine.observing.report import Report, RunPage
 from hfg.engine.observing.statistics import Statistics
 from hfg.engine.observing.taps import Tap
 from hfg.engine.rules.activity import reset_activity
@@ -49,7 +49,9 @@ T = TypeVar("T")
 class Run:
     """A graph that runs; made by `running`."""
 
-    _recorder: ClassVar[Callable[..., Any]]  # what records stands above, and is put in by the package itself
+    # What records and what writes pages stand above, and are put in by the package itself.
+    _recorder: ClassVar[Callable[..., Any]]
+    _reporter: ClassVar[Callable[..., Any]]
 
     def __init__(self, graph: Graph, parts: Composition) -> None:
         self.graph = graph
@@ -222,6 +224,27 @@ class Run:
             self, file, select=select, lossless=lossless, images=images, pickle=pickle, force=force
         )
         return recording
+
+    def report_page(self, file: str | os.PathLike[str], *, pictures: int = 24, picture_size: int = 320) -> RunPage:
+        """Write a page about the run when it is over: one HTML file that needs nothing besides itself.
+
+        It has the drawing with who was active at any time, the times of activity and of firings, counts, times, errors
+        and pictures. In `begin=`, before nodes are set up, nothing is missed; what is asked for later begins there.
+        However long the run is, memory and file are bounded, and the page says what it leaves out.
+
+        Args:
+          file: where to; one that is there is written over.
+          pictures: how many of those that pass outputs and events are shown, spread evenly over ports and time; 0 shows
+            none. They are images of 8 bits.
+          picture_size: how many pixels their longer side has at most.
+
+        Raises:
+          UsageError: the file cannot be written, or a number is out of its range.
+          NotRunning: the run is over.
+        """
+        self._need_running("there is nothing left to see for a page")
+        page: RunPage = self._reporter(self, file, pictures=pictures, picture_size=picture_size)
+        return page
 
     @overload
     def set(self, parameter: ParameterPort[T], value: T) -> None: ...

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import msgspec
 
@@ -10,7 +11,7 @@ from hfg.engine.model.core import Core
 from hfg.engine.model.worker import ENDED
 from hfg.engine.observing.tables import seconds, table
 
-__all__ = ["EdgeReport", "NodeReport", "Report", "edge_reports", "node_reports"]
+__all__ = ["EdgeReport", "NodeReport", "Report", "RunPage", "edge_reports", "node_reports"]
 
 
 class NodeReport(msgspec.Struct, frozen=True):
@@ -106,6 +107,24 @@ class Report(msgspec.Struct, frozen=True):
         if self.lost_activity:
             lines += ["", f"activity was lost {self.lost_activity} times"]
         return "\n".join([*lines, *([""] if self.errors else []), *self.errors])
+
+
+class RunPage(Protocol):
+    """What `run.report_page` gives: a page about a run, written when that is over. `hfg.reporting` has its class."""
+
+    @property
+    def path(self) -> Path:
+        """Of the file."""
+
+    @property
+    def error(self) -> OSError | None:
+        """Why the file could not be written in the end; None if all is well."""
+
+    def text(self) -> str:
+        """Give the page as far as the run has come."""
+
+    def write(self) -> None:
+        """Write the file now, as far as the run has come; the end of the run does it again."""
 
 
 def node_reports(core: Core) -> dict[str, NodeReport]:

@@ -1,0 +1,194 @@
+"use strict";
+// What one can do with a report: move along the time, zoom, sort. Without this script the tables and the drawing are there
+// all the same. Names come from users, so they are only ever set as text.
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const byId = (id) => document.getElementById(id);
+  const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const duration = data.duration > 0 ? data.duration : 1;
+  const seconds = (s) => (s >= 100 ? s.toFixed(1) : s >= 0.1 || s === 0 ? Number(s.toPrecision(4)) : Number((s * 1e3).toPrecision(4)));
+  const said = (s) => seconds(s) + (s >= 0.1 || s === 0 ? " s" : " ms");
+
+  // --- the drawing: who is active at a time
+
+  const shapes = new Map();
+  for (const group of byId("graph").querySelectorAll("g[data-path]")) {
+    const rect = group.querySelector(":scope > rect");
+    if (rect) shapes.set(group.getAttribute("data-path"), rect);
+  }
+  const changes = [...new Set(data.active.flatMap((one) => one.spans.flat()))].sort((a, b) => a - b);
+  let now = data.duration;
+
+  // A time ends when the next begins, so a node that was active for no time at all is not shown unless one looks just there.
+  const isActive = (one, at) => one.spans.some(([begin, end]) => begin <= at && (at < end || (at === end && (begin === end || end >= data.duration))));
+
+  function show(at) {
+    now = Math.min(Math.max(at, 0), data.duration);
+    const active = data.active.filter((one) => isActive(one, now)).map((one) => one.path);
+    const lit = new Set();
+    for (const path of active) {
+      const parts = path.split("/");
+      for (let count = 1; count <= parts.length; count++) lit.add(parts.slice(0, count).join("/"));
+    }
+    for (const [path, rect] of shapes) rect.classList.toggle("hfg-on", lit.has(path));
+    byId("now").textContent = said(now);
+    byId("who").textContent = active.length ? active.join(", ") : data.active.length ? "nobody is active" : "";
+    byId("time").value = now;
+    drawRows();
+  }
+
+  byId("time").max = data.duration;
+  byId("time").addEventListener("input", (event) => show(Number(event.target.value)));
+  byId("before").addEventListener("click", () => { const all = changes.filter((at) => at < now); show(all.length ? all[all.length - 1] : 0); });
+  byId("after").addEventListener("click", () => { const next = changes.find((at) => at > now); show(next === undefined ? data.duration : next); });
+
+  const svg = byId("graph").querySelector("svg");
+  const width = svg.viewBox.baseVal.width, height = svg.viewBox.baseVal.height;
+  let zoom = 1;
+  function scale(by) {
+    zoom = Math.min(Math.max(by, 0.05), 4);
+    svg.setAttribute("width", width * zoom);
+    svg.setAttribute("height", height * zoom);
+  }
+  const fit = () => scale(Math.min(1, (byId("graph").clientWidth - 2) / width));
+  byId("fit").addEventListener("click", fit);
+  byId("larger").addEventListener("click", () => scale(zoom * 1.25));
+  byId("smaller").addEventListener("click", () => scale(zoom / 1.25));
+
+  // --- the timeline
+
+  const canvas = byId("rows"), LABEL = 240, ROW = 18, AXIS = 22;
+  let from = 0, to = duration, rows = [];
+
+  function groupRows() {
+    const sums = new Map();
+    for (const [path, counts] of Object.entries(data.counts)) {
+      const group = data.groups[path] ?? "loop";
+      const sum = sums.get(group) ?? new Array(counts.length).fill(0);
+      counts.forEach((count, index) => { sum[index] += count; });
+      sums.set(group, sum);
+    }
+    return [...sums].map(([group, counts]) => ({ name: group === "loop" ? "firings on the loop" : "firings of group " + group, counts }));
+  }
+
+  function chooseRows() {
+    rows = data.active.map((one) => ({ name: one.path, spans: one.spans }));
+    rows.push(...groupRows());
+    if (byId("all").checked) rows.push(...Object.entries(data.counts).map(([path, counts]) => ({ name: "firings of " + path, counts })));
+  }
+
+  function fitted(context, text, room) {
+    if (context.measureText(text).width <= room) return text;
+    let cut = text;
+    while (cut.length > 1 && context.measureText("…" + cut).width > room) cut = cut.slice(1);
+    return "…" + cut;
+  }
+
+  function drawRows() {
+    const ratio = window.devicePixelRatio || 1;
+    const wide = Math.max(canvas.parentElement.clientWidth, 480), high = AXIS + ROW * rows.length + 6;
+    canvas.width = wide * ratio;
+    canvas.height = high * ratio;
+    canvas.style.width = wide + "px";
+    canvas.style.height = high + "px";
+    const context = canvas.getContext("2d");
+    context.scale(ratio, ratio);
+    context.font = "12px system-ui, 'DejaVu Sans', sans-serif";
+    const room = wide - LABEL - 12, x = (at) => LABEL + ((at - from) / (to - from)) * room;
+    const ink = style("--ink"), soft = style("--soft"), rule = style("--rule"), on = style("--on"), work = style("--work");
+    const step = niceStep((to - from) / Math.max(room / 90, 1));
+    for (let tick = Math.ceil(from / step) * step; tick <= to + step * 1e-9; tick += step) {
+      context.fillStyle = rule;
+      context.fillRect(x(tick), AXIS - 4, 1, high - AXIS);
+      context.fillStyle = soft;
+      context.fillText(said(Math.abs(tick) < step * 1e-6 ? 0 : tick), x(tick) + 3, 13);
+    }
+    rows.forEach((row, index) => {
+      const y = AXIS + index * ROW;
+      if (index % 2) { context.fillStyle = style("--band"); context.fillRect(0, y, LABEL - 6, ROW); }
+      context.fillStyle = ink;
+      context.fillText(fitted(context, row.name, LABEL - 18), 6, y + 13);
+      context.save();
+      context.beginPath();
+      context.rect(LABEL, y, room + 2, ROW);
+      context.clip();
+      if (row.spans) {
+        context.fillStyle = on;
+        for (const [begin, end] of row.spans) {
+          if (end < from || begin > to) continue;
+          context.fillRect(x(begin), y + 3, Math.max(x(end) - x(begin), 1.5), ROW - 6);
+        }
+      } else {
+        const most = Math.max(...row.counts, 1);
+        context.fillStyle = work;
+        row.counts.forEach((count, span) => {
+          if (!count) return;
+          const tall = Math.max(1.5, (ROW - 5) * (count / most));
+          context.fillRect(x(span * data.span), y + ROW - 2 - tall, Math.max(x((span + 1) * data.span) - x(span * data.span) - 0.3, 1), tall);
+        });
+      }
+      context.restore();
+    });
+    if (now >= from && now <= to) {
+      context.fillStyle = ink;
+      context.fillRect(x(now) - 0.75, 0, 1.5, high);
+    }
+  }
+
+  function niceStep(raw) {
+    const power = 10 ** Math.floor(Math.log10(raw));
+    return power * [1, 2, 5, 10].find((factor) => factor * power >= raw);
+  }
+
+  const timeAt = (event) => from + ((event.offsetX - LABEL) / (canvas.clientWidth - LABEL - 12)) * (to - from);
+  let pressed = false;
+  canvas.addEventListener("pointerdown", (event) => { pressed = true; canvas.setPointerCapture(event.pointerId); show(timeAt(event)); });
+  canvas.addEventListener("pointerup", () => { pressed = false; });
+  canvas.addEventListener("pointermove", (event) => {
+    if (pressed) show(timeAt(event));
+    const row = rows[Math.floor((event.offsetY - AXIS) / ROW)], at = timeAt(event);
+    const span = row && row.spans && row.spans.find(([begin, end]) => begin <= at && at <= end);
+    canvas.title = row ? row.name + (span ? ": active from " + said(span[0]) + " to " + said(span[1]) : "") : "";
+  });
+
+  function zoomTime(factor) {
+    const middle = now >= from && now <= to ? now : (from + to) / 2;
+    const half = Math.min(((to - from) / 2) * factor, duration / 2);
+    from = Math.max(0, Math.min(middle - half, duration - 2 * half));
+    to = from + 2 * half;
+    drawRows();
+  }
+  byId("in").addEventListener("click", () => zoomTime(0.5));
+  byId("out").addEventListener("click", () => zoomTime(2));
+  byId("whole").addEventListener("click", () => { from = 0; to = duration; drawRows(); });
+  byId("all").addEventListener("change", () => { chooseRows(); drawRows(); });
+  window.addEventListener("resize", drawRows);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawRows);
+
+  for (const figure of document.querySelectorAll("figure[data-time]")) {
+    figure.addEventListener("click", () => { show(Number(figure.getAttribute("data-time"))); });
+  }
+
+  // --- tables
+
+  for (const table of document.querySelectorAll("table")) {
+    const body = table.tBodies[0];
+    table.querySelectorAll("th").forEach((head, column) => {
+      head.querySelector("button").addEventListener("click", () => {
+        const cells = (row) => row.cells[column];
+        const isNumber = body.rows.length && cells(body.rows[0]).hasAttribute("data-by");
+        const down = head.getAttribute("aria-sort") ? head.getAttribute("aria-sort") === "ascending" : isNumber;
+        const value = (row) => (isNumber ? Number(cells(row).getAttribute("data-by")) : cells(row).textContent);
+        const compare = (a, b) => (isNumber ? value(a) - value(b) : value(a).localeCompare(value(b)));
+        const sorted = [...body.rows].sort((a, b) => (down ? compare(b, a) : compare(a, b)));
+        table.querySelectorAll("th").forEach((other) => other.removeAttribute("aria-sort"));
+        head.setAttribute("aria-sort", down ? "descending" : "ascending");
+        body.append(...sorted);
+      });
+    });
+  }
+
+  chooseRows();
+  fit();
+  show(data.duration);
+})();

@@ -1,0 +1,96 @@
+"""The page of a run under way: it listens from the beginning, and writes its file when the run is over.
+
+Stands on `observing`, `html` and the engine.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Any, Final
+
+from hfg.engine import Run, VirtualTimeLoop
+from hfg.errors import UsageError
+from hfg.logs import Log
+from hfg.reporting.html import page
+from hfg.reporting.observing import Observed
+from hfg.trace import RunEnded, TraceEvent
+
+__all__ = ["ReportPage", "report_page"]
+
+_LOG = Log("hfg.engine")
+_MOST_PICTURES: Final = 1000
+_LONGEST_SIDE: Final = 4096
+
+
+class ReportPage:
+    """A page about a run; `run.report_page` makes it.
+
+    Attributes:
+      path: of the file.
+      error: why the file could not be written in the end; None if all is well.
+    """
+
+    def __init__(self, run: Run, path: Path, observed: Observed, say_when: bool) -> None:
+        self.path = path
+        self.error: OSError | None = None
+        self._run = run
+        self._observed = observed
+        self._when = time.time() if say_when else None
+        self._outcome: str | None = None
+        self._text = ""
+
+    def __call__(self, event: TraceEvent) -> None:
+        """Take one event of the run."""
+        self._observed(event)
+        if isinstance(event, RunEnded):
+            self._observed.now = event.time
+            self._outcome = event.outcome
+            self.write()
+
+    def write(self) -> None:
+        """Write the page as far as the run has come; its end does it, too. A disk that is full is logged and kept."""
+        try:
+            self.path.write_text(self.text(), encoding="utf-8", errors="replace")
+            self.error = None
+        except OSError as error:
+            self.error = error
+            _LOG.error('the report "%s" cannot be written: %s', self.path, error.strerror)
+
+    def text(self) -> str:
+        """Give the page as far as the run has come."""
+        run = self._run
+        return page(run.graph, self._observed, run.report(), run.statistics(), run.error, self._outcome, self._when)
+
+
+def report_page(run: Run, file: str | os.PathLike[str], *, pictures: int, picture_size: int) -> ReportPage:
+    """Stand behind `Run.report_page`, which says what it takes."""
+    title = f'the report of graph "{run.graph.name}"'
+    if not isinstance(file, str | os.PathLike):
+        raise UsageError(f'{title} goes into a file, as in run.report_page("run.html"), got {file!r:.80}')
+    path = Path(file)
+    _need_whole(title, "pictures", pictures, 0, _MOST_PICTURES)
+    _need_whole(title, "picture_size", picture_size, 16, _LONGEST_SIDE)
+    try:
+        with path.open("ab"):
+            pass  # it can be written, which is better known now than when the run is over
+    except (OSError, ValueError) as error:
+        said = error.strerror if isinstance(error, OSError) else error
+        raise UsageError(
+            f'{title} cannot be written to "{path}": {said}; name a file in a folder that you can write to'
+        ) from error
+    run.statistics()  # from now on times are measured
+    made = ReportPage(run, path, Observed(pictures, picture_size), say_when=not _is_virtual(run))
+    run.trace(made)
+    return made
+
+
+def _is_virtual(run: Run) -> bool:
+    loop: Any = run._engine.loop
+    return isinstance(loop, VirtualTimeLoop)
+
+
+def _need_whole(title: str, name: str, value: object, least: int, most: int) -> None:
+    if type(value) is not int or not least <= value <= most:
+        raise UsageError(f"{title}: {name}= is a whole number from {least} to {most}, got {value!r}")
