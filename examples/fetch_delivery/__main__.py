@@ -2,32 +2,49 @@
 
 from __future__ import annotations
 
-import argparse
-import time
+import sys
+from typing import Annotated
 
-import hfg
+import typer
+
 from examples.fetch_delivery.mission import build
-from examples.fetch_delivery.world import FAULTS, Simulation, fault
+from examples.fetch_delivery.running import carry_out
+from examples.fetch_delivery.world import FAULTS, Fault, fault
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
-def main() -> None:
-    arguments = argparse.ArgumentParser(prog="python -m examples.fetch_delivery", description="Robots deliver cubes.")
-    arguments.add_argument("--seed", type=int, default=1, help="decides what looks like chance")
-    arguments.add_argument("--robots", type=int, default=1, choices=range(1, 5), help="how many")
-    arguments.add_argument("--minutes", type=float, default=3.0, help="how long, in the arena's time")
-    arguments.add_argument(
-        "--fault", action="append", default=[], choices=FAULTS, help="what shall go wrong after 30 s"
-    )
-    given = arguments.parse_args()
-    graph = build(given.seed, given.robots, faults=tuple(fault(name) for name in given.fault))
-    began = time.perf_counter()
-    hfg.run(graph, clock="virtual", until_s=60 * given.minutes)
-    took = time.perf_counter() - began
-    simulation: Simulation = graph["world"].simulation
-    for number, score in enumerate(simulation.scores):
-        print(f"robot {number}: {score}")
-    print(f"{given.minutes:g} minutes in {took:.0f} s, {60 * given.minutes / took:.1f} times real time")
+def _known_faults(names: list[str] | None) -> list[str]:
+    for name in names or []:
+        if name not in FAULTS:
+            raise typer.BadParameter(f"there is no fault {name!r}; there are {', '.join(FAULTS)}")
+    return names or []
+
+
+@app.command()
+def main(
+    seed: Annotated[int, typer.Option(min=0, help="Decides what looks like chance.")] = 1,
+    robots: Annotated[int, typer.Option(min=1, max=4, help="How many.")] = 1,
+    minutes: Annotated[float, typer.Option(min=0.01, max=600, help="How long, in the arena's time.")] = 3.0,
+    fault_names: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault", metavar="NAME", help=f"Goes wrong after 30 s: {', '.join(FAULTS)}.", callback=_known_faults
+        ),
+    ] = None,
+    within: Annotated[
+        float | None, typer.Option(metavar="SECONDS", min=1, help="End it earlier when it takes longer than that.")
+    ] = None,
+) -> None:
+    """Robots deliver cubes in a simulated arena; says in the end how they did."""
+    faults: tuple[Fault, ...] = tuple(fault(name) for name in fault_names or [])
+    graph = build(seed, robots, faults=faults)
+    result = carry_out(graph, 60 * minutes, within_s=within)
+    print(result)
+    if result.error:
+        print(result.error, file=sys.stderr)
+    sys.exit(0 if result.outcome in ("over", "late") else 1)
 
 
 if __name__ == "__main__":
-    main()
+    app(prog_name="python -m examples.fetch_delivery")
