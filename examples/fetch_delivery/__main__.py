@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from examples.fetch_delivery.mission import build
+from examples.fetch_delivery.mission import Robot, build
 from examples.fetch_delivery.running import carry_out
 from examples.fetch_delivery.world import FAULTS, Fault, fault
 
@@ -19,6 +19,18 @@ def _known_faults(names: list[str] | None) -> list[str]:
         if name not in FAULTS:
             raise typer.BadParameter(f"there is no fault {name!r}; there are {', '.join(FAULTS)}")
     return names or []
+
+
+def _kind(machine: bool) -> type[Robot]:
+    if not machine:
+        return Robot
+    try:
+        from examples.fetch_delivery.machine import Robot as Machine
+    except ModuleNotFoundError as error:
+        if not (error.name or "").startswith("transitions"):
+            raise
+        raise typer.BadParameter("--machine needs the package transitions; pip install 'hfg[examples]'") from None
+    return Machine
 
 
 @app.command()
@@ -35,10 +47,13 @@ def main(
     within: Annotated[
         float | None, typer.Option(metavar="SECONDS", min=1, help="End it earlier when it takes longer than that.")
     ] = None,
+    machine: Annotated[
+        bool, typer.Option("--machine", help="A state machine decides, not the flow of activity.")
+    ] = False,
 ) -> None:
     """Robots deliver cubes in a simulated arena; says in the end how they did."""
     faults: tuple[Fault, ...] = tuple(fault(name) for name in fault_names or [])
-    graph = build(seed, robots, faults=faults)
+    graph = build(seed, robots, faults=faults, kind=_kind(machine))
     result = carry_out(graph, 60 * minutes, within_s=within)
     print(result)
     if result.error:

@@ -189,7 +189,13 @@ class Robot(hfg.Subgraph):
 
 
 def build(
-    seed: int = 1, robots: int = 1, *, speed: float = 0.6, faults: tuple[Fault, ...] = (), gated: bool = True
+    seed: int = 1,
+    robots: int = 1,
+    *,
+    speed: float = 0.6,
+    faults: tuple[Fault, ...] = (),
+    gated: bool = True,
+    kind: type[Robot] = Robot,
 ) -> hfg.Graph:
     """Build the arena with robots in it, each with a mission of its own.
 
@@ -199,11 +205,12 @@ def build(
       speed: of their motors, in m/s.
       faults: what shall go wrong.
       gated: pictures are taken when a step asks for them; else all the time, to see what that saves.
+      kind: what sort of robot; all have the same ports.
     """
     graph = hfg.Graph("fetch-delivery")
     world = graph.add(World(seed=seed, speed=speed, faults=faults, odometry=robots), name="world", max_rate_hz=RATE_HZ)
     for number in range(robots):
-        robot = graph.add(Robot(), name=f"robot_{number}")
+        robot = graph.add(kind(), name=f"robot_{number}")
         graph.start.activates(robot.begin)
         graph.connect(world.odometry[number], robot.odometry)
         graph.connect(world.scan[number], robot.scan)

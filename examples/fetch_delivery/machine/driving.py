@@ -1,0 +1,185 @@
+"""How the robot drives in a state, as plain classes: made when the state is entered, asked for a command at each tick.
+
+A step returns the command and how it ended: nothing while it goes on. The laws are those of the nodes of
+`mission.driving`; the algorithms, plans, paths and walls, are the same functions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+from examples.fetch_delivery.messages import Odometry, Scan, Twist
+from examples.fetch_delivery.perception.following import Limits, follow
+from examples.fetch_delivery.perception.laser import obstacle_ahead, wall_ahead
+from examples.fetch_delivery.perception.planning import Path, length_of, plan
+from examples.fetch_delivery.perception.records import Localised, Sighting, Station, wrapped
+from hfg.nodes.robotics import Disk
+
+End: TypeAlias = Literal["done", "lost", "blocked"]
+Step: TypeAlias = tuple[Twist, End | None]
+
+
+@dataclass
+class Move:
+    """Move a given distance by the wheels alone, or turn on the spot.
+
+    Attributes:
+      x: how far ahead; negative is back.
+      y: how far to the left.
+      turn: how far to turn, counter-clockwise.
+      speed: at most.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    turn: float = 0.0
+    speed: float = 0.4
+    goal: tuple[float, float, float] | None = None
+
+    def step(self, odometry: Odometry) -> Step:
+        """Steer to where it leads from the pose of the first step."""
+        x, y, theta = odometry.pose
+        cos, sin = math.cos(theta), math.sin(theta)
+        if self.goal is None:
+            self.goal = (x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, theta + self.turn)
+        dx, dy, turn = self.goal[0] - x, self.goal[1] - y, self.goal[2] - theta
+        left = math.hypot(dx, dy)
+        if left < 0.05 and (not self.turn or abs(turn) < 0.2):
+            return Twist(), "done"
+        pace = min(self.speed, 0.05 + 1.2 * left) / max(left, 0.05)
+        omega = max(-0.8, min(0.8, turn)) if self.turn else 0.0  # without a turn the heading may drift
+        return Twist(pace * (cos * dx + sin * dy), pace * (cos * dy - sin * dx), omega), None
+
+
+@dataclass
+class GoTo:
+    """Go to a pose of the map; plan anew while the robot and others move.
+
+    Attributes:
+      goal: the pose.
+      near: how near to it is there.
+      aligned: and how near to its heading.
+      every: plan with each so many-th pose.
+      without_path: so many seconds without any path are too long.
+      patience: so many seconds may the robot come no nearer.
+    """
+
+    goal: Any
+    near: float = 0.06
+    aligned: float = 0.06
+    every: int = 5
+    without_path: float = 8.0
+    patience: float = 6.0
+    path: Path | None = None
+    poses: int = 0
+    since: float | None = None
+    least: float = math.inf
+    last: Twist = field(default_factory=Twist)
+
+    def step(self, localised: Localised | None, scan: Scan, others: Sequence[Disk]) -> Step:
+        """Plan if it is time to, and take one step along the path."""
+        if self.since is None:
+            self.since = scan.stamp
+        if localised is None:
+            return Twist(), None
+        if localised.fits:
+            if self.poses % self.every == 0:
+                self._plan(localised, others)
+            self.poses += 1
+        waited = scan.stamp - self.since
+        if self.path is None:
+            return Twist(), "blocked" if waited >= self.without_path else None
+        if waited > self.patience:
+            return Twist(), "blocked"
+        limits = Limits(near=self.near, aligned=self.aligned)
+        twist = follow(self.path, localised, scan, math.hypot(self.last.vx, self.last.vy), limits)
+        if twist is None:
+            return Twist(), "done"
+        self.last = twist
+        return twist, None
+
+    def _plan(self, localised: Localised, others: Sequence[Disk]) -> None:
+        points = plan(localised.pose, self.goal, others)
+        if points is None:
+            return
+        self.path = Path(points, float(self.goal[2]))
+        left = length_of(points) + 0.3 * abs(float(wrapped(self.goal[2] - localised.pose[2])))
+        if left < self.least - 0.05:
+            self.least, self.since = left, localised.stamp
+
+
+@dataclass
+class Position:
+    """Stand before a bull's-eye, looking straight at the wall that bears it.
+
+    Attributes:
+      station: where it should be.
+      distance: from the wall.
+      patience: how many seconds it may be out of sight.
+    """
+
+    station: Station
+    distance: float = 0.8
+    patience: float = 3.0
+    target: tuple[float, float] | None = None
+    since: float | None = None
+    steady: int = 0
+
+    def step(self, localised: Localised | None, scan: Scan, seen: Sequence[Sighting]) -> Step:
+        """Take one step towards it; `seen` are the bull's-eyes that were seen since the last one."""
+        if self.since is None:
+            self.since = scan.stamp
+        if localised is None:
+            return Twist(), None
+        self._follow(localised, seen)
+        if self.target is None or localised.stamp - self.since > self.patience:
+            return Twist(), "lost" if localised.stamp - self.since > self.patience else None
+        x, y, theta = localised.pose
+        dx, dy = self.target[0] - x, self.target[1] - y
+        ahead, left = math.cos(theta) * dx + math.sin(theta) * dy, math.cos(theta) * dy - math.sin(theta) * dx
+        wall = wall_ahead.function(scan)
+        turn = wall.angle if wall is not None else float(wrapped(self.station.theta + math.pi - theta))
+        far = wall.distance if wall is not None else ahead
+        aside = math.cos(turn) * left - math.sin(turn) * ahead  # along the wall
+        if abs(aside) < 0.025 and abs(turn) < 0.05 and far < self.distance + 0.1:
+            self.steady += 1
+            return Twist(), "done" if self.steady >= 2 else None
+        self.steady = 0
+        on = max(-0.2, min(0.3, 0.8 * (far - self.distance)))
+        across = max(-0.25, min(0.25, 1.2 * aside))
+        cos, sin = math.cos(turn), math.sin(turn)
+        return Twist(cos * on - sin * across, sin * on + cos * across, max(-0.6, min(0.6, 1.2 * turn))), None
+
+    def _follow(self, localised: Localised, seen: Sequence[Sighting]) -> None:
+        """Take in what was seen: of several bull's-eyes that which is nearest to where it should be."""
+        expected = self.target if self.target is not None else (self.station.x, self.station.y)
+        places = [localised.place(one.x, one.y) for one in seen]
+        near = [place for place in places if math.dist(place, expected) < 0.7]
+        if near:
+            best = min(near, key=lambda place: math.dist(place, expected))
+            old, gain = (best, 1.0) if self.target is None else (self.target, 0.5)
+            self.target = (old[0] + gain * (best[0] - old[0]), old[1] + gain * (best[1] - old[1]))
+            self.since = localised.stamp
+
+
+@dataclass
+class Dock:
+    """Drive straight ahead until something is near.
+
+    Attributes:
+      distance: how near, from the middle of the robot.
+      speed: at most.
+    """
+
+    distance: float = 0.36
+    speed: float = 0.3
+
+    def step(self, scan: Scan) -> Step:
+        """Look ahead."""
+        left = obstacle_ahead.function(scan, width=0.3) - self.distance
+        if left < 0.015:
+            return Twist(), "done"
+        return Twist(min(self.speed, 0.03 + 0.8 * left)), None
