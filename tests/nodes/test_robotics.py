@@ -212,3 +212,56 @@ def test_cheaper_cells_are_worth_a_longer_way() -> None:
     dear = robotics.plan_path.function(costs, start, goal)
     assert dear is not None
     assert dear[:, 1].max() > 1.9
+
+
+def seen_by(tracks: robotics.DiskTracks, disks: Any, now: float, pose: Any = (4.0, 2.0, 0.0)) -> list[robotics.Disk]:
+    """Look from a pose into the room, and tell the tracks which of the disks the laser sees."""
+    clear = robotics.expected_ranges.function(np.array(pose), ANGLES, ROOM)
+    ranges = scan(pose, np.random.default_rng(round(10 * now)), disks)
+    points = placed(robotics.scan_points.function(ranges, ANGLES), pose)
+    found = robotics.find_disks.function(points[ranges < clear - 0.1], np.array([pose[:2]]))
+    return tracks.update(found, np.array(pose), ranges, ANGLES, now)
+
+
+def test_a_disk_is_followed_and_its_velocity_is_told() -> None:
+    tracks = robotics.DiskTracks()
+    for tick in range(30):
+        (one,) = seen_by(tracks, [(5.0 + 0.05 * tick, 1.0)], tick / 10)
+    assert math.dist((one.x, one.y), (6.45, 1.0)) < 0.05
+    assert (one.vx, one.vy) == pytest.approx((0.5, 0.0), abs=0.1)
+    for tick in range(30, 60):
+        (one,) = seen_by(tracks, [(6.45, 1.0)], tick / 10)
+    assert math.hypot(one.vx, one.vy) < 0.1
+
+
+def test_a_disk_that_the_laser_does_not_see_is_kept_for_a_while() -> None:
+    """It was on the left; then the laser turns its back on it, or something comes in between."""
+    for turned, between in ((-math.pi / 2, []), (0.0, [(4.0, 2.7)])):
+        tracks = robotics.DiskTracks(memory=2.0)
+        for tick in range(5):
+            assert len(seen_by(tracks, [(4.0, 3.5)], tick / 10)) == 1
+        for tick in range(5, 24):
+            known = seen_by(tracks, [*between, (4.0, 3.5)], tick / 10, (4.0, 2.0, turned))
+            assert min(math.dist((one.x, one.y), (4.0, 3.5)) for one in known) < 0.03
+        for tick in range(24, 28):
+            known = seen_by(tracks, between, tick / 10, (4.0, 2.0, turned))
+        assert len(known) == len(between)
+
+
+def test_a_disk_that_should_be_seen_and_is_not_has_gone() -> None:
+    tracks = robotics.DiskTracks(memory=60.0)
+    for tick in range(5):
+        assert len(seen_by(tracks, [(5.5, 2.0), (4.0, 3.2)], tick / 10)) == 2
+    for tick in range(5, 8):
+        known = seen_by(tracks, [(4.0, 3.2)], tick / 10)
+    assert [round(one.y, 1) for one in known] == [3.2]
+
+
+def test_track_disks_follows_them_in_a_graph() -> None:
+    node = robotics.TrackDisks(memory=5.0)
+    far = np.full(271, 9.0)
+    for x in (3.0, 3.02):
+        disks = fire(node, seen=[robotics.Disk(x, 0.0, 9)], pose=np.zeros(3), ranges=far, angles=ANGLES).outputs[
+            "disks"
+        ]
+    assert [round(one.x, 1) for one in disks] == [3.0]

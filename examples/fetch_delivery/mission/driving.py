@@ -176,7 +176,7 @@ class MoveToObstacle(hfg.Node):
         if left < 0.015:
             self.done.trigger()
             return Twist()
-        return Twist(min(self.speed, 0.03 + 0.8 * left))
+        return Twist(min(self.speed, 0.03 + math.sqrt(2 * 0.25 * left)))
 
     @hfg.slot
     def begin(self) -> None:
@@ -201,6 +201,8 @@ class GoTo(hfg.Subgraph):
       blocked: it came no nearer.
       near: how near to the goal is there.
       aligned: and how near to its heading.
+      lane: how far beyond the goal it has to be free; the robot waits for that at a distance.
+      queueing: and not longer than so long.
     """
 
     localised, scan, others = hfg.Input(Localised), hfg.Input(Scan), hfg.Input(list[Disk])
@@ -210,6 +212,8 @@ class GoTo(hfg.Subgraph):
     arrived, blocked = hfg.Event(), hfg.Event(object)
     near = hfg.Parameter(0.06)
     aligned = hfg.Parameter(0.06)
+    lane = hfg.Parameter(0.0)
+    queueing = hfg.Parameter(60.0)
 
     def build(self, graph: hfg.Graph) -> None:
         """Put the planner before the follower."""
@@ -231,6 +235,8 @@ class GoTo(hfg.Subgraph):
         graph.connect(shutter.out, self.look.inner)
         graph.promote(self.near, follow.ports.parameters["near"])
         graph.promote(self.aligned, follow.ports.parameters["aligned"])
+        graph.promote(self.lane, plan.ports.parameters["lane"])
+        graph.promote(self.queueing, follow.ports.parameters["queueing"])
 
 
 class LookAround(hfg.Subgraph):

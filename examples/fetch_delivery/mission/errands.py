@@ -120,7 +120,7 @@ class FetchCube(hfg.Subgraph):
     def build(self, graph: hfg.Graph) -> None:
         """Put the choice before the visit."""
         select = graph.add(SelectFilling(), name="select", active_for_s=5.1)
-        look_around, visit = graph.add(LookAround(), name="look_around"), graph.add(Visit(), name="visit")
+        look_around, visit = graph.add(LookAround(), name="look_around"), graph.add(Visit(queueing=8.0), name="visit")
         self.begin.inner.activates(select.begin)
         select.station.activates(visit.begin)
         visit.gave_up.activates(select.again)

@@ -10,13 +10,16 @@ There is no state machine: what is active is the state. `deliver` and `fetch` ar
 
 from __future__ import annotations
 
+import math
+
 import hfg
 from examples.fetch_delivery.messages import Odometry, Picture, Scan, Twist
 from examples.fetch_delivery.mission.driving import MoveRobot
 from examples.fetch_delivery.mission.errands import DeliverCube, Explore, FetchCube, MapLookup
 from examples.fetch_delivery.mission.world import RATE_HZ, World
 from examples.fetch_delivery.perception.cube import CubeWatch
-from examples.fetch_delivery.perception.laser import other_robots
+from examples.fetch_delivery.perception.following import GiveWay
+from examples.fetch_delivery.perception.laser import FollowRobots, other_robots
 from examples.fetch_delivery.perception.localising import Localise
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station
 from examples.fetch_delivery.perception.sighting import find_targets, read_digits
@@ -38,7 +41,8 @@ class Perception(hfg.Subgraph):
       ask: look anew what lies in the basket.
       forget: the number of a sign that is not where it should be.
       localised: where the robot is.
-      others: other robots.
+      others: other robots, in the map frame.
+      around: the same, in the robot's own frame.
       targets: bull's-eyes that are seen.
       signs: the digits that are known.
       filling: the filling stations that are known.
@@ -49,24 +53,29 @@ class Perception(hfg.Subgraph):
     odometry, scan = hfg.Input(Odometry), hfg.Input(Scan)
     front, basket = hfg.Input(Picture), hfg.Input(Picture)
     ask, forget = hfg.slot(type=object), hfg.slot(type=int)
-    localised, others = hfg.Output(Localised), hfg.Output(list[Disk])
+    localised = hfg.Output(Localised)
+    others, around = hfg.Output(list[Disk]), hfg.Output(list[Disk])
     targets, signs = hfg.Output(list[Sighting]), hfg.Output(dict[int, Sign])
     filling = hfg.Output(list[Station])
     number, none = hfg.Event(int), hfg.Event()
 
     def build(self, graph: hfg.Graph) -> None:
         """Connect what measures with what learns."""
-        localise, others = graph.add(Localise(), name="localise"), graph.add(other_robots(), name="others")
+        localise, robots = graph.add(Localise(), name="localise"), graph.add(other_robots(), name="robots")
+        others = graph.add(FollowRobots(), name="others")
         targets, digits = graph.add(find_targets(), name="targets"), graph.add(read_digits(), name="digits")
         signs, stations = graph.add(SignMap(), name="signs"), graph.add(StationMap(), name="stations")
         cube = graph.add(CubeWatch(), name="cube")
 
         graph.connect(self.scan.inner, localise.scan)
         graph.connect(self.odometry.inner, localise.odometry)
-        graph.connect(self.scan.inner, others.scan)
-        graph.connect(localise.localised, others.localised)
+        for laser in (robots, others):
+            graph.connect(self.scan.inner, laser.scan)
+            graph.connect(localise.localised, laser.localised)
+        graph.connect(robots.out, others.seen)
         graph.connect(localise.localised, self.localised.inner)
-        graph.connect(others.out, self.others.inner)
+        graph.connect(others.others, self.others.inner)
+        graph.connect(others.around, self.around.inner)
 
         # Pictures come when somebody has asked, poses ten times a second: each picture meets the pose of its moment.
         for eyes, learner, seen in ((targets, stations, stations.targets), (digits, signs, signs.sightings)):
@@ -108,7 +117,7 @@ class Robot(hfg.Subgraph):
 
     odometry, scan, message = hfg.Input(Odometry), hfg.Input(Scan), hfg.Input(str)
     front, basket = hfg.Input(Picture), hfg.Input(Picture)
-    command, lamp = hfg.Output(Twist), hfg.Output(bool)
+    command, lamp = hfg.Event(Twist), hfg.Output(bool)
     look_ahead, look_into_basket = hfg.Output(object), hfg.Output(Scan)
     begin = hfg.slot(type=object)
     not_found = hfg.Event(int)
@@ -117,7 +126,7 @@ class Robot(hfg.Subgraph):
         """Figure 19."""
         perception = graph.add(Perception(), name="perception")
         wait_for_start = graph.add(activity.WaitForText(wanted="start"), name="wait_for_start")
-        advance = graph.add(MoveRobot(x=1.0, y=1.0), name="advance", active_for_s=10.1)
+        advance = graph.add(MoveRobot(x=1.0, y=1.0, turn=math.pi / 2), name="advance", active_for_s=10.1)
         fetch, deliver = graph.add(FetchCube(), name="fetch"), graph.add(DeliverCube(), name="deliver")
         read_cube = graph.add(activity.WaitForMessage(), name="read_cube", active_for_s=10.1)
         newest, lookup = graph.add(flow.SampleAndHold(), name="newest"), graph.add(MapLookup(), name="lookup")
@@ -160,12 +169,21 @@ class Robot(hfg.Subgraph):
         perception = graph["perception"]
         for name in ("odometry", "scan", "front", "basket"):
             graph.connect(self.ports.inputs[name].inner, perception.ports.inputs[name])
+        # It turns to the middle and looks at it: so it knows which sides of the octagon are filling stations.
+        shutter = graph.add(flow.EveryNth(n=4), name="look_first")
+        graph.connect(self.scan.inner, shutter.value)
+        graph.connect(shutter.out, self.look_ahead.inner)
+        graph.gate(shutter, by=graph["advance"])
         basket = graph.add(flow.EveryNth(n=2), name="look_again")
         graph.connect(self.scan.inner, basket.value)
         graph.connect(basket.out, self.look_into_basket.inner)
         graph.gate(basket, by=graph["read_cube"])
         graph.connect(self.odometry.inner, graph["advance"].ports.inputs["odometry"])
-        graph.connect(graph["advance"].ports.outputs["command"], self.command.inner)
+        # Of all that drive only the active one sends commands; whichever it is, others come first.
+        give_way = graph.add(GiveWay(), name="give_way")
+        graph.connect(perception.ports.outputs["around"], give_way.around)
+        graph.connect(give_way.held, self.command.inner)
+        graph.connect(graph["advance"].ports.outputs["command"], give_way.command)
         for errand in (graph["fetch"], graph["deliver"]):
             for name in ("odometry", "scan"):
                 graph.connect(self.ports.inputs[name].inner, errand.ports.inputs[name])
@@ -174,7 +192,7 @@ class Robot(hfg.Subgraph):
             for name in ("number", "none"):
                 graph.connect(perception.ports.events[name], errand.ports.slots[name])
             graph.connect(errand.ports.events["ask"], perception.ports.slots["ask"], overflow="latest")
-            graph.connect(errand.ports.outputs["command"], self.command.inner)
+            graph.connect(errand.ports.outputs["command"], give_way.command)
             graph.connect(errand.ports.outputs["lamp"], self.lamp.inner)
             graph.connect(errand.ports.outputs["look"], self.look_ahead.inner)
             graph.connect(errand.ports.outputs["look_into_basket"], self.look_into_basket.inner)
@@ -184,7 +202,7 @@ class Robot(hfg.Subgraph):
             graph.connect(self.ports.inputs[name].inner, explore.ports.inputs[name])
         for name in ("localised", "others"):
             graph.connect(perception.ports.outputs[name], explore.ports.inputs[name])
-        graph.connect(explore.ports.outputs["command"], self.command.inner)
+        graph.connect(explore.ports.outputs["command"], give_way.command)
         graph.connect(explore.ports.outputs["look"], self.look_ahead.inner)
 
 

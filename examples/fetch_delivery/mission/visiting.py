@@ -121,6 +121,7 @@ class Visit(hfg.Subgraph):
 
     Attributes:
       loading: whether a cube shall come, or go.
+      queueing: so long it waits for another robot to leave the station.
       localised: where the robot is.
       odometry: what the wheels say.
       scan: of the laser.
@@ -140,6 +141,7 @@ class Visit(hfg.Subgraph):
     """
 
     loading = hfg.Parameter(True)
+    queueing = hfg.Parameter(60.0)
     localised, odometry, scan = hfg.Input(Localised), hfg.Input(Odometry), hfg.Input(Scan)
     others, targets = hfg.Input(list[Disk]), hfg.Input(list[Sighting])
     number, none, unwanted = hfg.slot(type=int), hfg.slot(type=object), hfg.slot(type=int)
@@ -151,7 +153,10 @@ class Visit(hfg.Subgraph):
 
     def build(self, graph: hfg.Graph) -> None:
         """Put the steps in a row, and behind each what follows if it fails."""
-        approach, go_to = graph.add(Approach(), name="approach"), graph.add(GoTo(), name="go_to", active_for_s=60.1)
+        approach, go_to = (
+            graph.add(Approach(), name="approach"),
+            graph.add(GoTo(lane=0.9), name="go_to", active_for_s=60.1),
+        )
         position = graph.add(PositionToTarget(), name="position", active_for_s=20.1)
         dock = graph.add(MoveToObstacle(), name="dock", active_for_s=10.1)
         settle = graph.add(activity.Wait(seconds=0.6), name="settle")
@@ -197,6 +202,7 @@ class Visit(hfg.Subgraph):
         graph.connect(self.none.inner, wait.none)
         graph.connect(self.unwanted.inner, wait.unwanted)
         graph.promote(self.loading, wait.ports.parameters["loading"])
+        graph.promote(self.queueing, go_to.ports.parameters["queueing"])
 
     def _feed(self, graph: hfg.Graph) -> None:
         """Give each step the data it needs, and let those that are not active rest."""

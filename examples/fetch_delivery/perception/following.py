@@ -7,16 +7,18 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from annotated_types import Gt
 
 import hfg
 from examples.fetch_delivery.messages import Scan, Twist
 from examples.fetch_delivery.perception.laser import foreign
 from examples.fetch_delivery.perception.planning import RADIUS, Path
 from examples.fetch_delivery.perception.records import Localised, wrapped
-from hfg.nodes.robotics import scan_points
+from hfg.nodes.robotics import Disk, scan_points
 
 _FORESIGHT: Final = 0.35  # seconds: how far ahead on the path the robot aims, beside _LEAST_AHEAD
 _LEAST_AHEAD: Final = 0.15
+_REACTION: Final = 0.2  # seconds from a scan to wheels that obey
 _LOOK: Final = 1.0  # metres before the goal, from where on the robot turns to its heading
 
 
@@ -123,13 +125,15 @@ class FollowPath(hfg.Node):
     """Follow a path.
 
     Fires once for each pose with the scan of its time; it is silent without a path. A new path takes the place of the
-    old one without a stop. The last command is to stand.
+    old one without a stop. The last command is to stand. At the end of a path to where the robot waits it stands, and
+    has not arrived.
 
     Attributes:
       speed: top speed.
       near: how near to the goal is there.
       aligned: and how near to its heading.
       patience: so long may the robot come no nearer to the goal before `blocked` tells.
+      queueing: and so long may it wait where it can wait for the goal.
       localised: where the robot is.
       scan: of the same time.
       command: the velocity.
@@ -143,6 +147,7 @@ class FollowPath(hfg.Node):
     near = hfg.Parameter(0.04, unit="m")
     aligned = hfg.Parameter(0.04, unit="rad")
     patience = hfg.Parameter(3.0, unit="s")
+    queueing = hfg.Parameter(60.0, unit="s")
     localised = hfg.Input(Localised)
     scan = hfg.Input(Scan)
     command = hfg.Output(Twist)
@@ -153,6 +158,7 @@ class FollowPath(hfg.Node):
     last: hfg.State[Any] = hfg.State(None)
     best = hfg.State(math.inf)
     since = hfg.State(0.0)
+    queues_since: hfg.State[float | None] = hfg.State(None)
 
     def process(self, localised: Localised, scan: Scan) -> Twist | None:
         """Take one step."""
@@ -162,14 +168,25 @@ class FollowPath(hfg.Node):
         speed = math.hypot(self.last.vx, self.last.vy) if self.last is not None else 0.0
         limits = Limits(speed=self.speed, near=self.near, aligned=self.aligned)
         twist = follow(self.way, localised, scan, speed, limits)
+        if twist is None and self.way.waits:
+            self._queue(scan.stamp)
+            return Twist()
         if twist is None:
             self.way = self.last = None
             self.best = math.inf
             self.arrived.trigger()
             return Twist()
         self._watch(localised, scan.stamp)
-        self.last = twist
+        self.last, self.queues_since = twist, None
         return twist
+
+    def _queue(self, now: float) -> None:
+        self.last, self.since = None, now
+        if self.queues_since is None:
+            self.queues_since = now
+        elif now - self.queues_since > self.queueing:
+            self.queues_since = now
+            self.blocked.trigger(0.0)
 
     def _watch(self, localised: Localised, now: float) -> None:
         goal = self.way.points[-1]
@@ -197,4 +214,52 @@ class FollowPath(hfg.Node):
     @hfg.slot
     def stop(self) -> None:
         """Follow nothing."""
-        self.way, self.best = None, math.inf
+        self.way, self.best, self.queues_since = None, math.inf, None
+
+
+class GiveWay(hfg.Node):
+    """Hold back what would lead too fast at another robot, whoever commands it.
+
+    Steps that drive without looking, such as backing off, need not care for others: here all commands pass. Walls are
+    not looked at, for a robot has to dock.
+
+    Attributes:
+      gap: that is kept.
+      braking: in m/s2; less than the motors can.
+      around: other robots in the robot's own frame, with velocities over the ground.
+      command: what is wanted.
+      held: what is safe.
+    """
+
+    gap = hfg.Parameter(0.06, Gt(0), unit="m")
+    braking = hfg.Parameter(0.5, Gt(0), unit="m/s^2")
+    held = hfg.Event(Twist)
+    known: hfg.State[list[Disk]] = hfg.State(factory=list)
+
+    @hfg.slot
+    def around(self, around: list[Disk]) -> None:
+        """Keep where they are."""
+        self.known = around
+
+    @hfg.slot
+    def command(self, twist: Twist) -> None:
+        """Take out of it what is too fast."""
+        self.held.trigger(apart(twist, self.known, self.gap, self.braking))
+
+
+def apart(twist: Twist, around: list[Disk], gap: float = 0.06, braking: float = 0.5) -> Twist:
+    """Take from a velocity what would lead too fast at other robots, of which some come nearer by themselves."""
+    vx, vy = twist.vx, twist.vy
+    for _ in range(2):  # what is held back before one may lead at the next
+        for one in around:
+            far = math.hypot(one.x, one.y)
+            if not 0 < far < 2.0:
+                continue
+            nx, ny = one.x / far, one.y / far
+            comes = max(0.0, -(nx * one.vx + ny * one.vy))
+            left = far - 2 * RADIUS - gap - _REACTION * comes
+            most = max(0.0, math.sqrt(2 * braking * max(left, 0.0)) - comes)
+            over = nx * vx + ny * vy - most
+            if over > 0:
+                vx, vy = vx - over * nx, vy - over * ny
+    return Twist(vx, vy, twist.omega)

@@ -6,15 +6,17 @@ import math
 from typing import Annotated, Any, Final
 
 import numpy as np
-from annotated_types import Interval
+from annotated_types import Ge, Interval
 
 import hfg
 from examples.fetch_delivery.messages import Scan
 from examples.fetch_delivery.perception import shape
 from examples.fetch_delivery.perception.records import Localised, Wall
-from hfg.nodes.robotics import Disk, find_disks, nearest_obstacle, scan_points
+from hfg.nodes.robotics import Disk, DiskTracks, find_disks, nearest_obstacle, scan_points
 
 _ROBOT: Final = 0.25  # its radius
+_FASTEST: Final = 0.7  # m/s
+_WIDE: Final = 0.42  # metres: of a robot's round back no straight piece is that wide
 
 
 @hfg.node
@@ -48,7 +50,7 @@ def wall_ahead(scan: Scan, *, width: Annotated[float, Interval(gt=0, le=math.pi)
       width: of the sector in which it is looked for.
 
     Returns:
-      out: silence if there is no wall, or nothing straight.
+      out: silence if there is no wall, or nothing straight; the back of another robot is none.
     """
     points = scan_points.function(scan.ranges, scan.angles, max_range=scan.max_range)
     points = points[np.abs(np.arctan2(points[:, 1], points[:, 0])) <= width / 2]
@@ -65,7 +67,9 @@ def wall_ahead(scan: Scan, *, width: Annotated[float, Interval(gt=0, le=math.pi)
     if distance < 0:
         distance, normal = -distance, -normal
     angle = math.atan2(normal[1], normal[0])
-    return Wall(distance, angle) if abs(angle) < 1.2 else None
+    least = min(_WIDE, 1.7 * math.tan(width / 2) * distance)  # from near by even a wall is not seen wider
+    wide = float(np.ptp(points @ np.array([-normal[1], normal[0]])))
+    return Wall(distance, angle) if abs(angle) < 1.2 and wide > least else None
 
 
 def _straightest(points: Any) -> Any:
@@ -99,6 +103,58 @@ def other_robots(scan: Scan, localised: Localised) -> list[Disk]:
     places = foreign(scan, localised)
     disks = find_disks.function(places, localised.pose[None, :2], radius=_ROBOT, tolerance=0.05)
     return [one for one in disks if _is_free(one)]
+
+
+class FollowRobots(hfg.Node):
+    """Follow other robots from scan to scan: how they move, and where they are when the laser does not see them.
+
+    It does not look back, and one robot hides another. Fires once for each list of robots with the scan in which they
+    were found.
+
+    Attributes:
+      memory: for how long one is kept that cannot be seen.
+      seen: robots in the map frame.
+      scan: in which they were found.
+      localised: where the robot was then.
+      others: all that are known, in the map frame.
+      around: the same in the robot's own frame, with velocities over the ground.
+    """
+
+    memory = hfg.Parameter(4.0, Ge(0), unit="s")
+    seen = hfg.Input(list[Disk])
+    scan = hfg.Input(Scan)
+    localised = hfg.Input(Localised)
+    others = hfg.Output(list[Disk])
+    around = hfg.Output(list[Disk])
+
+    tracks: hfg.State[Any] = hfg.State(None)
+
+    def setup(self) -> None:
+        """Begin with none."""
+        self.tracks = DiskTracks(memory=self.memory, fastest=_FASTEST, radius=_ROBOT)
+
+    def process(self, seen: list[Disk], scan: Scan, localised: Localised) -> None:
+        """Follow them; while the scan does not fit to the pose nobody knows where they are."""
+        if not localised.fits:
+            self.others.send([])
+            self.around.send([])
+            return
+        x, y, theta = map(float, localised.pose)
+        others = self.tracks.update(seen, localised.pose, scan.ranges, scan.angles, scan.stamp)
+        cos, sin = math.cos(theta), math.sin(theta)
+        self.others.send(others)
+        self.around.send(
+            [
+                Disk(
+                    cos * (one.x - x) + sin * (one.y - y),
+                    cos * (one.y - y) - sin * (one.x - x),
+                    one.points,
+                    cos * one.vx + sin * one.vy,
+                    cos * one.vy - sin * one.vx,
+                )
+                for one in others
+            ]
+        )
 
 
 def foreign(scan: Scan, localised: Localised) -> Any:

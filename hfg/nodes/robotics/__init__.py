@@ -1,9 +1,10 @@
-"""What robots on wheels need: scans of a laser, where they are, where things are, paths.
+"""What robots on wheels need: scans of a laser, where they are, where things are and how they move, paths.
 
 _scans          scan_points, nearest_obstacle, expected_ranges, find_disks
 _matching       match_scan
 _landmarks      LandmarkMap
 _planning       plan_path, which needs scikit-image
+_tracking       TrackDisks
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ from hfg.nodes.robotics._scans import (
     nearest_obstacle,
     scan_points,
 )
+from hfg.nodes.robotics._tracking import DiskTracks, TrackDisks
 
 __all__ = [
     "Costs",
     "Covariance",
     "Disk",
+    "DiskTracks",
     "Landmark",
     "LandmarkMap",
     "LandmarkMixture",
@@ -36,6 +39,7 @@ __all__ = [
     "Ranges",
     "ScanMatch",
     "Segments",
+    "TrackDisks",
     "expected_ranges",
     "find_disks",
     "match_scan",

@@ -45,11 +45,15 @@ class Disk(NamedTuple):
       x: of its middle, in metres.
       y: of its middle.
       points: on how many points that stands.
+      vx: how fast it moves along x, in m/s; 0 as long as nobody has followed it.
+      vy: how fast along y.
     """
 
     x: float
     y: float
     points: int
+    vx: float = 0.0
+    vy: float = 0.0
 
 
 @node

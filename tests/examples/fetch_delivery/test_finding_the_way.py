@@ -11,9 +11,9 @@ import pytest
 
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.perception import laser, shape
-from examples.fetch_delivery.perception.following import FollowPath, Limits, follow, held_back
+from examples.fetch_delivery.perception.following import FollowPath, GiveWay, Limits, follow, held_back
 from examples.fetch_delivery.perception.localising import Localise, Localiser
-from examples.fetch_delivery.perception.planning import Path, PlanPath, plan
+from examples.fetch_delivery.perception.planning import Path, PlanPath, plan, queue
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Wall
 from examples.fetch_delivery.perception.sighting import find_targets, read_digits
 from examples.fetch_delivery.perception.signs import SignMap, delivery_station
@@ -289,3 +289,160 @@ def test_a_doubtful_pose_teaches_nothing() -> None:
     assert abs(signs[2].x - 5.9) < 0.01
     fire(node, slot="forget", value=2)
     assert fire(node, sightings=[], localised=doubtful).outputs["signs"] == {}
+
+
+# --- among others
+
+
+def standing(x: float, y: float) -> Disk:
+    return Disk(x, y, 9)
+
+
+def test_the_round_back_of_a_robot_is_no_wall() -> None:
+    world = Simulation(1, robots=2)
+    me, other = world.robots
+    me.x, me.y, me.theta, other.x, other.y = 0.0, 3.0, math.pi / 2, 0.0, 4.0
+    for _ in range(20):
+        world.step(0.05)
+        wall = laser.wall_ahead.function(world.scan(0))
+        assert wall is None or abs(wall.distance - 2.97) < 0.05
+
+
+def test_of_two_who_meet_both_paths_keep_to_the_right() -> None:
+    there = plan(np.array([-2.0, 3.5]), np.array([2.0, 3.5]), [standing(0.0, 3.5)])
+    back = plan(np.array([2.0, 3.5]), np.array([-2.0, 3.5]), [standing(0.0, 3.5)])
+    assert there is not None
+    assert back is not None
+    assert there[np.abs(there[:, 0]) < 0.3][:, 1].max() < 3.0
+    assert back[np.abs(back[:, 0]) < 0.3][:, 1].min() > 4.0
+
+
+def test_a_path_leads_behind_one_who_crosses() -> None:
+    start, goal = np.array([-2.5, 3.5]), np.array([2.5, 3.5])
+    for vy in (0.5, -0.5):
+        path = plan(start, goal, [Disk(0.0, 3.5, 9, 0.0, vy)])
+        assert path is not None
+        at = path[np.abs(path[:, 0]) < 0.2][:, 1]
+        assert (at < 3.0).all() if vy > 0 else (at > 4.0).all()
+
+
+def test_who_finds_somebody_at_the_station_waits_at_a_distance_until_it_is_free() -> None:
+    """The goal is 1.25 m before a station on the wall; somebody stands at the station, backs off and leaves."""
+    planner, follower = PlanPath(lane=0.9, every=1), FollowPath()
+    fire(planner, slot="goal", value=np.array([4.7, 0.0, 0.0]))
+
+    def drive_with(others: list[Disk], pose: Any, seconds: float) -> tuple[Any, list[str]]:
+        pose, events = np.array(pose), []
+        for tick in range(round(10 * seconds)):
+            me = Localised(pose, np.eye(3) * 1e-4, 1.0, True, tick / 10)
+            planned = fire(planner, localised=me, others=others).outputs
+            if "path" in planned:
+                fire(follower, slot="path", value=planned["path"])
+            fired = fire(follower, localised=me, scan=Scan(NOWHERE.ranges, NOWHERE.angles, tick / 10))
+            events += [name for name, _ in fired.events]
+            if "arrived" in events:
+                break
+            vx, vy, omega = fired.outputs.get("command", Twist())
+            cos, sin = math.cos(pose[2]), math.sin(pose[2])
+            pose = pose + 0.1 * np.array([cos * vx - sin * vy, sin * vx + cos * vy, omega])
+        return pose, events
+
+    waiting, events = drive_with([standing(5.6, 0.0)], (3.0, 3.0, 0.0), 20)
+    assert events == []
+    assert 1.1 < math.dist(waiting[:2], (4.7, 0.0)) < 1.8
+    looks = math.atan2(-waiting[1], 5.6 - waiting[0])
+    assert abs(math.remainder(waiting[2] - looks, 2 * math.pi)) < 0.1
+    still, events = drive_with([standing(4.9, 0.0)], waiting, 3)  # it backs off, and needs the room
+    assert (events, math.dist(still[:2], waiting[:2]) < 0.1) == ([], True)
+    there, events = drive_with([standing(3.8, -2.0)], waiting, 8)
+    assert events == ["arrived"]
+    assert math.dist(there[:2], (4.7, 0.0)) < 0.06
+
+
+def test_who_has_waited_for_long_at_a_station_says_so() -> None:
+    follower = FollowPath(queueing=5.0, patience=2.0)
+    fire(follower, slot="path", value=Path(np.array([(3.0, 0.0), (3.0, 0.0)]), 0.0, waits=True))
+    told = []
+    for tick in range(60):
+        fired = fire(follower, localised=sure(3, 0, 0), scan=Scan(NOWHERE.ranges, NOWHERE.angles, tick / 10))
+        assert fired.outputs == {"command": Twist()}
+        told += [(tick, name) for name, _ in fired.events]
+    assert told == [(51, "blocked")]
+
+
+def test_of_two_who_come_to_a_station_at_once_one_goes_on() -> None:
+    goal, one, other = np.array([4.7, 0.0, 0.0]), np.array([4.3, 0.6, 0.0]), np.array([4.2, -0.6, 0.0])
+    assert queue(one, goal, [standing(*other[:2])], 0.9) is None
+    assert queue(other, goal, [standing(*one[:2])], 0.9) is not None
+    assert queue(one, goal, [standing(3.0, 2.0)], 0.9) is None
+
+
+def test_no_command_leads_into_a_robot_behind_or_one_that_comes() -> None:
+    backwards, behind = Twist(-0.4, 0.0, 0.3), standing(-0.58, 0.0)
+    held = fired_through(backwards, [behind])
+    assert (round(held.vx, 3), held.omega) == (-0.141, 0.3)
+    assert fired_through(backwards, [standing(-0.55, 0.0)]).vx == 0
+    assert fired_through(backwards, [standing(0.55, 0.0)]) == backwards
+    ahead, far = Twist(0.6, 0.0, 0.0), Disk(1.2, 0.0, 9)
+    assert fired_through(ahead, [far]) == ahead
+    assert fired_through(ahead, [far._replace(vx=-0.6)]).vx < 0.15
+    along = fired_through(Twist(0.3, 0.3, 0.0), [standing(0.55, 0.0)])
+    assert along == pytest.approx((0.0, 0.3, 0.0), abs=1e-9)
+
+
+def fired_through(twist: Twist, around: list[Disk]) -> Twist:
+    node = GiveWay()
+    fire(node, slot="around", value=around)
+    ((name, held),) = fire(node, slot="command", value=twist).events
+    assert name == "held"
+    assert isinstance(held, Twist)
+    return held
+
+
+def test_a_robot_that_has_gone_behind_is_remembered_in_the_map_and_in_the_own_frame() -> None:
+    world = Simulation(2, robots=2)
+    me, other = world.robots
+    me.x, me.y, me.theta, other.x, other.y = 3.5, 0.0, 0.0, 4.5, 0.0
+    robot, node = Robot(world), laser.FollowRobots()
+    command = Twist(0.0, 0.0, 1.5)
+    for _ in range(25):
+        robot.measure()
+        seen = laser.other_robots.function(robot.scan, robot.localised)
+        fired = fire(node, seen=seen, scan=robot.scan, localised=robot.localised).outputs
+        world.command(0, command)
+        world.step(0.1)
+    assert seen == []
+    (known,), (around,) = fired["others"], fired["around"]
+    assert math.dist((known.x, known.y), robot.in_map(np.array([4.5, 0.0, 0.0]))[:2]) < 0.06
+    assert abs(math.atan2(around.y, around.x)) > math.radians(140)
+    lost = Localised(robot.localised.pose, robot.localised.covariance, 0.3, False, 0.0)
+    assert fire(node, seen=[], scan=robot.scan, localised=lost).outputs == {"others": [], "around": []}
+
+
+def test_two_robots_that_drive_at_each_other_pass_without_touching() -> None:
+    world = Simulation(4, robots=2)
+    ends = [np.array([-2.2, 3.6, 0.0]), np.array([2.2, 3.6, math.pi])]
+    drivers = []
+    for number, (begin, end) in enumerate(zip(ends, reversed(ends), strict=True)):
+        world.robots[number].x, world.robots[number].y, world.robots[number].theta = map(float, begin)
+        robot = Robot(world, number)
+        robot.measure()
+        drivers.append((robot, PlanPath(), FollowPath(), laser.FollowRobots(), GiveWay()))
+        fire(drivers[-1][1], slot="goal", value=robot.in_map(end))
+    for _ in range(150):
+        for robot, planner, follower, followed, give_way in drivers:
+            robot.measure()
+            seen = laser.other_robots.function(robot.scan, robot.localised)
+            known = fire(followed, seen=seen, scan=robot.scan, localised=robot.localised).outputs
+            fire(give_way, slot="around", value=known["around"])
+            planned = fire(planner, localised=robot.localised, others=known["others"]).outputs
+            if "path" in planned:
+                fire(follower, slot="path", value=planned["path"])
+            wanted = fire(follower, localised=robot.localised, scan=robot.scan).outputs.get("command", Twist())
+            ((_, held),) = fire(give_way, slot="command", value=wanted).events
+            world.command(robot.number, held)
+        world.step(0.1)
+    assert [score.contact_s for score in world.scores] == [0, 0]
+    for (robot, *_), end in zip(drivers, reversed(ends), strict=True):
+        body = world.robots[robot.number]
+        assert math.dist((body.x, body.y), end[:2]) < 0.1

@@ -94,7 +94,7 @@ def test_position_to_target_takes_no_bulls_eye_of_another_station_and_gives_up()
 
 
 def test_move_to_obstacle_slows_down_and_stops_at_its_distance() -> None:
-    far, near, there = (Scan(np.full(271, distance), ANGLES, 0.0) for distance in (2.0, 0.5, 0.36))
+    far, near, there = (Scan(np.full(271, distance), ANGLES, 0.0) for distance in (2.0, 0.4, 0.36))
     node = MoveToObstacle(distance=0.36, speed=0.2)
     assert fire(node, scan=far).outputs["command"] == Twist(0.2)
     assert 0.03 < fire(node, scan=near).outputs["command"].vx < 0.2
