@@ -13,6 +13,7 @@ import hfg
 from examples.fetch_delivery.machine.mission import Mission, Senses
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.mission import robot
+from examples.fetch_delivery.perception.following import GiveWay
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station
 from hfg.nodes.robotics import Disk
 
@@ -132,6 +133,10 @@ class Robot(robot.Robot):
             graph.connect(perception.ports.events[name], control.ports.slots[name])
         graph.connect(control.ask, perception.ask)
         graph.connect(control.forget, perception.forget)
-        for name in ("command", "lamp", "look_ahead", "look_into_basket"):
+        give_way = graph.add(GiveWay(), name="give_way")
+        graph.connect(perception.ports.outputs["around"], give_way.around)
+        graph.connect(control.ports.outputs["command"], give_way.command)
+        graph.connect(give_way.held, self.command.inner)
+        for name in ("lamp", "look_ahead", "look_into_basket"):
             graph.connect(control.ports.outputs[name], self.ports.outputs[name].inner)
         graph.connect(control.not_found, self.not_found.inner)
