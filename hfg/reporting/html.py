@@ -17,6 +17,7 @@ import msgspec
 from hfg.engine import Report, Statistics
 from hfg.errors import HfgError
 from hfg.graph import Graph
+from hfg.graph.drawing.picture import Shape, picture
 from hfg.graph.drawing.text import escaped
 from hfg.reporting.observing import MOST_NODES, SPANS, Observed
 from hfg.reporting.pictures import png
@@ -28,8 +29,22 @@ _MOST_DRAWN: Final = 600  # nodes; of a larger graph the subgraphs are folded
 _RULES: Final = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 
+def drawing(graph: Graph) -> tuple[str, str]:
+    """Draw a graph as a page shows it: nobody is active; and say what the drawing leaves out, if anything."""
+    nodes = [one for _, one in picture(graph).items if isinstance(one, Shape) and one.look == "node"]
+    if len(nodes) <= _MOST_DRAWN:
+        return graph.draw(format="svg", active=()), ""
+    top = sum(1 for _ in graph.nodes)
+    if top > _MOST_DRAWN:
+        return "", f"the drawing, for the graph has {top:,} nodes; graph.draw makes it"
+    return graph.draw(
+        format="svg", depth=0, active=()
+    ), f"what lies in subgraphs, for it is {len(nodes):,} nodes in all"
+
+
 def page(
     graph: Graph,
+    drawn: tuple[str, str],
     observed: Observed,
     report: Report,
     statistics: Statistics,
@@ -41,6 +56,7 @@ def page(
 
     Args:
       graph: as it is now.
+      drawn: what `drawing` gives.
       observed: what was kept of the run.
       report: how the run went.
       statistics: times and depths.
@@ -48,7 +64,7 @@ def page(
       outcome: how it ended; None if it goes on.
       when: seconds since 1970 at its begin; None in virtual time, where equal runs give equal pages.
     """
-    return "".join(_Page(graph, observed, report, statistics, error, outcome, when).parts())
+    return "".join(_Page(graph, drawn, observed, report, statistics, error, outcome, when).parts())
 
 
 class _Page:
@@ -57,6 +73,7 @@ class _Page:
     def __init__(
         self,
         graph: Graph,
+        drawn: tuple[str, str],
         observed: Observed,
         report: Report,
         statistics: Statistics,
@@ -64,7 +81,8 @@ class _Page:
         outcome: str | None,
         when: float | None,
     ) -> None:
-        self.graph, self.observed, self.report, self.statistics = graph, observed, report, statistics
+        self.graph, self.drawn = graph, drawn
+        self.observed, self.report, self.statistics = observed, report, statistics
         self.error, self.when = error, when
         self.outcome = outcome or "still running"
         self.begun_at = observed.begun_at or 0.0
@@ -135,10 +153,8 @@ class _Page:
     # --- who was active when
 
     def _drawing(self) -> Iterator[str]:
-        depth = None
-        if len(self.report.nodes) > _MOST_DRAWN:
-            depth = 0
-            self.notes.append(f"the drawing shows subgraphs folded, for the graph has {len(self.report.nodes):,} nodes")
+        if self.drawn[1]:
+            self.notes.append(self.drawn[1])
         if self.observed.edits:
             count = self.observed.edits
             times = "once" if count == 1 else f"{count:,} times"
@@ -151,7 +167,7 @@ class _Page:
         yield '<span class="right"><button type="button" id="fit">fit</button> '
         yield '<button type="button" id="smaller">-</button> <button type="button" id="larger">+</button>'
         yield '</span></div>\n<div class="picture" id="graph">'
-        yield self.graph.draw(format="svg", depth=depth, active=())
+        yield self.drawn[0]
         yield "</div>\n</section>\n"
 
     def _timeline(self) -> Iterator[str]:

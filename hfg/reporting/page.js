@@ -43,10 +43,11 @@
   byId("after").addEventListener("click", () => { const next = changes.find((at) => at > now); show(next === undefined ? data.duration : next); });
 
   const svg = byId("graph").querySelector("svg");
-  const width = svg.viewBox.baseVal.width, height = svg.viewBox.baseVal.height;
+  const width = svg ? svg.viewBox.baseVal.width : 1, height = svg ? svg.viewBox.baseVal.height : 1;
   let zoom = 1;
   function scale(by) {
     zoom = Math.min(Math.max(by, 0.05), 4);
+    if (!svg) return; // the graph is too large for a drawing
     svg.setAttribute("width", width * zoom);
     svg.setAttribute("height", height * zoom);
   }

@@ -13,7 +13,7 @@ from typing import Any, Final
 from hfg.engine import Run, VirtualTimeLoop
 from hfg.errors import UsageError
 from hfg.logs import Log
-from hfg.reporting.html import page
+from hfg.reporting.html import drawing, page
 from hfg.reporting.observing import Observed
 from hfg.trace import RunEnded, TraceEvent
 
@@ -38,8 +38,10 @@ class ReportPage:
         self._run = run
         self._observed = observed
         self._when = time.time() if say_when else None
+        # Made now: a run that is interrupted has no time for it in the end.
+        self._drawing = drawing(run.graph)
+        self._edits = 0
         self._outcome: str | None = None
-        self._text = ""
 
     def __call__(self, event: TraceEvent) -> None:
         """Take one event of the run."""
@@ -60,8 +62,12 @@ class ReportPage:
 
     def text(self) -> str:
         """Give the page as far as the run has come."""
-        run = self._run
-        return page(run.graph, self._observed, run.report(), run.statistics(), run.error, self._outcome, self._when)
+        run, observed = self._run, self._observed
+        if observed.edits != self._edits:
+            self._edits, self._drawing = observed.edits, drawing(run.graph)
+        return page(
+            run.graph, self._drawing, observed, run.report(), run.statistics(), run.error, self._outcome, self._when
+        )
 
 
 def report_page(run: Run, file: str | os.PathLike[str], *, pictures: int, picture_size: int) -> ReportPage:

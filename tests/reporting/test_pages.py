@@ -313,3 +313,33 @@ def test_a_graph_without_activity_has_a_page_too(tmp_path: Path) -> None:
     graph = hfg.Graph()
     _ = graph.add(script()) >> graph.add(sink())
     assert data_of(page_of(graph, tmp_path / "run.html"))["active"] == []
+
+
+def test_a_large_graph_is_drawn_folded_and_one_that_is_too_large_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hfg.reporting.html._MOST_DRAWN", 3)
+    graph = mission()
+    graph.add(Part(), name="other", enabled=False)
+    assert "<li>the drawing, for the graph has 4 nodes; graph.draw makes it</li>" in page_of(graph, tmp_path / "a.html")
+    monkeypatch.setattr("hfg.reporting.html._MOST_DRAWN", 4)
+    graph["other"].graph.add(State(), name="more")
+    page = page_of(graph, tmp_path / "b.html")
+    assert "<li>what lies in subgraphs, for it is 5 nodes in all</li>" in page
+    assert 'data-path="part"' in page
+    assert 'data-path="part/inner"' not in page
+
+
+def test_a_graph_that_was_edited_is_drawn_as_it_is_in_the_end(tmp_path: Path) -> None:
+    async def main() -> None:
+        graph = mission()
+        async with hfg.running(graph) as run:
+            run.report_page(tmp_path / "run.html")
+            await run.edit(hfg.commands.Rename("last", "goal"))
+            await run.wait_finished()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        runner.run(main())
+    page = (tmp_path / "run.html").read_text(encoding="utf-8")
+    assert 'data-path="goal"' in page
+    assert "<li>the graph was changed once; the drawing shows it as it was in the end</li>" in page

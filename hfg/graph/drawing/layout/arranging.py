@@ -119,12 +119,19 @@ class _Part:
         self.members, self.inner, self.blocks, self.lines, self.column = members, inner, blocks, lines, column
         self.partners = partners  # how far down the other ends of a dock's lines are, by what is known
         self.ways: list[tuple[Way, Way]] = [self._ways(line) for line in self.lines]
+        self.lines_of: list[set[int]] = [set() for _ in blocks]
+        for index, line in enumerate(lines):
+            self.lines_of[line.tail].add(index)
+            self.lines_of[line.head].add(index)
+        self.lowest_tier: dict[int, int] = {}
+        for block, at in zip(blocks, column, strict=True):
+            self.lowest_tier[at] = max(block.tier, self.lowest_tier.get(at, 0))
         self.dock_at = [[dock.at for dock in block.docks] for block in blocks]
         self.upper = [0.0] * len(self.blocks)  # how far the member reaches above the block
         self.heights: list[float] = []
         self.meets: dict[tuple[int, int, Way, str], float] = {}  # how far down the member lines of a dock meet it
-        for block in range(len(self.blocks)):
-            self._docks(block)
+        for number in range(len(self.blocks)):
+            self._docks(number)
         self._wires()
         self._place()
 
@@ -155,7 +162,8 @@ class _Part:
         """Choose where docks on top and bottom are, and the tracks on which their lines turn."""
         block = self.blocks[number]
         used: dict[int, set[tuple[Way, str]]] = {}
-        for line, (leaves, reaches) in zip(self.lines, self.ways, strict=True):
+        for index in self.lines_of[number]:
+            line, (leaves, reaches) = self.lines[index], self.ways[index]
             if line.tail == number:
                 used.setdefault(line.tail_dock, set()).add((leaves, line.kind))
             if line.head == number:
@@ -256,9 +264,7 @@ class _Part:
 
     def _middle_tier(self, column: int) -> int:
         """What passes a column of blocks that have ranks goes below them."""
-        return 1 + max(
-            (block.tier for block, at in zip(self.blocks, self.column, strict=True) if at == column), default=-1
-        )
+        return 1 + self.lowest_tier.get(column, -1)
 
     # --- up and down
 

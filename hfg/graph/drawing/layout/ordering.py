@@ -108,9 +108,11 @@ def _swap(
     place: list[float],
 ) -> None:
     """Let neighbours in a column change places as long as lines cross less by that."""
+    waiting = set(range(len(columns)))
     for _ in range(_SWAPS):
-        changed = False
-        for column in columns:
+        again: set[int] = set()
+        for number in sorted(waiting):
+            column = columns[number]
             heights = {one: [sorted(place[o] + t for o, t, _ in ties[one]) for ties in (left, right)] for one in column}
             for index in range(len(column) - 1):
                 upper, lower = column[index], column[index + 1]
@@ -122,8 +124,9 @@ def _swap(
                 if saved > 0:
                     column[index], column[index + 1] = lower, upper
                     place[upper], place[lower] = place[lower], place[upper]
-                    changed = True
-        if not changed:
+                    again |= {number - 1, number, number + 1}
+        waiting = again & set(range(len(columns)))
+        if not waiting:
             return
 
 
