@@ -131,10 +131,9 @@ def run(
         show.failure(error)
     if interrupt.count:
         show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
-        return 1
-    if error is None and report is not None and (not json or verbose):
+    elif error is None and report is not None and (not json or verbose):
         show.report(graph.name, report, verbose)
-    return 0 if error is None else 1
+    return 1 if interrupt.count or error is not None else 0
 
 
 @contextmanager

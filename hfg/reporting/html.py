@@ -22,7 +22,7 @@ from hfg.graph.drawing.text import escaped
 from hfg.reporting.observing import MOST_NODES, SPANS, Observed
 from hfg.reporting.pictures import png
 
-__all__ = ["page"]
+__all__ = ["Page", "drawing"]
 
 _MOST_ROWS: Final = 2000  # of a table
 _MOST_DRAWN: Final = 600  # nodes; of a larger graph the subgraphs are folded
@@ -42,17 +42,8 @@ def drawing(graph: Graph) -> tuple[str, str]:
     ), f"what lies in subgraphs, for it is {len(nodes):,} nodes in all"
 
 
-def page(
-    graph: Graph,
-    drawn: tuple[str, str],
-    observed: Observed,
-    report: Report,
-    statistics: Statistics,
-    error: HfgError | None,
-    outcome: str | None,
-    when: float | None,
-) -> str:
-    """Write the page.
+class Page:
+    """The page of a run, which is written once.
 
     Args:
       graph: as it is now.
@@ -64,11 +55,6 @@ def page(
       outcome: how it ended; None if it goes on.
       when: seconds since 1970 at its begin; None in virtual time, where equal runs give equal pages.
     """
-    return "".join(_Page(graph, drawn, observed, report, statistics, error, outcome, when).parts())
-
-
-class _Page:
-    """One page."""
 
     def __init__(
         self,
@@ -88,8 +74,11 @@ class _Page:
         self.begun_at = observed.begun_at or 0.0
         self.notes: list[str] = []  # what was left out
 
-    def parts(self) -> Iterator[str]:
-        """Give the text of the page, piece by piece."""
+    def text(self) -> str:
+        """Write it."""
+        return "".join(self._pieces())
+
+    def _pieces(self) -> Iterator[str]:
         body = [
             *self._drawing(),
             *self._timeline(),

@@ -13,7 +13,7 @@ from typing import Any, Final
 from hfg.engine import Run, VirtualTimeLoop
 from hfg.errors import UsageError
 from hfg.logs import Log
-from hfg.reporting.html import drawing, page
+from hfg.reporting.html import Page, drawing
 from hfg.reporting.observing import Observed
 from hfg.trace import RunEnded, TraceEvent
 
@@ -65,9 +65,8 @@ class ReportPage:
         run, observed = self._run, self._observed
         if observed.edits != self._edits:
             self._edits, self._drawing = observed.edits, drawing(run.graph)
-        return page(
-            run.graph, self._drawing, observed, run.report(), run.statistics(), run.error, self._outcome, self._when
-        )
+        numbers = run.report(), run.statistics()
+        return Page(run.graph, self._drawing, observed, *numbers, run.error, self._outcome, self._when).text()
 
 
 def report_page(run: Run, file: str | os.PathLike[str], *, pictures: int, picture_size: int) -> ReportPage:

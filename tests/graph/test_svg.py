@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from reactivex import operators as ops
 
 import hfg
+from hfg.graph.drawing.parts import Card
 from hfg.graph.drawing.picture import Box, Pin, Shape, View, picture
-from hfg.graph.drawing.sheet import Card, Sheet, sheet
+from hfg.graph.drawing.sheet import Sheet, sheet
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -14,9 +14,9 @@ from annotated_types import Ge, Gt
 import hfg
 from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
 from examples.fetch_delivery.mission.driving import GoTo, LookAround
-from examples.fetch_delivery.mission.visiting import Visit
+from examples.fetch_delivery.mission.visiting import AtStation, Visit
 from examples.fetch_delivery.perception import shape
-from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station, wrapped
+from examples.fetch_delivery.perception.records import Localised, Sign, Station, wrapped
 from examples.fetch_delivery.perception.signs import delivery_station
 from hfg.nodes import activity
 from hfg.nodes.robotics import Disk
@@ -85,37 +85,17 @@ def _key(station: Station) -> tuple[int, int]:
     return round(10 * station.x), round(10 * station.y)
 
 
-class FetchCube(hfg.Subgraph):
+class FetchCube(AtStation):
     """Fetch a cube from one of the filling stations; where it fails, try another one.
 
     Attributes:
-      localised: where the robot is.
-      odometry: what the wheels say.
-      scan: of the laser.
-      others: other robots.
-      targets: bull's-eyes that are seen.
       stations: the filling stations that are known.
       unwanted: a cube with this number is to be given back for another one.
-      number: a cube with this number lies in the basket.
-      none: no cube lies there.
-      command: velocities.
-      lamp: whether the lamp shall be on.
-      look: asks for a picture of what is ahead.
-      look_into_basket: asks for one of the basket.
-      ask: asks the cube detection to look anew.
       begin: where activity arrives.
-      done: a cube lies in the basket.
     """
 
-    localised, odometry, scan = hfg.Input(Localised), hfg.Input(Odometry), hfg.Input(Scan)
-    others, targets = hfg.Input(list[Disk]), hfg.Input(list[Sighting])
     stations, unwanted = hfg.slot(type=list[Station]), hfg.slot(type=int)
-    number, none = hfg.slot(type=int), hfg.slot(type=object)
-    command, lamp = hfg.Output(Twist), hfg.Output(bool)
-    look, look_into_basket = hfg.Output(object), hfg.Output(Scan)
-    ask = hfg.Event()
     begin = hfg.slot(type=object)
-    done = hfg.Event(object)
 
     def build(self, graph: hfg.Graph) -> None:
         """Put the choice before the visit."""
@@ -154,35 +134,16 @@ class Destination(hfg.Node):
         self.station.trigger(delivery_station(sign))
 
 
-class DeliverCube(hfg.Subgraph):
+class DeliverCube(AtStation):
     """Bring the cube to the station whose sign is where the map has it; try that more than once.
 
     Attributes:
-      localised: where the robot is.
-      odometry: what the wheels say.
-      scan: of the laser.
-      others: other robots.
-      targets: bull's-eyes that are seen.
-      number: a cube with this number lies in the basket.
-      none: no cube lies there.
-      command: velocities.
-      lamp: whether the lamp shall be on.
-      look: asks for a picture of what is ahead.
-      look_into_basket: asks for one of the basket.
-      ask: asks the cube detection to look anew.
       begin: where the sign is; where activity arrives.
-      done: the cube is delivered.
-      gave_up: it could not be.
+      gave_up: the cube could not be delivered.
     """
 
-    localised, odometry, scan = hfg.Input(Localised), hfg.Input(Odometry), hfg.Input(Scan)
-    others, targets = hfg.Input(list[Disk]), hfg.Input(list[Sighting])
-    number, none = hfg.slot(type=int), hfg.slot(type=object)
-    command, lamp = hfg.Output(Twist), hfg.Output(bool)
-    look, look_into_basket = hfg.Output(object), hfg.Output(Scan)
-    ask = hfg.Event()
     begin = hfg.slot(type=Sign)
-    done, gave_up = hfg.Event(object), hfg.Event(object)
+    gave_up = hfg.Event(object)
 
     def build(self, graph: hfg.Graph) -> None:
         """Put the sign before the visit, and tries around that."""
@@ -201,7 +162,7 @@ class DeliverCube(hfg.Subgraph):
         relay(graph, self, visit)
 
 
-def relay(graph: hfg.Graph, outer: FetchCube | DeliverCube, visit: Visit) -> None:
+def relay(graph: hfg.Graph, outer: AtStation, visit: Visit) -> None:
     """Lead data in and out of an errand's visit."""
     for name in ("localised", "odometry", "scan", "others", "targets"):
         graph.connect(outer.ports.inputs[name].inner, visit.ports.inputs[name])

@@ -116,12 +116,10 @@ class WaitForCube(hfg.Node):
             self.done.trigger(0)
 
 
-class Visit(hfg.Subgraph):
-    """Go to a station, stand below its ring, show the lamp until a cube has changed hands, and leave.
+class AtStation(hfg.Subgraph):
+    """What every errand to a station needs, and what it gives.
 
     Attributes:
-      loading: whether a cube shall come, or go.
-      queueing: so long it waits for another robot to leave the station.
       localised: where the robot is.
       odometry: what the wheels say.
       scan: of the laser.
@@ -129,27 +127,37 @@ class Visit(hfg.Subgraph):
       targets: bull's-eyes that are seen.
       number: a cube with this number lies in the basket.
       none: no cube lies there.
-      unwanted: a cube with this number is to be given back.
       command: velocities.
       lamp: whether the lamp shall be on.
       look: asks for a picture of what is ahead.
       look_into_basket: asks for one of the basket.
       ask: asks the cube detection to look anew.
-      begin: the station; where activity arrives.
       done: a cube has changed hands.
-      gave_up: it has not.
+    """
+
+    localised, odometry, scan = hfg.Input(Localised), hfg.Input(Odometry), hfg.Input(Scan)
+    others, targets = hfg.Input(list[Disk]), hfg.Input(list[Sighting])
+    number, none = hfg.slot(type=int), hfg.slot(type=object)
+    command, lamp = hfg.Output(Twist), hfg.Output(bool)
+    look, look_into_basket = hfg.Output(object), hfg.Output(Scan)
+    ask, done = hfg.Event(), hfg.Event(object)
+
+
+class Visit(AtStation):
+    """Go to a station, stand below its ring, show the lamp until a cube has changed hands, and leave.
+
+    Attributes:
+      loading: whether a cube shall come, or go.
+      queueing: so long it waits for another robot to leave the station.
+      unwanted: a cube with this number is to be given back.
+      begin: the station; where activity arrives.
+      gave_up: no cube has changed hands.
     """
 
     loading = hfg.Parameter(True)
     queueing = hfg.Parameter(60.0)
-    localised, odometry, scan = hfg.Input(Localised), hfg.Input(Odometry), hfg.Input(Scan)
-    others, targets = hfg.Input(list[Disk]), hfg.Input(list[Sighting])
-    number, none, unwanted = hfg.slot(type=int), hfg.slot(type=object), hfg.slot(type=int)
-    command, lamp = hfg.Output(Twist), hfg.Output(bool)
-    look, look_into_basket = hfg.Output(object), hfg.Output(Scan)
-    ask = hfg.Event()
-    begin = hfg.slot(type=Station)
-    done, gave_up = hfg.Event(object), hfg.Event(object)
+    unwanted, begin = hfg.slot(type=int), hfg.slot(type=Station)
+    gave_up = hfg.Event(object)
 
     def build(self, graph: hfg.Graph) -> None:
         """Put the steps in a row, and behind each what follows if it fails."""

@@ -275,6 +275,10 @@ class Core:
         self._has_no_plan()
         self._has_nothing_under_way()
 
+    def recall_with(self, recall: Callable[[Worker], None] | None) -> None:
+        """Let nodes get back, before they are set up, the state that was kept of them; None: no more."""
+        self.recall = recall
+
     def _has_no_plan(self) -> None:
         self.workers: list[Worker] = []
         self._numbers = itertools.count()

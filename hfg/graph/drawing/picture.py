@@ -96,6 +96,10 @@ class Shape(msgspec.Struct):
     is_enabled: bool = True
     is_folded: bool = False
 
+    def be_state(self) -> None:
+        """An active edge meets it."""
+        self.is_state = True
+
     @property
     def label(self) -> str:
         """Name and details as lines of text."""
@@ -225,8 +229,8 @@ class _Look:
                 if inner is None or inner not in insides or not (inner.nodes or ports):
                     self._node(depth, name, node, group)
                     continue
-                box = Box(f"g{self.boxes}", name, _details(options), inner.path, node._type.qualname, group)
-                box.is_active, box.is_enabled = self._is_active(node), options.enabled
+                said = _details(options), inner.path, node._type.qualname, group
+                box = Box(f"g{self.boxes}", name, *said, self._is_active(node), options.enabled)
                 self.picture.items.append((depth, box))
                 self.boxes += 1
                 for port, port_name in ports.items():
@@ -247,12 +251,21 @@ class _Look:
 
     def _node(self, depth: int, name: str, node: Node, group: str) -> None:
         inner = inside(node)
-        shape = self.shapes[self._shape(depth, node, name, "node", node._type.qualname)]
-        shape.details, shape.path, shape.group = _details(node._options), path_of(node), group
-        shape.is_enabled, shape.is_folded = node._options.enabled, inner is not None and bool(inner.nodes)
-        if self.view.all_ports:
-            declared = _declared(node)
-            shape.pins = [Pin(*port, order) for port, order in declared.items() if port[0] != "parameter"]
+        declared = _declared(node) if self.view.all_ports else {}
+        shape = Shape(
+            self._next_id,
+            name,
+            "node",
+            type_name=node._type.qualname,
+            is_active=self._is_active(node),
+            details=_details(node._options),
+            path=path_of(node),
+            group=group,
+            pins=[Pin(*port, order) for port, order in declared.items() if port[0] != "parameter"],
+            is_enabled=node._options.enabled,
+            is_folded=inner is not None and bool(inner.nodes),
+        )
+        self._show(depth, node, shape)
 
     def _port_of_box(self, depth: int, port: Port | tuple[Node, str], name: str) -> None:
         self._shape(depth, port, name, "port", port.kind if isinstance(port, Port) else port[1])
@@ -270,7 +283,7 @@ class _Look:
         self.picture.arrows.append(arrow)
         for end in ends:
             if edge.active and self.shapes[end].look == "node":
-                self.shapes[end].is_state = True
+                self.shapes[end].be_state()
 
     def _end(self, end: SourceEnd) -> str:
         if not is_port(end):
@@ -306,14 +319,20 @@ class _Look:
         for name, ports in level.promotions.by_name.items():
             outer = self.ids.get(level.owner.ports.parameters[name])
             if outer is not None:
-                self.picture.arrows += [
+                self.picture.arrows.extend(
                     Arrow(outer, self._end(inner), f"→ {inner.name}", None, self._pin(inner, inner.name))
                     for inner in ports
-                ]
+                )
 
     def _shape(self, depth: int, of: object, name: str, look: Look, type_name: str) -> str:
-        shape = Shape(f"n{len(self.shapes)}", name, look, type_name=type_name)
-        shape.is_active = isinstance(of, Node) and self._is_active(of)
+        is_active = isinstance(of, Node) and self._is_active(of)
+        return self._show(depth, of, Shape(self._next_id, name, look, type_name=type_name, is_active=is_active))
+
+    @property
+    def _next_id(self) -> str:
+        return f"n{len(self.shapes)}"
+
+    def _show(self, depth: int, of: object, shape: Shape) -> str:
         self.picture.items.append((depth, shape))
         self.shapes[shape.id] = shape
         self.ids[of] = shape.id

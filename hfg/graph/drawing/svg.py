@@ -7,12 +7,14 @@ Stands on `sheet`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterable, Iterator, Sequence, Set
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from hfg.graph.drawing.layout.blocks import Point
+from hfg.graph.drawing.parts import DETAIL, LONGEST_NAME, Card, Mark, Text
 from hfg.graph.drawing.picture import EVERYTHING, Arrow, Box, Picture, Shape, View, picture
-from hfg.graph.drawing.sheet import DETAIL, LONGEST_NAME, Card, Lead, Mark, Sheet, Text, sheet
+from hfg.graph.drawing.sheet import Lead, Sheet, sheet
 from hfg.graph.drawing.text import FONTS, escaped, is_measured, shortened, width_of
 
 if TYPE_CHECKING:
@@ -193,31 +195,46 @@ def _port(mark: Mark) -> str:
 # --- lines
 
 
+class _Pen(NamedTuple):
+    """How a line of some kind is drawn."""
+
+    shade: str
+    ink: str
+    halo: float
+    dot: float
+    look: str
+
+
+def _pen(arrow: Arrow) -> _Pen:
+    if arrow.is_gate:
+        return _Pen(
+            " hfg-light", _LIGHT_INK, 6, 2.6, 'stroke-width="1.8" stroke-dasharray="1.5 4" stroke-linecap="round"'
+        )
+    shade, ink = (" hfg-light", _LIGHT_INK) if arrow.is_signal else ("", _INK)
+    if arrow.is_active:
+        return _Pen(shade, ink, 9, 3.4, 'stroke-width="5"')
+    dash = ' stroke-dasharray="6 3.5"' if arrow.is_signal else ""
+    return _Pen(shade, ink, 6, 2.6, f'stroke-width="1.3"{dash}')
+
+
 def _lead(lead: Lead) -> Iterator[str]:
     """Draw lines that run together; a rim of paper around them shows that those they cross lie below."""
     first = lead.arrows[0]
-    light = " hfg-light" if first.is_signal or first.is_gate else ""
-    ink = _LIGHT_INK if light else _INK
+    pen = _pen(first)
     heads = [_head(way, arrow) for way, arrow in zip(lead.ways, lead.arrows, strict=True)]
     d = "".join(_curve(way, end) for way, (_, end) in zip(lead.ways, heads, strict=True))
-    dash = ' stroke-dasharray="1.5 4"' if first.is_gate else ' stroke-dasharray="6 3.5"' if light else ""
     told = "\n".join(_said(arrow) for arrow in lead.arrows)
     yield f'<g class="hfg-edge" fill="none"><title>{escaped(told)}</title>'
     halo = "".join(_curve(*_within(way)) for way in lead.ways if len(way) > 1)
-    yield f'<path class="hfg-halo" d="{halo}" stroke="{_PAPER}" stroke-width="{9 if first.is_active else 6}"/>'
-    if first.is_active:
-        yield f'<path class="hfg-line{light}" d="{d}" stroke="{ink}" stroke-width="5"/>'
+    yield f'<path class="hfg-halo" d="{halo}" stroke="{_PAPER}" stroke-width="{pen.halo}"/>'
+    yield f'<path class="hfg-line{pen.shade}" d="{d}" stroke="{pen.ink}" {pen.look}/>'
+    if first.is_active:  # two lines, for there is paper between them
         yield f'<path class="hfg-gap" d="{d}" stroke="{_PAPER}" stroke-width="2.2" style="fill:none"/>'
-    else:
-        look = f'stroke-width="{1.8 if first.is_gate else 1.3}"{dash}'
-        look += ' stroke-linecap="round"' if first.is_gate else ""
-        yield f'<path class="hfg-line{light}" d="{d}" stroke="{ink}" {look}/>'
     for x, y in lead.dots:
-        radius = 3.4 if first.is_active else 2.6
-        yield f'<circle class="hfg-tip{light}" cx="{_n(x)}" cy="{_n(y)}" r="{radius}" fill="{ink}"/>'
+        yield f'<circle class="hfg-tip{pen.shade}" cx="{_n(x)}" cy="{_n(y)}" r="{pen.dot}" fill="{pen.ink}"/>'
     for (tip, _), arrow in zip(heads, lead.arrows, strict=True):
         if not arrow.is_gate:
-            yield f'<path class="hfg-tip{light}" d="{tip}" fill="{ink}"/>'
+            yield f'<path class="hfg-tip{pen.shade}" d="{tip}" fill="{pen.ink}"/>'
     yield "</g>\n"
     for text in lead.texts:
         yield _text(text, " hfg-free")
@@ -246,7 +263,7 @@ def _curve(way: Sequence[Point], end: Point) -> str:
     """Draw a way with round corners."""
     points = [*way[:-1], end]
     parts = [f"M{_n(points[0][0])} {_n(points[0][1])}"]
-    for (ax, ay), (bx, by), (cx, cy) in zip(points, points[1:], points[2:]):  # noqa: B905 - neighbours
+    for ((ax, ay), (bx, by)), (_, (cx, cy)) in pairwise(pairwise(points)):
         radius = min(_ROUND, (abs(bx - ax) + abs(by - ay)) / 2, (abs(cx - bx) + abs(cy - by)) / 2)
         from_x, from_y = bx - radius * ((bx > ax) - (bx < ax)), by - radius * ((by > ay) - (by < ay))
         to_x, to_y = bx + radius * ((cx > bx) - (cx < bx)), by + radius * ((cy > by) - (cy < by))
@@ -287,33 +304,41 @@ def _text(text: Text, more: str = "") -> str:
 
 def _legend(seen: Picture, laid: Sheet) -> Iterator[tuple[float, str]]:
     """Give each entry with the room it takes; only what is drawn is explained."""
-    cards = [card.of for card in laid.cards]
-    arrows = [arrow for lead in laid.leads for arrow in lead.arrows]
-    kinds = {mark.kind for card in laid.cards for mark in card.marks}
-    if kinds & {"input", "output"}:
-        yield _entry(_port(Mark(8.0, 0.0, "input", "")), 16, "synchronous")
-    if kinds & {"slot", "event"}:
-        yield _entry(_port(Mark(8.0, 0.0, "slot", "")), 16, "asynchronous")
-    if "parameter" in kinds:
-        yield _entry(_port(Mark(8.0, 0.0, "parameter", "")), 16, "parameter")
-    if any(not (arrow.is_signal or arrow.is_active or arrow.is_gate) for arrow in arrows):
-        yield _entry(_sample(Arrow("", "", "")), 34, "data")
-    if any(arrow.is_signal and not arrow.is_active for arrow in arrows):
-        yield _entry(_sample(Arrow("", "", "", is_signal=True)), 34, "signals")
-    if any(arrow.is_active for arrow in arrows):
-        yield _entry(_sample(Arrow("", "", "", is_active=True)), 34, "active edge")
-    if any(arrow.is_gate for arrow in arrows):
-        bar = f'<rect x="26" y="-6" width="5" height="12" fill="{_PAPER}" stroke="{_INK}"/>'
-        yield _entry(_sample(Arrow("", "", "", is_gate=True)) + bar, 36, "gate: rests unless active")
-    if any(of.is_active for of in cards):
-        look = f'rx="3" fill="#ffffff" stroke="{_ACTIVE}" stroke-width="3"'
-        yield _entry(f'<rect class="hfg-on" x="2" y="-6" width="20" height="12" {look}/>', 26, "active")
+    used = {mark.kind for card in laid.cards for mark in card.marks}
+    used |= {_meaning(arrow) for lead in laid.leads for arrow in lead.arrows}
+    used |= {"active node" for card in laid.cards if card.of.is_active}
+    bar = f'<rect x="26" y="-6" width="5" height="12" fill="{_PAPER}" stroke="{_INK}"/>'
+    lit = f'rx="3" fill="#ffffff" stroke="{_ACTIVE}" stroke-width="3"'
+    for meant, drawn, room, says in (
+        ({"input", "output"}, _port(Mark(8.0, 0.0, "input", "")), 16, "synchronous"),
+        ({"slot", "event"}, _port(Mark(8.0, 0.0, "slot", "")), 16, "asynchronous"),
+        ({"parameter"}, _port(Mark(8.0, 0.0, "parameter", "")), 16, "parameter"),
+        ({"data"}, _sample(Arrow("", "", "")), 34, "data"),
+        ({"signals"}, _sample(Arrow("", "", "", is_signal=True)), 34, "signals"),
+        ({"active edge"}, _sample(Arrow("", "", "", is_active=True)), 34, "active edge"),
+        ({"gate line"}, _sample(Arrow("", "", "", is_gate=True)) + bar, 36, "gate: rests unless active"),
+        ({"active node"}, f'<rect class="hfg-on" x="2" y="-6" width="20" height="12" {lit}/>', 26, "active"),
+    ):
+        if used & meant:
+            yield _entry(drawn, room, says)
+    yield from _legend_of_groups(seen, {card.of.group for card in laid.cards if card.of.path})
+
+
+def _meaning(arrow: Arrow) -> str:
+    if arrow.is_gate:
+        return "gate line"
+    return "active edge" if arrow.is_active else "signals" if arrow.is_signal else "data"
+
+
+def _legend_of_groups(seen: Picture, used: Set[str]) -> Iterator[tuple[float, str]]:
     colours = _colours(seen)
-    used = {of.group for of in cards if of.path}
-    for group in (group for group in seen.groups if group in used and used - {"loop"}):
-        look = f'rx="2" fill="{colours[group]}" stroke="{_INK}"'
-        rect = f'<rect class="hfg-node" x="2" y="-6" width="16" height="12" {look}/>'
-        yield _entry(rect, 22, "on the loop" if group == "loop" else f"group {group}")
+    if used <= {"loop"}:
+        return
+    for group in seen.groups:
+        if group in used:
+            look = f'rx="2" fill="{colours[group]}" stroke="{_INK}"'
+            rect = f'<rect class="hfg-node" x="2" y="-6" width="16" height="12" {look}/>'
+            yield _entry(rect, 22, "on the loop" if group == "loop" else f"group {group}")
 
 
 def _entry(drawn: str, room: float, says: str) -> tuple[float, str]:

@@ -47,6 +47,19 @@ class _Place:
     def __init__(self, at: Any, variance: float, look: Any) -> None:
         self.mean, self.variance, self.count, self.look = at, variance, 1.0, look
 
+    def learn(self, share: float, at: Any, variance: float, look: Any, *, least: float) -> None:
+        """Take in a sighting that belongs to it by a share; it never becomes surer than `least`."""
+        gain = share * self.variance / (self.variance + variance)
+        self.mean = self.mean + gain * (at - self.mean)
+        self.variance = max(self.variance * (1 - gain), least)
+        self.look = self.look + share * look
+        self.count += share
+
+    def fade(self, by: float) -> None:
+        """Another place of its label was seen."""
+        if self.count > 0.1:
+            self.count *= by
+
 
 class LandmarkMixture:
     """The places of all labels; the plain part of `LandmarkMap`.
@@ -88,14 +101,10 @@ class LandmarkMixture:
             shares = [0.0] * len(places)
         for one, share in zip(places, shares, strict=True):
             if share > 1e-3:
-                gain = share * one.variance / (one.variance + variance)
-                one.mean = one.mean + gain * (at - one.mean)
                 # What is seen from one place errs in one direction: no number of sightings makes it quite sure.
-                one.variance = max(one.variance * (1 - gain), (self.spread / 5) ** 2)
-                one.look = one.look + share * look
-                one.count += share
-            if share < 0.5 and one.count > 0.1:
-                one.count *= self.fading
+                one.learn(share, at, variance, look, least=(self.spread / 5) ** 2)
+            if share < 0.5:
+                one.fade(self.fading)
 
     def known(self, least: float = 2.0, ahead: float = 0.6) -> dict[str, Landmark]:
         """Give the place of each label that is known.

@@ -179,7 +179,7 @@ class Keeper:
         self._hints: dict[type, dict[str, Any]] = {}
         self._codecs: dict[Any, TokenCodec[Any] | None] = {}
         if kept is not None:
-            engine.core.recall = self._recall
+            engine.core.recall_with(self._recall)
 
     def stand_at(
         self, inlets: Mapping[str, Inlet], outlets: Mapping[str, Outlet], links: Mapping[str, Leaving]
@@ -355,7 +355,7 @@ class Keeper:
                 if self.kept is not None:
                     self._recall(worker)  # what setup() has written is older
                 self._own[worker.path] = _copies(_own(worker.node))
-        core.recall = None
+        core.recall_with(None)
         if self.kept is not None:
             self._go_on(self.kept)
         self._known = self._signature()

@@ -7,24 +7,24 @@ layout a block is higher than it is, and all its lines meet its left and right.
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Iterator, Sequence
-from typing import Final, Literal, TypeAlias
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, TypeAlias
+
+from msgspec.structs import replace
 
 from hfg.graph.drawing.layout.blocks import Block, Line, Plan, Point
 from hfg.graph.drawing.layout.channels import Trunk, tracks
 from hfg.graph.drawing.layout.columns import columns
+from hfg.graph.drawing.layout.docking import ENDS, TRACK, Turn, Way, docked
 from hfg.graph.drawing.layout.ordering import Ties, ordered
 from hfg.graph.drawing.layout.placing import Pulls, placed
 
 __all__ = ["arrange"]
 
-Way: TypeAlias = Literal["E", "W"]
+Wire: TypeAlias = tuple[int, int, Way, str]
+"""Lines that run together as long as they can: from which block and dock, on which side, and of which kind."""
 
-_TRACK: Final = 9.0  # between two lines beside each other
-_ABOVE: Final = 20.0  # from the lowest track above a block to the block: an arrow's head and a port
-_UNDER: Final = 13.0  # from a block to the first track below it
 _BEFORE: Final = 22.0  # from the last track of a channel to the next column
 _BEHIND: Final = 14.0  # from a column to the first track
 _STRAIGHT: Final = 34.0  # the width of a channel without tracks
@@ -33,7 +33,6 @@ _WIRE_GAP: Final = 10.0  # between two lines that pass
 _APART: Final = 34.0  # between what is not connected
 _SMALL: Final = 60  # blocks and places where lines pass
 _LARGE: Final = 600
-_ENDS: Final = ""  # lines of all kinds meet where they end
 _TRIES: Final = 2  # with docks in another order, for all but large drawings
 _CROSSING: Final = 60.0  # as bad as lines longer by so much
 _BROAD: Final = 1.7  # how broad a drawing of several parts is meant to be, against its height
@@ -85,13 +84,11 @@ def _best(blocks: Sequence[Block], lines: Sequence[Line], members: list[int], in
     """Lay a part out a few times, each time with docks in the order of what they led to the time before."""
     number = {block: index for index, block in enumerate(members)}
     own = [blocks[one] for one in members]
-    renumbered = []
-    for index in inner:
-        line = copy.copy(lines[index])
-        line.tail, line.head = number[line.tail], number[line.head]
-        renumbered.append(line)
+    renumbered = [
+        replace(line, tail=number[line.tail], head=number[line.head]) for line in (lines[one] for one in inner)
+    ]
     column = columns(own, renumbered)
-    best = part = _Part(members, inner, own, renumbered, column, {})
+    best = part = _Part(members, inner, own, renumbered, column, [{} for _ in own])
     for _ in range(_TRIES if len(part.at_column) < _LARGE else 1):
         part = _Part(members, inner, own, renumbered, column, part.heights_of_partners())
         if part.cost < best.cost:
@@ -114,35 +111,26 @@ class _Part:
         blocks: list[Block],
         lines: list[Line],
         column: list[int],
-        partners: dict[tuple[int, int], float],
+        partners: Sequence[Mapping[int, float]],
     ) -> None:
         self.members, self.inner, self.blocks, self.lines, self.column = members, inner, blocks, lines, column
         self.partners = partners  # how far down the other ends of a dock's lines are, by what is known
         self.ways: list[tuple[Way, Way]] = [self._ways(line) for line in self.lines]
-        self.lines_of: list[set[int]] = [set() for _ in blocks]
-        for index, line in enumerate(lines):
-            self.lines_of[line.tail].add(index)
-            self.lines_of[line.head].add(index)
         self.lowest_tier: dict[int, int] = {}
         for block, at in zip(blocks, column, strict=True):
             self.lowest_tier[at] = max(block.tier, self.lowest_tier.get(at, 0))
-        self.dock_at = [[dock.at for dock in block.docks] for block in blocks]
-        self.upper = [0.0] * len(self.blocks)  # how far the member reaches above the block
-        self.heights: list[float] = []
-        self.meets: dict[tuple[int, int, Way, str], float] = {}  # how far down the member lines of a dock meet it
-        for number in range(len(self.blocks)):
-            self._docks(number)
+        self._dock()
         self._wires()
         self._place()
 
-    def heights_of_partners(self) -> dict[tuple[int, int], float]:
-        """Give for each dock how far down the lines from it lead, in the mean."""
-        found: dict[tuple[int, int], list[float]] = {}
+    def heights_of_partners(self) -> list[dict[int, float]]:
+        """Give for each dock of each block how far down the lines from it lead, in the mean."""
+        found: list[dict[int, list[float]]] = [{} for _ in self.blocks]
         for line, legs in zip(self.lines, self.legs, strict=True):
             (_, _, (behind, down)), (_, (before, up), _) = legs[0], legs[-1]
-            found.setdefault((line.tail, line.tail_dock), []).append(self.y[behind] + down)
-            found.setdefault((line.head, line.head_dock), []).append(self.y[before] + up)
-        return {dock: sum(heights) / len(heights) for dock, heights in found.items()}
+            found[line.tail].setdefault(line.tail_dock, []).append(self.y[behind] + down)
+            found[line.head].setdefault(line.head_dock, []).append(self.y[before] + up)
+        return [{dock: sum(heights) / len(heights) for dock, heights in docks.items()} for docks in found]
 
     # --- which lines turn where
 
@@ -158,62 +146,17 @@ class _Part:
             "W" if reaches == "left" else "E" if reaches == "right" else from_left,
         )
 
-    def _docks(self, number: int) -> None:
-        """Choose where docks on top and bottom are, and the tracks on which their lines turn."""
-        block = self.blocks[number]
-        used: dict[int, set[tuple[Way, str]]] = {}
-        for index in self.lines_of[number]:
-            line, (leaves, reaches) = self.lines[index], self.ways[index]
-            if line.tail == number:
-                used.setdefault(line.tail_dock, set()).add((leaves, line.kind))
-            if line.head == number:
-                used.setdefault(line.head_dock, set()).add((reaches, _ENDS))
-        turned = {index: {way for way, _ in ways} for index, ways in used.items()}
-        depth = {"top": 0.0, "bottom": 0.0}
-        levels: dict[tuple[int, tuple[Way, str]], int] = {}
-        for side in depth:
-            docks = [index for index, dock in enumerate(block.docks) if dock.side == side]
-            if not any(block.docks[index].is_fixed for index in docks):
-                docks.sort(key=lambda index: self._rank_of_dock(number, index, turned.get(index, set())))
-                spare = (block.width - sum(block.docks[index].room for index in docks)) / (len(docks) + 1)
-                x = spare
-                for index in docks:
-                    self.dock_at[number][index] = round(x + block.docks[index].room / 2)
-                    x += block.docks[index].room + spare
-            else:
-                docks.sort(key=lambda index: block.docks[index].at)
-            west = [(index, way) for index in docks for way in sorted(used.get(index, ())) if way[0] == "W"]
-            east = [(index, way) for index in docks[::-1] for way in sorted(used.get(index, ())) if way[0] == "E"]
-            both = [index for index in docks if len(turned.get(index, ())) > 1]
-            lowest_east = len(west) if len(both) > 1 else 0
-            levels.update((turn, level) for level, turn in enumerate(west))
-            levels.update((turn, level + lowest_east) for level, turn in enumerate(east))
-            count = max(len(west), len(east) + lowest_east if east else 0)
-            if count:
-                depth[side] = (_ABOVE if side == "top" else _UNDER) + (count - 1) * _TRACK
-        self.upper[number] = depth["top"]
-        self.heights.append(depth["top"] + block.height + depth["bottom"])
-        for index, ways in used.items():
-            dock = block.docks[index]
-            for way in ways:
-                if dock.side == "top":
-                    at = depth["top"] - _ABOVE - levels[index, way] * _TRACK
-                elif dock.side == "bottom":
-                    at = depth["top"] + block.height + _UNDER + levels[index, way] * _TRACK
-                else:
-                    at = depth["top"] + dock.at
-                self.meets[number, index, *way] = at
-
-    def _rank_of_dock(self, number: int, index: int, ways: set[Way]) -> tuple[int, float]:
-        """Order docks on top or bottom from left to right, so that no lines to or from them cross.
-
-        Lines to the left belong to those on the left; and of those that turn to one side, the outer ones turn nearest
-        to the block, so on top what comes from below belongs outside, and at the bottom what leads up.
-        """
-        partner = self.partners.get((number, index), 0.0)
-        is_left = ways == {"W"}
-        is_outside_low = (self.blocks[number].docks[index].side == "top") == is_left
-        return ("E" in ways) - ("W" in ways), -partner if is_outside_low else partner
+    def _dock(self) -> None:
+        """Say where the docks of each block are, and how far down the member its lines meet it."""
+        used: list[set[Turn]] = [set() for _ in self.blocks]
+        for line, (leaves, reaches) in zip(self.lines, self.ways, strict=True):
+            used[line.tail].add((line.tail_dock, leaves, line.kind))
+            used[line.head].add((line.head_dock, reaches, ENDS))
+        self.docked = [
+            docked(block, turns, partners)
+            for block, turns, partners in zip(self.blocks, used, self.partners, strict=True)
+        ]
+        self.heights = [one.height for one in self.docked]
 
     # --- wires
 
@@ -222,10 +165,10 @@ class _Part:
         self.tiers = [block.tier for block in self.blocks]
         self.at_column = list(self.column)
         self.widths = [block.width for block in self.blocks]
-        self.passing: dict[tuple[tuple[int, int, Way, str], int], int] = {}
+        self.passing: dict[tuple[Wire, int], int] = {}
         # of each line: the channel, the member and height where it enters it, the same where it leaves
         self.legs: list[list[tuple[int, tuple[int, float], tuple[int, float]]]] = []
-        self.wire_of: list[tuple[int, int, Way, str]] = []
+        self.wire_of: list[Wire] = []
         self.label_at: list[int | None] = []
         for number, (line, (leaves, reaches)) in enumerate(zip(self.lines, self.ways, strict=True)):
             kind = line.kind if line.label is None else f"{line.kind} {number}"
@@ -235,7 +178,7 @@ class _Part:
             last = self.column[line.head] - (reaches == "W")
             passed = range(first + 1, last + 1) if first <= last else range(first, last, -1)
             labelled = passed[len(passed) // 2] if line.label is not None and passed else None
-            at = (line.tail, self.meets[line.tail, line.tail_dock, leaves, line.kind])
+            at = (line.tail, self.docked[line.tail].meets[line.tail_dock, leaves, line.kind])
             legs = []
             channel = first
             label_at = None
@@ -248,11 +191,11 @@ class _Part:
                 legs.append((channel, at, there))
                 at = there
                 channel += 1 if first <= last else -1
-            legs.append((channel, at, (line.head, self.meets[line.head, line.head_dock, reaches, _ENDS])))
+            legs.append((channel, at, (line.head, self.docked[line.head].meets[line.head_dock, reaches, ENDS])))
             self.legs.append(legs)
             self.label_at.append(label_at)
 
-    def _passing(self, wire: tuple[int, int, Way, str], column: int) -> int:
+    def _passing(self, wire: Wire, column: int) -> int:
         member = self.passing.get((wire, column))
         if member is None:
             member = self.passing[wire, column] = len(self.at_column)
@@ -269,31 +212,11 @@ class _Part:
     # --- up and down
 
     def _place(self) -> None:
-        count = len(self.at_column)
-        last = max(self.at_column, default=0)
-        in_columns: list[list[int]] = [[] for _ in range(last + 1)]
+        count, blocks = len(self.at_column), len(self.blocks)
+        in_columns: list[list[int]] = [[] for _ in range(max(self.at_column, default=0) + 1)]
         for member, column in enumerate(self.at_column):
             in_columns[column].append(member)
-        left: list[Ties] = [[] for _ in range(count)]
-        right: list[Ties] = [[] for _ in range(count)]
-        pulled_left: list[Pulls] = [[] for _ in range(count)]
-        pulled_right: list[Pulls] = [[] for _ in range(count)]
-        blocks = len(self.blocks)
-        for channel, (one, here), (other, there) in {leg for legs in self.legs for leg in legs}:
-            if self.at_column[one] == self.at_column[other]:
-                continue  # it turns back in its channel
-            if self.at_column[one] > channel:
-                (one, here), (other, there) = (other, there), (one, here)
-            height = (self.heights[one] or 1.0, self.heights[other] or 1.0)
-            right[one].append((other, min(there / height[1], 0.999), min(here / height[0], 0.999)))
-            left[other].append((one, min(here / height[0], 0.999), min(there / height[1], 0.999)))
-            passes = (one >= blocks) + (other >= blocks)
-            weight = (1.0, 2.0, 6.0)[passes]
-            pulled_right[one].append((other, here - there, weight))
-            pulled_left[other].append((one, there - here, weight))
-        for ties in (left, right, pulled_left, pulled_right):
-            for one_ties in ties:
-                one_ties.sort()  # what comes from a set has no order
+        left, right, pulled_left, pulled_right = self._ties()
         gap = [_GAP if member < blocks or self.heights[member] else _WIRE_GAP for member in range(count)]
         # Of what crosses equally little that is taken whose lines are short; where that is cheap to find out.
         starts, most = (6, 4) if count < _SMALL else (2, 2) if count < _LARGE else (1, 1)
@@ -304,6 +227,29 @@ class _Part:
             if cost < self.cost:
                 self.cost, self.in_columns, self.y = cost, order, y
         self.height = max((y + height for y, height in zip(self.y, self.heights, strict=True)), default=0.0)
+
+    def _ties(self) -> tuple[list[Ties], list[Ties], list[Pulls], list[Pulls]]:
+        """Say for each member what it is tied to in the columns left and right of it, and how these pull it."""
+        count, blocks = len(self.at_column), len(self.blocks)
+        left: list[Ties] = [[] for _ in range(count)]
+        right: list[Ties] = [[] for _ in range(count)]
+        pulled_left: list[Pulls] = [[] for _ in range(count)]
+        pulled_right: list[Pulls] = [[] for _ in range(count)]
+        for channel, (one, here), (other, there) in {leg for legs in self.legs for leg in legs}:
+            if self.at_column[one] == self.at_column[other]:
+                continue  # it turns back in its channel
+            if self.at_column[one] > channel:
+                (one, here), (other, there) = (other, there), (one, here)
+            from_top, to_top = here / (self.heights[one] or 1.0), there / (self.heights[other] or 1.0)
+            right[one].append((other, min(to_top, 0.999), min(from_top, 0.999)))
+            left[other].append((one, min(from_top, 0.999), min(to_top, 0.999)))
+            weight = (1.0, 2.0, 6.0)[(one >= blocks) + (other >= blocks)]
+            pulled_right[one].append((other, here - there, weight))
+            pulled_left[other].append((one, there - here, weight))
+        for ties in (left, right, pulled_left, pulled_right):
+            for one_ties in ties:
+                one_ties.sort()  # what comes from a set has no order
+        return left, right, pulled_left, pulled_right
 
     def _length(self, order: list[list[int]], y: list[float]) -> float:
         """Say how long the upright parts of all lines are, and how high all is."""
@@ -316,7 +262,7 @@ class _Part:
 
     def route(self) -> None:
         """Choose tracks for all lines, and with them how wide everything is."""
-        trunks: dict[tuple[tuple[int, int, Way, str], int], Trunk] = {}
+        trunks: dict[tuple[Wire, int], Trunk] = {}
         for wire, legs in zip(self.wire_of, self.legs, strict=True):
             for channel, *ends in legs:
                 trunk = trunks.setdefault((wire, channel), Trunk(set(), set()))
@@ -338,13 +284,13 @@ class _Part:
             count = tracks(here)
             channel_x[channel] = x + _BEHIND
             if count:
-                x += _BEHIND + (count - 1) * _TRACK + _BEFORE
+                x += _BEHIND + (count - 1) * TRACK + _BEFORE
             elif 0 <= channel < last:
                 x += _STRAIGHT
         self.width = x
         self.column_x = column_x
         self.column_w = [(max((self.widths[m] for m in members), default=0.0)) for members in self.in_columns]
-        self.trunk_x = {key: channel_x[key[1]] + trunk.track * _TRACK for key, trunk in trunks.items()}
+        self.trunk_x = {key: channel_x[key[1]] + trunk.track * TRACK for key, trunk in trunks.items()}
         self.trunks = trunks
 
     def _block_at(self, member: int) -> Point:
@@ -352,7 +298,7 @@ class _Part:
         spare = self.column_w[column] - self.widths[member]
         rank = self.blocks[member].rank
         x = self.column_x[column] + (0.0 if rank == "first" else spare if rank == "last" else spare / 2)
-        return round(x), self.y[member] + self.upper[member]
+        return round(x), self.y[member] + self.docked[member].upper
 
     # --- what comes of it
 
@@ -361,9 +307,8 @@ class _Part:
         for member, block in enumerate(self.members):
             left, top = self._block_at(member)
             plan.blocks[block] = (x + left, y + top)
-            for dock, at in zip(self.blocks[member].docks, self.dock_at[member], strict=True):
-                dock.at = at
-        told: set[tuple[tuple[int, int, Way, str], int]] = set()
+            self.blocks[member].settle(self.docked[member].at)
+        told: set[tuple[Wire, int]] = set()
         for number, index in enumerate(self.inner):
             plan.lines[index] = [(x + left, y + top) for left, top in self._corners(number)]
             wire = self.wire_of[number]
@@ -399,7 +344,7 @@ class _Part:
     def _at_dock(self, member: int, index: int) -> list[Point]:
         """Give where a dock is; on top and bottom also where its lines turn, whose height the caller knows."""
         block, dock = self.blocks[member], self.blocks[member].docks[index]
-        at = self.dock_at[member][index]
+        at = self.docked[member].at[index]
         left, top = self._block_at(member)
         match dock.side:
             case "left":
@@ -411,7 +356,7 @@ class _Part:
             case "bottom":
                 return [(left + at, top + block.height), (left + at, top + block.height)]
 
-    def _dots(self, wire: tuple[int, int, Way, str], channel: int) -> Iterator[Point]:
+    def _dots(self, wire: Wire, channel: int) -> Iterator[Point]:
         """Give where a trunk has three ways to go on."""
         trunk = self.trunks[wire, channel]
         if trunk.track < 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 import msgspec
@@ -40,6 +41,16 @@ class Block(msgspec.Struct):
     docks: list[Dock]
     rank: Literal["", "first", "last"] = ""
     tier: int = 0
+
+    def add(self, dock: Dock) -> int:
+        """Give it one more dock, and say which one it is."""
+        self.docks.append(dock)
+        return len(self.docks) - 1
+
+    def settle(self, places: Sequence[float]) -> None:
+        """Take the places of the docks from the layout."""
+        for dock, at in zip(self.docks, places, strict=True):
+            dock.at = at
 
 
 class Label(msgspec.Struct, frozen=True):
