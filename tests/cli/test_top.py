@@ -170,6 +170,24 @@ def test_a_question_that_makes_no_sense_gets_an_error(question: bytes) -> None:
         assert b'{"error":"the question cannot be understood' in stranger.recv(1000)
 
 
+@pytest.mark.asyncio
+async def test_who_knocks_at_the_very_moment_a_run_ends_is_seen_out() -> None:
+    """The loop hears of the knock and of the end in one pass, of the end first: what it has let in then is not lost."""
+    loop, over, graph = asyncio.get_running_loop(), asyncio.Event(), hfg.Graph("ticking")
+    graph.add(ticks(), max_rate_hz=50)
+    async with hfg.running(graph, watch=False) as run:
+        with socket.socket(socket.AF_UNIX) as stranger:
+            stranger.settimeout(5)
+            async with asyncio.timeout(5):
+                async with watching.watched(run, "ticking.py"):
+                    (door,) = watching.sockets(watching.folder()).values()
+                    stranger.connect(str(door))
+                    loop.call_soon(over.set)
+                    await over.wait()
+            assert stranger.recv(1) == b""
+        run.stop()
+
+
 @pytest.mark.parametrize("noise", [b"x" * 5000, b'{"want":"glance"}\n' * 5])
 def test_whoever_talks_too_much_is_shown_the_door(noise: bytes) -> None:
     with running(), socket.socket(socket.AF_UNIX) as stranger:

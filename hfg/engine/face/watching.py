@@ -167,10 +167,12 @@ async def watched(run: Run, watch: bool | str) -> AsyncIterator[None]:
     finally:
         if file is not None:
             file.unlink(missing_ok=True)
-        if server is not None:
-            server.close()
-        if door is not None:
+        if server is not None and door is not None:
+            # First nobody more is let in: a server that is closed loses whom it has let in but not made a connection
+            # of yet (asyncio asserts that it is open), and the door would wait for that guest for ever.
+            asyncio.get_running_loop().remove_reader(listening)
             await door.close()
+            server.close()
 
 
 def _listen() -> tuple[Path, socket.socket]:
