@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.perception.following import Limits, follow
 from examples.fetch_delivery.perception.laser import obstacle_ahead, wall_ahead
-from examples.fetch_delivery.perception.planning import Path, length_of, plan
+from examples.fetch_delivery.perception.planning import Path, length_of, plan, queue
 from examples.fetch_delivery.perception.records import Localised, Sighting, Station, wrapped
 from hfg.nodes.robotics import Disk
 
@@ -62,6 +62,8 @@ class GoTo:
       goal: the pose.
       near: how near to it is there.
       aligned: and how near to its heading.
+      lane: how far beyond the goal it has to be free; the robot waits for that at a distance.
+      queueing: and not longer than so many seconds.
       every: plan with each so many-th pose.
       without_path: so many seconds without any path are too long.
       patience: so many seconds may the robot come no nearer.
@@ -70,12 +72,15 @@ class GoTo:
     goal: Any
     near: float = 0.06
     aligned: float = 0.06
+    lane: float = 0.0
+    queueing: float = 60.0
     every: int = 5
     without_path: float = 8.0
     patience: float = 6.0
     path: Path | None = None
     poses: int = 0
     since: float | None = None
+    queues_since: float | None = None
     least: float = math.inf
     last: Twist = field(default_factory=Twist)
 
@@ -92,23 +97,35 @@ class GoTo:
         waited = scan.stamp - self.since
         if self.path is None:
             return Twist(), "blocked" if waited >= self.without_path else None
-        if waited > self.patience:
-            return Twist(), "blocked"
         limits = Limits(near=self.near, aligned=self.aligned)
         twist = follow(self.path, localised, scan, math.hypot(self.last.vx, self.last.vy), limits)
+        if twist is None and self.path.waits:
+            return self._queue(scan.stamp)
         if twist is None:
             return Twist(), "done"
-        self.last = twist
-        return twist, None
+        self.last, self.queues_since = twist, None
+        return twist, "blocked" if waited > self.patience else None
 
     def _plan(self, localised: Localised, others: Sequence[Disk]) -> None:
-        points = plan(localised.pose, self.goal, others)
-        if points is None:
-            return
-        self.path = Path(points, float(self.goal[2]))
-        left = length_of(points) + 0.3 * abs(float(wrapped(self.goal[2] - localised.pose[2])))
-        if left < self.least - 0.05:
+        waiting = queue(localised.pose, self.goal, others, self.lane) if self.lane else None
+        if waiting is not None:
+            path = Path(*waiting, waits=True)
+        else:
+            points = plan(localised.pose, self.goal, others, beside=not self.lane)
+            if points is None:
+                return
+            path = Path(points, float(self.goal[2]))
+        elsewhere = self.path is None or math.dist(self.path.points[-1], path.points[-1]) > 0.1
+        left = length_of(path.points) + 0.3 * abs(float(wrapped(path.heading - localised.pose[2])))
+        if elsewhere or left < self.least - 0.05:
             self.least, self.since = left, localised.stamp
+        self.path = path
+
+    def _queue(self, now: float) -> Step:
+        self.last, self.since = Twist(), now
+        if self.queues_since is None:
+            self.queues_since = now
+        return Twist(), "blocked" if now - self.queues_since > self.queueing else None
 
 
 @dataclass
@@ -182,4 +199,4 @@ class Dock:
         left = obstacle_ahead.function(scan, width=0.3) - self.distance
         if left < 0.015:
             return Twist(), "done"
-        return Twist(min(self.speed, 0.03 + 0.8 * left)), None
+        return Twist(min(self.speed, 0.03 + math.sqrt(2 * 0.25 * left))), None

@@ -208,7 +208,7 @@ class Mission:
         self._view: Any = None
         self._activities: dict[str, Callable[[], str | None]] = {
             "wait_for_start": self._listen,
-            "advance": self._move,
+            "advance": self._advance,
             "select": self._select,
             "look_around": self._turn,
             "go_to": self._go_to,
@@ -290,6 +290,10 @@ class Mission:
     def _move(self) -> str | None:
         return self._command(self._drive.step(self.senses.odometry))
 
+    def _advance(self) -> str | None:
+        self.orders.look_ahead = self._ticks % 4 == 0
+        return self._move()
+
     def _leave(self) -> str | None:
         return "served" if self._move() else None
 
@@ -345,16 +349,17 @@ class Mission:
         self._changed(self.state)
 
     def begin_to_advance(self) -> None:
-        """Clear of where it stands."""
-        self._drive = Move(x=1.0, y=1.0)
+        """Clear of where it stands, and turned to the middle, to see which sides of the octagon are stations."""
+        self._drive = Move(x=1.0, y=1.0, turn=math.pi / 2)
 
     def begin_to_turn(self) -> None:
         """Once around: what is seen tells a robot that is in doubt where it is."""
         self._drive = Move(turn=2 * math.pi)
 
     def begin_to_approach(self) -> None:
-        """To before the station."""
-        self._drive = GoTo(self.station.before(_BEFORE_M))
+        """To before the station; where there are others that will do, the robot does not queue for long."""
+        queueing = 8.0 if self.state.startswith("fetch") else 60.0
+        self._drive = GoTo(self.station.before(_BEFORE_M), lane=0.9, queueing=queueing)
 
     def begin_to_go_to_view(self) -> None:
         """To where more is to be seen."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,13 +13,14 @@ import pytest
 
 import hfg
 from examples.fetch_delivery.__main__ import app
-from examples.fetch_delivery.machine import Mission, Robot
+from examples.fetch_delivery.machine import Mission, Robot, compare
 from examples.fetch_delivery.machine.driving import Dock, GoTo, Move, Position
 from examples.fetch_delivery.machine.mission import LIMITS, Orders, Senses
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.mission import build
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station
 from examples.fetch_delivery.world.scanning import ANGLES
+from hfg.nodes.robotics import Disk
 from hfg.trace import EventTriggered, TraceEvent
 from tests.examples.fetch_delivery.watching import Watch
 
@@ -230,9 +233,80 @@ def test_go_to_arrives_and_gives_up_when_it_comes_no_nearer() -> None:
     go_to = GoTo(np.array([3.0, 2.0, 0.0]))
     ends = [go_to.step(at(4.0, stamp=now), scanned(3.0, now), [])[1] for now in (0.0, 5.9, 6.1)]
     assert ends == [None, None, "blocked"]
-    into_the_wall = GoTo(np.array([9.0, 0.0, 0.0]))
+    into_the_wall = GoTo(np.array([9.0, 0.0, 0.0]), lane=0.1)
     ends = [into_the_wall.step(at(4.0, stamp=now), scanned(3.0, now), [])[1] for now in (0.0, 7.9, 8.0)]
     assert ends == [None, None, "blocked"]
+
+
+def test_go_to_waits_at_a_distance_for_a_station_that_is_taken_but_not_for_ever() -> None:
+    go_to = GoTo(np.array([4.3, 0.0, 0.0]), lane=0.9, queueing=8.0)
+    there = [Disk(5.2, 0.0, 9)]
+    steps = [go_to.step(at(3.0, stamp=now), scanned(2.0, now), there) for now in (0.0, 7.0, 8.0, 8.1)]
+    assert steps == [(Twist(), None), (Twist(), None), (Twist(), None), (Twist(), "blocked")]
+    go_to = GoTo(np.array([4.3, 0.0, 0.0]), lane=0.9)
+    command, end = go_to.step(at(3.0), scanned(2.0), [])
+    assert (command.vx > 0.2, end) == (True, None)
+
+
+# --- what both consist of
+
+
+def test_lines_of_code_are_counted_without_comments_docstrings_imports_and_what_is_blank(tmp_path: Path) -> None:
+    source = '''"""A module."""
+
+import math  # not this
+
+MOST = [
+    1,  # these
+    2,
+
+]
+
+
+@staticmethod
+def one(x: int) -> str:
+    """Say it.
+
+    At length.
+    """
+    # nor this
+    text = """two
+lines"""
+    return text
+
+
+class Two:
+    """Nothing else."""
+'''
+    (tmp_path / "counted_module.py").write_text(source)
+    spec = importlib.util.spec_from_file_location("counted_module", tmp_path / "counted_module.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert compare.code_lines(module) == 4 + 5 + 1
+    assert compare.code_lines(module, only=["one"]) == 5
+    assert compare.code_lines(module, without=["one", "Two"]) == 4
+    with pytest.raises(ValueError, match="counted_module has no Three"):
+        compare.code_lines(module, only=["Three"])
+
+
+def test_what_is_counted_is_what_is_there() -> None:
+    graph, machine = compare.structure("activity"), compare.structure("machine")
+    leaves = len(WAYS)
+    assert (machine["states"], machine["nodes"], machine["subgraphs"]) == (leaves, 2, 0)
+    assert machine["time-outs"] == leaves - 1
+    assert graph["states"] > leaves  # what an entry action does here is a state there
+    assert graph["nodes"] >= graph["states"]
+
+
+def test_missions_of_both_sorts_are_measured() -> None:
+    runs = [compare.mission(sort, 3, 0.02) for sort in compare.KINDS]
+    assert [(run["sort"], run["seed"], run["delivered"]) for run in runs] == [("activity", 3, 0), ("machine", 3, 0)]
+    assert runs[0]["firings"] > 10 * runs[1]["firings"]
+    head, _, *rows = compare.measured(runs).splitlines()
+    assert "0.02 simulated minutes, seeds 3" in head
+    assert rows[0] == "| cubes delivered | 0 | 0 |"
 
 
 # --- the whole
@@ -276,15 +350,14 @@ def test_nothing_is_wrong_with_the_graph_around_it() -> None:
 
 
 @pytest.mark.timeout(180)
-def test_it_comes_to_a_station_and_keeps_to_what_is_demanded_of_the_graph_too() -> None:
+def test_it_fetches_a_cube_and_keeps_to_what_is_demanded_of_the_graph_too() -> None:
     watch = watched(seed=1, minutes=0.41)
     (score,) = watch.simulation.scores
     assert watch.found == []
     assert score.lamp_while_driving_s == score.contact_s == 0
     states = [state for _, state in watch.steps]
-    assert states[:4] == ["wait_for_start", "advance", "fetch/select", "fetch/visit/go_to"]
-    assert states[-5:] == [f"fetch/visit/{step}" for step in ("go_to", "position", "dock", "settle", "wait")]
-    assert watch.simulation.robots[0].lamp
+    assert states[:9] == ["wait_for_start", "advance", "fetch/select", *(f"fetch/visit/{step}" for step in VISIT)]
+    assert len(score.fetched) == 1
 
 
 @pytest.mark.soak
@@ -298,3 +371,11 @@ def test_one_robot_alone_delivers_for_ten_minutes(seed: int) -> None:
     assert score.wrong == []
     assert score.lamp_while_driving_s == 0
     assert score.contact_s < 6
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(600)
+def test_each_mission_that_is_measured_has_a_process_of_its_own() -> None:
+    runs = compare.missions([3], 0.1)
+    assert [(run["sort"], run["seed"]) for run in runs] == [("activity", 3), ("machine", 3)]
+    assert all(0 < run["cpu_s"] < 60 for run in runs)
