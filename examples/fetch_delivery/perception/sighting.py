@@ -30,6 +30,11 @@ _SIZE: Final = 40  # pixels of a digit that is compared
 _LIKE: Final = 0.7
 _BETTER: Final = 0.08  # than any other digit
 
+# Rows of the picture, for the camera looks level: bull's-eyes hang as high as it is, 0.45 m away or more, and digits
+# above it. To search only there costs about half.
+_TARGETS: Final = (75, 405)
+_DIGITS: Final = (0, 250)
+
 
 @hfg.node
 def find_targets(image: Gray) -> list[Sighting]:
@@ -46,11 +51,17 @@ def find_targets(image: Gray) -> list[Sighting]:
       ValueError: the picture is empty.
     """
     found = []
-    for one in find_bullseyes.function(image, smallest=10.0):
-        seen = _target(one)
+    band, top = _band(image, *_TARGETS)
+    for one in find_bullseyes.function(band, smallest=10.0):
+        seen = _target(one._replace(y=one.y + top))
         if seen is not None:
             found.append(seen)
     return sorted(found, key=lambda seen: seen.distance)
+
+
+def _band(image: Any, top: int, bottom: int) -> tuple[Any, int]:
+    """Give some rows of a picture, and how many are above them; a picture of another size as it is."""
+    return (image[top:bottom], top) if image.shape[0] == 480 else (image, 0)
 
 
 def _target(one: Bullseye) -> Sighting | None:
@@ -105,7 +116,8 @@ def read_digits(image: Gray) -> list[Sighting]:
       ValueError: the picture is empty.
     """
     found = []
-    for corners in find_quadrilaterals.function(image, smallest=_SMALLEST):
+    band, _ = _band(image, *_DIGITS)
+    for corners in find_quadrilaterals.function(band, smallest=_SMALLEST):
         seen = _digit(image, corners.astype(np.float64))
         if seen is not None:
             found.append(seen)

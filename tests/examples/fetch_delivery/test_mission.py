@@ -252,30 +252,30 @@ def test_nothing_is_wrong_with_the_graph_of_four_robots() -> None:
 
 
 @pytest.fixture(scope="module")
-def minute() -> Watch:
-    """A robot's first minute: it fetches a cube, searches for its station, and delivers it."""
-    return watched(seed=1, minutes=1.0)
+def minutes() -> Watch:
+    """A robot's first three minutes: it fetches cubes, searches for their stations, and delivers them."""
+    return watched(seed=1, minutes=3.0)
 
 
-@pytest.mark.timeout(180)
-def test_in_its_first_minute_a_robot_delivers_a_cube_by_what_it_sees_itself(minute: Watch) -> None:
-    (score,) = minute.simulation.scores
-    assert len(score.delivered) == 1
+@pytest.mark.timeout(300)
+def test_in_its_first_minutes_a_robot_delivers_cubes_by_what_it_sees_itself(minutes: Watch) -> None:
+    (score,) = minutes.simulation.scores
+    assert len(score.delivered) >= 3
     assert score.wrong == score.returned == []
 
 
-def test_one_step_is_active_at_every_moment_none_too_long_and_no_lamp_is_on_while_driving(minute: Watch) -> None:
-    assert minute.found == []
-    assert minute.simulation.scores[0].lamp_while_driving_s == 0
+def test_one_step_is_active_at_every_moment_none_too_long_and_no_lamp_is_on_while_driving(minutes: Watch) -> None:
+    assert minutes.found == []
+    assert minutes.simulation.scores[0].lamp_while_driving_s == 0
 
 
-def test_it_touches_nothing(minute: Watch) -> None:
-    assert minute.simulation.scores[0].contact_s == 0
+def test_it_touches_nothing(minutes: Watch) -> None:
+    assert minutes.simulation.scores[0].contact_s == 0
 
 
-def test_the_robot_ends_where_it_thinks_it_is(minute: Watch) -> None:
+def test_the_robot_ends_where_it_thinks_it_is(minutes: Watch) -> None:
     """Up to the eighth of a turn that it has chosen itself."""
-    robot, localiser = minute.simulation.robots[0], minute.localiser(0)
+    robot, localiser = minutes.simulation.robots[0], minutes.localiser(0)
     x, y, theta = localiser.pose
     assert math.hypot(x, y) == pytest.approx(math.hypot(robot.x, robot.y), abs=0.05)
     turn = math.remainder(math.atan2(robot.y, robot.x) - math.atan2(y, x), 2 * math.pi)
