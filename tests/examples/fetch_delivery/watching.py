@@ -6,8 +6,8 @@ from typing import Any
 
 import hfg
 from examples.fetch_delivery.mission import build
-from examples.fetch_delivery.world import Simulation
-from hfg.trace import ActivityChanged, TraceEvent
+from examples.fetch_delivery.world import Score, Simulation
+from hfg.trace import ActivityChanged, EventTriggered, TraceEvent
 
 # How long each step may hold the activity: its time-out where it has one, else the moment it takes.
 LONGEST_S = {"go_to/plan": 8.2, "go_to/follow": 60.2, "position": 20.2, "dock": 10.2, "wait": 20.2, "leave": 6.2}
@@ -31,6 +31,8 @@ class Watch:
         self._world: Any = graph["world"]
         self._active: dict[str, dict[str, float]] = {}
         self._now = 0.0
+        self._reported: dict[str, list[int]] = {}  # numbers whose sign was not found, by robot
+        self._returned: dict[str, int] = {}
 
     @property
     def simulation(self) -> Simulation:
@@ -59,8 +61,13 @@ class Watch:
                 self.steps.append((event.time, event.node))
             else:
                 active.pop(step, None)
+        elif isinstance(event, EventTriggered) and event.event.endswith("/explore/view.gave_up"):
+            robot = event.event.partition("/")[0]
+            self._reported.setdefault(robot, []).append(event.token.value)
 
     def _time_passes(self, now: float) -> None:
+        for number, score in enumerate(self.simulation.scores):
+            self._account(f"robot_{number}", score)
         for robot, active in self._active.items():
             if len(active) != 1:
                 self.found.append(f"at {self._now} s {sorted(active)} of {robot} are active, not one step")
@@ -71,6 +78,16 @@ class Watch:
                 body = self.simulation.robots[int(robot.removeprefix("robot_"))]
                 if body.lamp and not step.endswith(STANDING):
                     self.found.append(f"at {now} s the lamp of {robot} is on in {step}")
+
+    def _account(self, robot: str, score: Score) -> None:
+        """Each cube that was fetched is delivered, or given back after it was reported that its sign was not found."""
+        for at, cube in score.returned[self._returned.get(robot, 0) :]:
+            if cube not in self._reported.get(robot, []):
+                self.found.append(f"at {at} s {robot} gave back cube {cube}, and had not said that it does not find it")
+        self._returned[robot] = len(score.returned)
+        unknown = len(score.fetched) - len(score.delivered) - len(score.wrong) - len(score.returned)
+        if unknown not in (0, 1):
+            self.found.append(f"at {self._now} s {robot} has {unknown} cubes that it fetched and nobody knows where")
 
 
 def watched(seed: int = 1, robots: int = 1, *, minutes: float = 1.0, **options: Any) -> Watch:
