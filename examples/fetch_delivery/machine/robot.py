@@ -139,4 +139,5 @@ class Robot(robot.Robot):
         graph.connect(give_way.held, self.command.inner)
         for name in ("lamp", "look_ahead", "look_into_basket"):
             graph.connect(control.ports.outputs[name], self.ports.outputs[name].inner)
-        graph.connect(control.not_found, self.not_found.inner)
+        graph.connect(control.not_found, self.report.inner)
+        graph.connect(perception.unreadable, self.report.inner)

@@ -1,11 +1,12 @@
 """One robot: perception as data flow, the mission as activity (figure 19), and the arena around both.
 
-    start ══ wait_for_start ══ advance ══ fetch ══ read_cube ══ lookup ══ deliver ══ fetch ...
-                                            ║          ║          ║           ║
-                                            ║          ╚════ explore          ╚══ read_cube
-                                            ╚══ (no cube after all: read_cube.timeout)
+    start ══ wait_for_start ══ advance ══ fetch ══ bring ══ read_cube ══ lookup ══ deliver ══ bring ══ fetch ...
+                                            ║        ║          ║          ║                    ║
+                                            ║        ║          ╚════ explore                   ╚══ read_cube
+                                            ╚════════╩══ (no cube after all, or one to give back)
 
-There is no state machine: what is active is the state. `deliver` and `fetch` are built of the same `Visit`.
+There is no state machine: what is active is the state. `deliver` and `fetch` are built of the same `Visit`. `bring`
+counts how often a cube was brought in vain: one that nobody wants is reported and given back for another one.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ class Perception(hfg.Subgraph):
       filling: the filling stations that are known.
       number: a cube with this number lies in the basket.
       none: no cube lies there.
+      unreadable: a cube lies there whose code cannot be read.
     """
 
     odometry, scan = hfg.Input(Odometry), hfg.Input(Scan)
@@ -57,7 +59,7 @@ class Perception(hfg.Subgraph):
     others, around = hfg.Output(list[Disk]), hfg.Output(list[Disk])
     targets, signs = hfg.Output(list[Sighting]), hfg.Output(dict[int, Sign])
     filling = hfg.Output(list[Station])
-    number, none = hfg.Event(int), hfg.Event()
+    number, none, unreadable = hfg.Event(int), hfg.Event(), hfg.Event()
 
     def build(self, graph: hfg.Graph) -> None:
         """Connect what measures with what learns."""
@@ -96,6 +98,7 @@ class Perception(hfg.Subgraph):
         graph.connect(self.ask.inner, cube.ask)
         graph.connect(cube.number, self.number.inner)
         graph.connect(cube.none, self.none.inner)
+        graph.connect(cube.unreadable, self.unreadable.inner)
 
 
 class Robot(hfg.Subgraph):
@@ -112,7 +115,8 @@ class Robot(hfg.Subgraph):
       look_ahead: asks for a picture of what is ahead.
       look_into_basket: asks for one of the basket.
       begin: where activity arrives.
-      not_found: the sign of a cube was not found anywhere; the number.
+      report: the cube in the basket cannot be delivered, for its sign was not found or its station served nobody; its
+        number, or None if its code cannot be read.
     """
 
     odometry, scan, message = hfg.Input(Odometry), hfg.Input(Scan), hfg.Input(str)
@@ -120,7 +124,7 @@ class Robot(hfg.Subgraph):
     command, lamp = hfg.Event(Twist), hfg.Output(bool)
     look_ahead, look_into_basket = hfg.Output(object), hfg.Output(Scan)
     begin = hfg.slot(type=object)
-    not_found = hfg.Event(int)
+    report = hfg.Event(int | None)
 
     def build(self, graph: hfg.Graph) -> None:
         """Figure 19."""
@@ -130,21 +134,24 @@ class Robot(hfg.Subgraph):
         fetch, deliver = graph.add(FetchCube(), name="fetch"), graph.add(DeliverCube(), name="deliver")
         read_cube = graph.add(activity.WaitForMessage(), name="read_cube", active_for_s=10.1)
         newest, lookup = graph.add(flow.SampleAndHold(), name="newest"), graph.add(MapLookup(), name="lookup")
-        explore = graph.add(Explore(), name="explore")
+        explore, bring = graph.add(Explore(), name="explore"), graph.add(activity.Retry(attempts=2), name="bring")
 
         self.begin.inner.activates(wait_for_start.begin)
         wait_for_start.received.activates(advance.begin)
         advance.done.activates(fetch.begin)
         advance.timeout.activates(fetch.begin)
-        fetch.done.activates(read_cube.begin)
+        fetch.done.activates(bring.begin)
+        bring.attempt.activates(read_cube.begin)
         read_cube.received.activates(lookup.key)
         read_cube.timeout.activates(fetch.begin)
         lookup.sign.activates(deliver.begin)
         lookup.unknown.activates(explore.begin)
         explore.done.activates(read_cube.begin)
         explore.gave_up.activates(fetch.begin)
-        deliver.done.activates(fetch.begin)
-        deliver.gave_up.activates(read_cube.begin)
+        deliver.done.activates(bring.done)
+        deliver.gave_up.activates(bring.gave_up)
+        bring.finished.activates(fetch.begin)
+        bring.exhausted.activates(fetch.begin)
 
         graph.connect(self.message.inner, wait_for_start.message)
         graph.connect(read_cube.received, newest.tick)
@@ -153,13 +160,16 @@ class Robot(hfg.Subgraph):
         graph.connect(perception.number, read_cube.message)
         graph.connect(read_cube.activated, perception.ask, overflow="latest")
         graph.connect(lookup.sign, explore.found)
-        graph.connect(explore.gave_up, self.not_found.inner)
-        graph.connect(explore.gave_up, fetch.unwanted)
-        # A sign that could not be served is not where the map has it.
-        wrong = graph.add(flow.SampleAndHold(), name="wrong_sign")
-        graph.connect(read_cube.received, wrong.value)
-        graph.connect(deliver.gave_up, wrong.tick)
-        graph.connect(wrong.held, perception.forget)
+        graph.connect(perception.unreadable, self.report.inner)
+        # A sign that could not be served is not where the map has it, and a cube that is given back is not taken again.
+        in_vain, refused = (graph.add(flow.SampleAndHold(), name=name) for name in ("in_vain", "refused"))
+        for number, when in ((in_vain, deliver.gave_up), (refused, bring.exhausted)):
+            graph.connect(read_cube.received, number.value, overflow="latest")
+            graph.connect(when, number.tick)
+        graph.connect(in_vain.held, perception.forget)
+        for given_back in (explore.gave_up, refused.held.sent):
+            graph.connect(given_back, self.report.inner)
+            graph.connect(given_back, fetch.unwanted)
         for step in (wait_for_start, advance, read_cube):
             graph.gate(step, by=step)
         self._feed(graph)
@@ -237,6 +247,7 @@ def build(
         graph.connect(world.basket[number], robot.basket)
         graph.connect(robot.command, world.command[number])
         graph.connect(robot.lamp, world.lamp[number])
+        graph.connect(robot.report, world.report[number])
         if gated:
             graph.connect(robot.look_ahead, world.look_ahead[number])
             graph.connect(robot.look_into_basket, world.look_into_basket[number])

@@ -29,6 +29,7 @@ class World(hfg.Node):
       message: what the referee says.
       command: the velocity that a robot shall have; it holds for half a second.
       lamp: whether the green lamp of a robot shall be on.
+      report: a robot says that it cannot deliver the cube in its basket; its number, or None if that cannot be read.
       look_ahead: asks for a picture of the front camera.
       look_into_basket: asks for a picture of the basket camera.
       front: the picture.
@@ -74,6 +75,11 @@ class World(hfg.Node):
     def lamp(self, robot: int, on: bool) -> None:
         """Switch the lamp."""
         self.simulation.set_lamp(robot, on)
+
+    @hfg.Slots(int | None, "odometry")
+    def report(self, robot: int, number: int | None) -> None:
+        """Note it down."""
+        self.simulation.report(robot, number)
 
     @hfg.Slots(object, "odometry")
     def look_ahead(self, robot: int) -> None:

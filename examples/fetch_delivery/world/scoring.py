@@ -14,6 +14,7 @@ class Score:
       delivered: when it has delivered which cube.
       wrong: when which cube was taken at a station with another digit.
       returned: when it gave which cube back at a filling station.
+      reported: when the robot said that it cannot deliver the cube in its basket; its number, None if that is not read.
       contact_s: how long it has touched something.
       contacts: when each touch began.
       lamp_while_driving_s: how long its lamp was on while it drove.
@@ -24,10 +25,21 @@ class Score:
     delivered: list[tuple[float, int]] = field(default_factory=list)
     wrong: list[tuple[float, int]] = field(default_factory=list)
     returned: list[tuple[float, int]] = field(default_factory=list)
+    reported: list[tuple[float, int | None]] = field(default_factory=list)
     contact_s: float = 0.0
     contacts: list[float] = field(default_factory=list)
     lamp_while_driving_s: float = 0.0
     driven_m: float = 0.0
+
+    def unaccounted(self) -> list[tuple[float, int]]:
+        """Give the cubes that were given back without a word: since they were fetched, nothing was reported."""
+        times = [time for time, _ in self.fetched]
+        silent = []
+        for when, number in self.returned:
+            since = max(time for time in times if time < when)
+            if not any(since <= time <= when and said in (number, None) for time, said in self.reported):
+                silent.append((when, number))
+        return silent
 
     def __str__(self) -> str:
         """Say it in a line."""

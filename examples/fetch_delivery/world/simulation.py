@@ -132,6 +132,19 @@ class Simulation:
         """
         self._robot(robot).lamp = on
 
+    def report(self, robot: int, number: int | None) -> None:
+        """Hear that a cube cannot be delivered.
+
+        Args:
+          robot: who says it.
+          number: of the cube; None if that cannot be read.
+
+        Raises:
+          ValueError: if there is no such robot.
+        """
+        self._robot(robot)
+        self.scores[robot].reported.append((self.now_s, number))
+
     # --- what robots sense ---
 
     def odometry(self, robot: int) -> Odometry:

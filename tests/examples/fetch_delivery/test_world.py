@@ -341,6 +341,18 @@ def test_who_brings_a_cube_back_gets_another_one() -> None:
     assert len(score.fetched) == len(score.returned) + 1 > 3
 
 
+def test_a_cube_that_comes_back_is_accounted_for_by_what_the_robot_has_reported_of_it() -> None:
+    simulation = fetched()
+    score = simulation.scores[0]
+    ((_, number),) = score.fetched
+    simulation.report(0, number % 4 + 1)
+    wait_for_handover(simulation)
+    assert score.unaccounted() == score.returned != []
+    simulation.report(0, None)
+    wait_for_handover(simulation)
+    assert score.unaccounted() == score.returned[:1]
+
+
 def test_a_lamp_while_driving_is_noted_down() -> None:
     simulation = Simulation(1)
     simulation.set_lamp(0, True)
