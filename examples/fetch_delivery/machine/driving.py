@@ -103,7 +103,9 @@ class GoTo:
             return self._queue(scan.stamp)
         if twist is None:
             return Twist(), "done"
-        self.last, self.queues_since = twist, None
+        self.last = twist
+        if not self.path.waits:
+            self.queues_since = None
         return twist, "blocked" if waited > self.patience else None
 
     def _plan(self, localised: Localised, others: Sequence[Disk]) -> None:

@@ -16,6 +16,7 @@ from hfg.images import Gray, wrong_image
 _CODES: Final = {signs.cube_code(station): station for station in range(1, 5)}
 _PAPER: Final = 190  # gray levels: lighter than anything in an empty basket
 _LEAST: Final = 0.015  # of the picture
+_MARGIN: Final = 24  # pixels
 
 
 @hfg.node
@@ -44,10 +45,20 @@ def read_cube(image: Gray) -> Cube:
     rough = (
         cv2.resize(picture, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA) if min(picture.shape) > 8 else picture
     )
-    if np.count_nonzero(rough > _PAPER) < _LEAST * rough.size:
+    light = rough > _PAPER
+    if np.count_nonzero(light) < _LEAST * rough.size:
         return Cube("none")
-    read = {text for text in _texts(picture) if text in _CODES}
+    read = {text for text in _texts(_around(picture, light)) if text in _CODES}
     return Cube("number", _CODES[read.pop()]) if len(read) == 1 else Cube("unreadable")
+
+
+def _around(picture: Any, light: Any) -> Any:
+    """Cut out what is light, with a margin: to look for codes in all of the picture takes three times as long."""
+    down, right = (round(whole / rough) for whole, rough in zip(picture.shape, light.shape, strict=True))
+    x, y, width, height = cv2.boundingRect(light.astype(np.uint8))
+    top, left = max(0, down * y - _MARGIN), max(0, right * x - _MARGIN)
+    cut = picture[top : down * (y + height) + _MARGIN, left : right * (x + width) + _MARGIN]
+    return np.ascontiguousarray(cut)
 
 
 def _texts(picture: Any) -> tuple[str, ...]:

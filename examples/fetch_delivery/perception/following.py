@@ -140,7 +140,7 @@ class FollowPath(hfg.Node):
       path: what is to be followed.
       stop: follow nothing any more, and stand.
       arrived: the robot is at the goal.
-      blocked: it came no nearer for so many seconds; it goes on trying.
+      blocked: it came no nearer for so many seconds, or waited for so many; it goes on trying.
     """
 
     speed = hfg.Parameter(0.6, unit="m/s")
@@ -168,8 +168,9 @@ class FollowPath(hfg.Node):
         speed = math.hypot(self.last.vx, self.last.vy) if self.last is not None else 0.0
         limits = Limits(speed=self.speed, near=self.near, aligned=self.aligned)
         twist = follow(self.way, localised, scan, speed, limits)
+        self._queue(scan.stamp, twist is None)
         if twist is None and self.way.waits:
-            self._queue(scan.stamp)
+            self.last, self.since = None, scan.stamp
             return Twist()
         if twist is None:
             self.way = self.last = None
@@ -177,13 +178,14 @@ class FollowPath(hfg.Node):
             self.arrived.trigger()
             return Twist()
         self._watch(localised, scan.stamp)
-        self.last, self.queues_since = twist, None
+        self.last = twist
         return twist
 
-    def _queue(self, now: float) -> None:
-        self.last, self.since = None, now
-        if self.queues_since is None:
-            self.queues_since = now
+    def _queue(self, now: float, stands: bool) -> None:
+        if not self.way.waits:
+            self.queues_since = None
+        elif self.queues_since is None:
+            self.queues_since = now if stands else None
         elif now - self.queues_since > self.queueing:
             self.queues_since = now
             self.blocked.trigger(0.0)

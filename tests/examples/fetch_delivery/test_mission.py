@@ -25,6 +25,7 @@ from examples.fetch_delivery.world.scanning import ANGLES
 from examples.fetch_delivery.world.scoring import Score
 from hfg.nodes.robotics import Disk
 from hfg.testing import Recorder, fire
+from tests.examples.fetch_delivery.measure_missions import measured
 from tests.examples.fetch_delivery.watching import Watch, watched
 
 
@@ -382,14 +383,14 @@ def test_equal_seeds_give_equal_missions_in_another_process_with_another_hash_se
 
 @pytest.mark.soak
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize("seed", range(1, 6))
-def test_one_robot_alone_delivers_for_ten_minutes(seed: int) -> None:
-    watch = watched(seed, minutes=10)
-    (score,) = watch.simulation.scores
-    assert watch.found == []
-    assert len(score.delivered) >= 7
-    assert score.wrong == []
-    assert score.contact_s < 6
+@pytest.mark.parametrize(("robots", "seed", "least"), [(1, 1, 9), (1, 2, 9), (4, 11, 6), (4, 12, 6)])
+def test_robots_deliver_for_ten_minutes(robots: int, seed: int, least: int) -> None:
+    """All of a robot's rivals are seen by its laser alone; more seeds: `measure_missions`."""
+    row = measured(seed, robots, minutes=10)
+    assert row.found == []
+    assert sum(row.delivered) >= least * robots
+    assert (row.wrong, row.stuck) == (0, [])
+    assert max(row.contact_s) < 6
 
 
 LONG = {
