@@ -2,6 +2,7 @@
 
 pages       the page of a run under way, and its file     observing     what is kept of a run, within bounds
 html        the page as text                              pictures      pixels as PNG
+sections    what users add to it
 """
 
 from hfg.reporting.pages import ReportPage, report_page

@@ -26,7 +26,9 @@ __all__ = ["Page", "drawing"]
 
 _MOST_ROWS: Final = 2000  # of a table
 _MOST_DRAWN: Final = 600  # nodes; of a larger graph the subgraphs are folded
-_RULES: Final = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
+_RULES: Final = (
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; media-src data:"
+)
 
 
 def drawing(graph: Graph) -> tuple[str, str]:
@@ -54,6 +56,7 @@ class Page:
       error: what the run failed with.
       outcome: how it ended; None if it goes on.
       when: seconds since 1970 at its begin; None in virtual time, where equal runs give equal pages.
+      own: the sections that users have added, as HTML.
     """
 
     def __init__(
@@ -66,8 +69,9 @@ class Page:
         error: HfgError | None,
         outcome: str | None,
         when: float | None,
+        own: Sequence[str] = (),
     ) -> None:
-        self.graph, self.drawn = graph, drawn
+        self.graph, self.drawn, self.own = graph, drawn, own
         self.observed, self.report, self.statistics = observed, report, statistics
         self.error, self.when = error, when
         self.outcome = outcome or "still running"
@@ -80,6 +84,8 @@ class Page:
 
     def _pieces(self) -> Iterator[str]:
         body = [
+            *self._clock(),
+            *self.own,
             *self._drawing(),
             *self._timeline(),
             *self._errors(),
@@ -141,6 +147,12 @@ class Page:
 
     # --- who was active when
 
+    def _clock(self) -> Iterator[str]:
+        yield '<div class="bar" id="clock"><button type="button" id="before" title="the change before">◀</button>'
+        yield '<input type="range" id="time" min="0" max="1" step="any" value="1" aria-label="time">'
+        yield '<button type="button" id="after" title="the next change">▶</button> '
+        yield '<output id="now"></output> <span id="who"></span></div>\n'
+
     def _drawing(self) -> Iterator[str]:
         if self.drawn[1]:
             self.notes.append(self.drawn[1])
@@ -148,11 +160,7 @@ class Page:
             count = self.observed.edits
             times = "once" if count == 1 else f"{count:,} times"
             self.notes.append(f"the graph was changed {times}; the drawing shows it as it was in the end")
-        yield '<section id="drawing"><h2>The graph</h2>\n<div class="bar" id="clock">'
-        yield '<button type="button" id="before" title="the change before">◀</button>'
-        yield '<input type="range" id="time" min="0" max="1" step="any" value="1" aria-label="time">'
-        yield '<button type="button" id="after" title="the next change">▶</button> '
-        yield '<output id="now"></output> <span id="who"></span>'
+        yield '<section id="drawing"><h2>The graph</h2>\n<div class="bar">'
         yield '<span class="right"><button type="button" id="fit">fit</button> '
         yield '<button type="button" id="smaller">-</button> <button type="button" id="larger">+</button>'
         yield '</span></div>\n<div class="picture" id="graph">'

@@ -12,9 +12,9 @@
   // --- the drawing: who is active at a time
 
   const shapes = new Map();
-  for (const group of byId("graph").querySelectorAll("g[data-path]")) {
-    const rect = group.querySelector(":scope > rect");
-    if (rect) shapes.set(group.getAttribute("data-path"), rect);
+  for (const group of document.querySelectorAll(".picture g[data-path]")) {
+    const rect = group.querySelector(":scope > rect"), path = group.getAttribute("data-path");
+    if (rect) shapes.set(path, [...(shapes.get(path) ?? []), rect]);
   }
   const changes = [...new Set(data.active.flatMap((one) => one.spans.flat()))].sort((a, b) => a - b);
   let now = data.duration;
@@ -22,7 +22,7 @@
   // A time ends when the next begins, so a node that was active for no time at all is not shown unless one looks just there.
   const isActive = (one, at) => one.spans.some(([begin, end]) => begin <= at && (at < end || (at === end && (begin === end || end >= data.duration))));
 
-  function show(at) {
+  function show(at, playing) {
     now = Math.min(Math.max(at, 0), data.duration);
     const active = data.active.filter((one) => isActive(one, now)).map((one) => one.path);
     const lit = new Set();
@@ -30,11 +30,25 @@
       const parts = path.split("/");
       for (let count = 1; count <= parts.length; count++) lit.add(parts.slice(0, count).join("/"));
     }
-    for (const [path, rect] of shapes) rect.classList.toggle("hfg-on", lit.has(path));
+    for (const [path, rects] of shapes) rects.forEach((rect) => rect.classList.toggle("hfg-on", lit.has(path)));
     byId("now").textContent = said(now);
     byId("who").textContent = active.length ? active.join(", ") : data.active.length ? "nobody is active" : "";
     byId("time").value = now;
+    for (const video of videos) if (video !== playing) video.currentTime = Math.max(0, (now - video.starts) / video.speed);
     drawRows();
+  }
+
+  // Whoever plays a video moves the clock, and whoever moves the clock moves the video.
+  const videos = [...document.querySelectorAll("video[data-starts]")];
+  for (const video of videos) {
+    video.starts = Number(video.getAttribute("data-starts"));
+    video.speed = Number(video.getAttribute("data-speed"));
+    const follow = () => show(video.starts + video.currentTime * video.speed, video);
+    let frame = 0;
+    const step = () => { follow(); frame = requestAnimationFrame(step); };
+    video.addEventListener("play", () => { cancelAnimationFrame(frame); step(); });
+    for (const end of ["pause", "ended"]) video.addEventListener(end, () => { cancelAnimationFrame(frame); });
+    video.addEventListener("seeked", () => { if (video.matches(":hover")) follow(); });
   }
 
   byId("time").max = data.duration;
@@ -42,6 +56,10 @@
   byId("before").addEventListener("click", () => { const all = changes.filter((at) => at < now); show(all.length ? all[all.length - 1] : 0); });
   byId("after").addEventListener("click", () => { const next = changes.find((at) => at > now); show(next === undefined ? data.duration : next); });
 
+  for (const drawn of document.querySelectorAll(".own .picture svg")) {
+    const room = (drawn.parentElement.clientWidth - 2) / drawn.viewBox.baseVal.width;
+    if (room < 1) { drawn.setAttribute("width", "100%"); drawn.removeAttribute("height"); }
+  }
   const svg = byId("graph").querySelector("svg");
   const width = svg ? svg.viewBox.baseVal.width : 1, height = svg ? svg.viewBox.baseVal.height : 1;
   let zoom = 1;

@@ -15,6 +15,7 @@ from hfg.errors import UsageError
 from hfg.logs import Log
 from hfg.reporting.html import Page, drawing
 from hfg.reporting.observing import Observed
+from hfg.reporting.sections import Sections
 from hfg.trace import RunEnded, TraceEvent
 
 __all__ = ["ReportPage", "report_page"]
@@ -24,7 +25,7 @@ _MOST_PICTURES: Final = 1000
 _LONGEST_SIDE: Final = 4096
 
 
-class ReportPage:
+class ReportPage(Sections):
     """A page about a run; `run.report_page` makes it.
 
     Attributes:
@@ -33,6 +34,7 @@ class ReportPage:
     """
 
     def __init__(self, run: Run, path: Path, observed: Observed, say_when: bool) -> None:
+        super().__init__(f'the report of graph "{run.graph.name}"')
         self.path = path
         self.error: OSError | None = None
         self._run = run
@@ -66,7 +68,8 @@ class ReportPage:
         if observed.edits != self._edits:
             self._edits, self._drawing = observed.edits, drawing(run.graph)
         numbers = run.report(), run.statistics()
-        return Page(run.graph, self._drawing, observed, *numbers, run.error, self._outcome, self._when).text()
+        own = self.sections()
+        return Page(run.graph, self._drawing, observed, *numbers, run.error, self._outcome, self._when, own).text()
 
 
 def report_page(run: Run, file: str | os.PathLike[str], *, pictures: int, picture_size: int) -> ReportPage:

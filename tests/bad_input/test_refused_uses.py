@@ -11,8 +11,9 @@ import asyncio
 import inspect
 import io
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stderr
+from contextlib import chdir, redirect_stderr
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ import hfg
 from hfg import commands
 from hfg.cli import show
 from hfg.encoding import TokenCodec, decode, encode
+from hfg.engine.observing.report import RunPage
 from hfg.sharedmemory import Reader, Ring, segment_name, sweep
 from hfg.testing import diagrams, explore, fire, reference_run
 from hfg.trace import TraceEvent
@@ -140,6 +142,22 @@ def _declares(**said: Any) -> type:
 
 def reported(file: Any, **options: Any) -> Callable[[], Any]:
     return lambda: hfg.run(build(), clock="virtual", begin=lambda run: run.report_page(file, **options))
+
+
+def put_on_page(add: Callable[[RunPage], Any]) -> Callable[[], Any]:
+    """Add something to a page, in a folder where there is a file called "note.txt" and one that is too large."""
+
+    def begin(run: hfg.Run) -> None:
+        Path("note.txt").write_text("hello")
+        with Path("large.webm").open("wb") as large:
+            large.truncate(65 * 2**20)
+        add(run.report_page("run.html"))
+
+    def run() -> None:
+        with TemporaryDirectory() as folder, chdir(folder):
+            hfg.run(build(), clock="virtual", begin=begin)
+
+    return run
 
 
 def edited(*given: Any) -> Callable[[], Any]:
@@ -542,6 +560,41 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "report with fewer pictures": (
         reported("x.html", pictures=-1),
         "pictures= is a whole number from 0 to 1000, got -1",
+    ),
+    "section 3": (put_on_page(lambda page: page.add_text(3, "x")), "section is a text, got 3"),  # type: ignore[arg-type]
+    "text 3": (put_on_page(lambda page: page.add_text("x", 3)), "text is a text, got 3"),  # type: ignore[arg-type]
+    "a row too short": (
+        put_on_page(lambda page: page.add_table("x", ("a", "b"), [(1,)])),
+        "a row has as many cells as the table has heads, 2, got (1,)",
+    ),
+    "a picture of floats": (
+        put_on_page(lambda page: page.add_picture("x", np.zeros((9, 9)))),
+        "the text of an SVG drawing or a file, got ndarray of shape (9, 9) and type float",
+    ),
+    "a picture that is 3": (put_on_page(lambda page: page.add_picture("x", 3)), "of an SVG drawing or a file, got int"),
+    "a picture nowhere": (
+        put_on_page(lambda page: page.add_picture("x", "nowhere.png")),
+        '"nowhere.png" cannot be read: No such file or directory',
+    ),
+    "a picture of text": (
+        put_on_page(lambda page: page.add_picture("x", "note.txt")),
+        '"note.txt" ends in none of .png, .jpg, .jpeg, .gif, .webp, .svg, which browsers show',
+    ),
+    "a picture at noon": (
+        put_on_page(lambda page: page.add_picture("x", "<svg/>", at_s="noon")),  # type: ignore[arg-type]
+        "at_s= is a number of seconds, got 'noon'",
+    ),
+    "a film": (
+        put_on_page(lambda page: page.add_video("x", "film.avi")),
+        '"film.avi" ends in none of .webm, .mp4, .ogv, which browsers show',
+    ),
+    "a large film": (
+        put_on_page(lambda page: page.add_video("x", "large.webm")),
+        '"large.webm" has 65 MB, more than the 64 that a page takes of one; name it in a text instead',
+    ),
+    "a film that stands": (
+        put_on_page(lambda page: page.add_video("x", "large.webm", speed=0)),
+        "speed= of a video is above 0, got 0",
     ),
     "report with dots": (reported("x.html", picture_size=1), "picture_size= is a whole number from 16 to 4096, got 1"),
     "draw a pdf": (lambda: build().draw("x.pdf"), 'cannot be drawn into "x.pdf": a drawing ends in .svg or .mmd or .'),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -10,6 +12,7 @@ import msgspec
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import ENDED
 from hfg.engine.observing.tables import seconds, table
+from hfg.graph import Graph
 
 __all__ = ["EdgeReport", "NodeReport", "Report", "RunPage", "edge_reports", "node_reports"]
 
@@ -110,7 +113,11 @@ class Report(msgspec.Struct, frozen=True):
 
 
 class RunPage(Protocol):
-    """What `run.report_page` gives: a page about a run, written when that is over. `hfg.reporting` has its class."""
+    """What `run.report_page` gives: a page about a run, written when that is over. `hfg.reporting` has its class.
+
+    Sections of one's own stand on top of the page in the order in which they are first named, and in each of them what
+    was added to it, in order. What is added when the run is over needs another `write`.
+    """
 
     @property
     def path(self) -> Path:
@@ -125,6 +132,64 @@ class RunPage(Protocol):
 
     def write(self) -> None:
         """Write the file now, as far as the run has come; the end of the run does it again."""
+
+    def add_text(self, section: str, text: str) -> None:
+        """Add paragraphs, separated by empty lines, to the section of that title."""
+
+    def add_table(self, section: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+        """Add a table that its reader can sort by each of its columns.
+
+        Raises:
+          UsageError: a row has more or fewer cells than there are heads.
+        """
+
+    def add_picture(self, section: str, picture: object, *, caption: str = "", at_s: float | None = None) -> None:
+        """Add a picture; those that follow one another stand side by side.
+
+        Args:
+          section: its title.
+          picture: an image of 8 bits, gray or blue, green, red; the text of a drawing in SVG; or a file.
+          caption: stands below it.
+          at_s: when in the run that was; a click on the picture sets the clock of the page.
+
+        Raises:
+          UsageError: it is none of these, or the file cannot be read or is larger than 64 MB.
+        """
+
+    def add_video(
+        self,
+        section: str,
+        file: str | os.PathLike[str],
+        *,
+        caption: str = "",
+        starts_s: float = 0.0,
+        speed: float = 1.0,
+    ) -> None:
+        """Add a video, which is copied into the page; playing it moves the clock of the page, and the other way round.
+
+        Args:
+          section: its title.
+          file: WebM, MP4 or Ogg; which codecs are played is up to the browser: VP8 and VP9 are, everywhere.
+          caption: stands below it.
+          starts_s: which time of the run its beginning shows.
+          speed: so many seconds of the run pass in one of the video.
+
+        Raises:
+          UsageError: it cannot be read, is larger than 64 MB, or a number is none.
+        """
+
+    def add_drawing(
+        self, section: str, graph: Graph, *, caption: str = "", depth: int | None = None, fold: Iterable[str] = ()
+    ) -> None:
+        """Add the drawing of a graph, or of the inside of a subgraph, in which the page shows who is active.
+
+        Args:
+          section: its title.
+          graph: the one that runs, or `subgraph.graph` of one in it.
+          caption: stands below it.
+          depth: so many subgraphs inside each other are shown open; None folds none.
+          fold: paths of subgraphs that are folded whatever the depth.
+        """
 
 
 def node_reports(core: Core) -> dict[str, NodeReport]:
