@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import sys
+import webbrowser
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+import hfg
 from examples.fetch_delivery.mission import Robot, build
 from examples.fetch_delivery.running import carry_out
+from examples.fetch_delivery.showing import Showing
 from examples.fetch_delivery.world import FAULTS, Fault, fault
 
+SHOWN_IN = Path("out", "fetch_delivery")
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
@@ -33,6 +38,16 @@ def _kind(machine: bool) -> type[Robot]:
     return Machine
 
 
+def _showing(folder: Path, graph: hfg.Graph, seed: int, robots: int, seconds: float) -> Showing:
+    try:
+        return Showing(folder, graph, seed, robots, seconds)
+    except OSError as error:
+        raise typer.BadParameter(
+            f'nothing can be written to "{folder}": {error.strerror}; name a folder that you can write to',
+            param_hint="'--report'",
+        ) from None
+
+
 @app.command()
 def main(
     seed: Annotated[int, typer.Option(min=0, help="Decides what looks like chance.")] = 1,
@@ -50,15 +65,34 @@ def main(
     machine: Annotated[
         bool, typer.Option("--machine", help="A state machine decides, not the flow of activity.")
     ] = False,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write report.html there, with a video from above, ways, pictures and graph."),
+    ] = None,
+    show: Annotated[
+        bool, typer.Option("--show", help=f"Open the report in a browser; without --report it is in {SHOWN_IN}.")
+    ] = False,
 ) -> None:
     """Robots deliver cubes in a simulated arena; says in the end how they did."""
     faults: tuple[Fault, ...] = tuple(fault(name) for name in fault_names or [])
     graph = build(seed, robots, faults=faults, kind=_kind(machine))
-    result = carry_out(graph, 60 * minutes, within_s=within)
+    showing = None
+    if report is not None or show:
+        showing = _showing(report or SHOWN_IN, graph, seed, robots, 60 * minutes)
+    result = carry_out(graph, 60 * minutes, within_s=within, begin=None if showing is None else showing.begin)
     print(result)
     if result.error:
         print(result.error, file=sys.stderr)
-    sys.exit(0 if result.outcome in ("over", "late") else 1)
+    if showing is not None:
+        showing.end(result)
+        for note in showing.notes:
+            print(note, file=sys.stderr)
+        if showing.page.exists():
+            print(f"report: {showing.page}")
+        if show and not webbrowser.open(showing.page.resolve().as_uri()):
+            print("There is no browser here that could be opened: open the report in one elsewhere.", file=sys.stderr)
+    is_well = result.outcome in ("over", "late") and (showing is None or showing.is_whole)
+    sys.exit(0 if is_well else 1)
 
 
 if __name__ == "__main__":

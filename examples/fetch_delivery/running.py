@@ -76,7 +76,7 @@ def carry_out(
                 begin(run)
 
         try:
-            hfg.run(graph, clock="virtual", until_s=seconds, begin=both)
+            hfg.run(graph, clock="virtual", until_s=seconds, begin=both, block_warning_s=0)
         except KeyboardInterrupt:
             outcome = "interrupted"
         except HfgError as problem:
