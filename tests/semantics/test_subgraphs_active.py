@@ -7,7 +7,8 @@ import asyncio
 import pytest
 
 import hfg
-from hfg.trace import NodeEnabled
+from hfg.testing.nodes import add
+from hfg.trace import ActivityChanged, CallStarted, FiringEnded, NodeEnabled, TokenDrained
 from tests.semantics.nodes import (
     Countdown,
     Ear,
@@ -66,6 +67,43 @@ def test_a_subgraph_is_active_while_something_inside_is(fast: bool) -> None:
     assert up.seen == [(None, 0)]
     assert down.seen == [(None, 2)]
     assert report.nodes["ear"].active
+
+
+@pytest.mark.rule("G2", "F12")
+def test_what_a_node_drains_as_it_ends_makes_the_subgraphs_around_it_active_at_once(fast: bool) -> None:
+    """Activity leaves by `activated`, so the node inside never becomes active."""
+    graph = hfg.Graph()
+    box, ear, twice = graph.add(Pairs()), graph.add(Ear(), name="ear"), graph.add(Twice())
+    graph.connect(graph.start, twice.begin)
+    graph.connect(graph.add(slow_numbers(count=0, pause_s=1)).out, box.first)
+    graph.connect(twice.said, box.second, active=True)
+    box.activated.activates(ear.begin)
+    trace = traced(graph, fast=fast)
+    assert [(event.node, event.active) for event in of_kind(trace, ActivityChanged)] == [("ear", True)]
+    kinds = [type(event) for event in trace if isinstance(event, TokenDrained | CallStarted | FiringEnded)]
+    assert kinds[-3:] == [TokenDrained, FiringEnded, CallStarted]
+
+
+class Pairs(hfg.Subgraph):
+    """A node that takes two inputs together."""
+
+    first, second = hfg.Input(int), hfg.Input(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        both = graph.add(add(), name="both")
+        graph.connect(self.first.inner, both.a)
+        graph.connect(self.second.inner, both.b, active=True)
+
+
+class Twice(hfg.Node):
+    """Says something twice, the second time with activity."""
+
+    said = hfg.Event(int)
+
+    @hfg.slot
+    def begin(self) -> None:
+        self.said.trigger(1)
+        self.said.trigger(2, activity=1)
 
 
 @pytest.mark.rule("G2")

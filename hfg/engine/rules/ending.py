@@ -10,6 +10,7 @@ from typing import Any
 
 from hfg.engine.model.worker import DISABLED, Worker
 from hfg.engine.rules.agenda import freed, idle_again
+from hfg.engine.rules.modifiers import derive_scopes, touch
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, send_end
 from hfg.errors import EndOfStream
@@ -41,6 +42,9 @@ def end(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> N
     worker.end()
     worker.in_time()
     drain_left(worker.in_edges)
+    if worker.deferred:  # what was drained has yet to act, and subgraphs around are active by it meanwhile (G2)
+        touch(core, worker.scopes)
+        derive_scopes(core)
     hook = worker.node._hook("end") if worker.node is not None else None
     if hook is None:
         _ended(worker, None, None)
