@@ -151,11 +151,23 @@ ACTIVE: Final = EdgeOptions(active=True)
 
 
 def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
-    """Check the options of a node and give the object shared by all that have the same.
+    """Check the options of a node and give the object shared by all that have the same, which are checked once.
 
     Raises:
       GraphError: a value is out of its range; the message begins with `where`.
     """
+    try:
+        return _right_options(**given)
+    except (GraphError, TypeError):  # the second: one that cannot be hashed, and so is none
+        return _checked(where, given)
+
+
+@functools.lru_cache(maxsize=1024, typed=True)
+def _right_options(**given: Any) -> NodeOptions:  # noqa: ANN401 - each checked by its name
+    return _checked("", given)
+
+
+def _checked(where: str, given: dict[str, Any]) -> NodeOptions:
     _need_choice(where, "on_error", given["on_error"], ON_ERROR, GraphError)
     _need_choice(where, "release", given["release"], RELEASE, GraphError)
     for name in ("max_rate_hz", "max_duration_s", "active_for_s", "deadline_s"):
@@ -179,11 +191,6 @@ def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
             f"{where}: group must be the name of a group, got {group!r}; "
             'declare it with graph.group("vision", threads=1)'
         )
-    return _shared_node_options(**given)
-
-
-@functools.lru_cache(maxsize=1024)
-def _shared_node_options(**given: Any) -> NodeOptions:  # noqa: ANN401 - each checked by its name
     return NodeOptions(**given)
 
 
