@@ -51,6 +51,7 @@ class SetLamp(hfg.Subgraph):
         self.begin.inner.activates(once.begin)
         once.done.activates(self.done.inner)
         graph.promote(self.on, value.ports.parameters["value"])
+        graph.gate(value, by=once)
 
 
 class Approach(hfg.Node):

@@ -28,6 +28,8 @@ from hfg.testing import Recorder, fire
 from tests.examples.fetch_delivery.measure_missions import measured
 from tests.examples.fetch_delivery.watching import Watch, watched
 
+pytestmark = pytest.mark.timeout(300)  # on a machine that has much else to do, whole missions take minutes
+
 
 def at(x: float, y: float, theta: float = 0.0, stamp: float = 0.0, sure: bool = True) -> Localised:
     return Localised(np.array([x, y, theta]), np.eye(3) * 1e-4, 1.0, sure, stamp)
@@ -259,7 +261,6 @@ def minutes() -> Watch:
     return watched(seed=1, minutes=3.0)
 
 
-@pytest.mark.timeout(300)
 def test_in_its_first_minutes_a_robot_delivers_cubes_by_what_it_sees_itself(minutes: Watch) -> None:
     (score,) = minutes.simulation.scores
     assert len(score.delivered) >= 3
