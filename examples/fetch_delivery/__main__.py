@@ -13,7 +13,7 @@ import hfg
 from examples.fetch_delivery.mission import Robot, build
 from examples.fetch_delivery.running import carry_out
 from examples.fetch_delivery.showing import Showing
-from examples.fetch_delivery.world import FAULTS, Fault, fault
+from examples.fetch_delivery.world import FAULTS, Cameras, Fault, fault
 
 SHOWN_IN = Path("out", "fetch_delivery")
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -62,6 +62,9 @@ def main(
     within: Annotated[
         float | None, typer.Option(metavar="SECONDS", min=1, help="End it earlier when it takes longer than that.")
     ] = None,
+    cameras: Annotated[
+        Cameras, typer.Option(help="What draws the pictures; mujoco needs a package and OpenGL.")
+    ] = "light",
     machine: Annotated[
         bool, typer.Option("--machine", help="A state machine decides, not the flow of activity.")
     ] = False,
@@ -75,7 +78,7 @@ def main(
 ) -> None:
     """Robots deliver cubes in a simulated arena; says in the end how they did."""
     faults: tuple[Fault, ...] = tuple(fault(name) for name in fault_names or [])
-    graph = build(seed, robots, faults=faults, kind=_kind(machine))
+    graph = build(seed, robots, faults=faults, kind=_kind(machine), cameras=cameras)
     showing = None
     if report is not None or show:
         showing = _showing(report or SHOWN_IN, graph, seed, robots, 60 * minutes)

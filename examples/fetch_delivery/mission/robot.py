@@ -26,7 +26,7 @@ from examples.fetch_delivery.perception.records import Localised, Sighting, Sign
 from examples.fetch_delivery.perception.sighting import find_targets, read_digits
 from examples.fetch_delivery.perception.signs import SignMap
 from examples.fetch_delivery.perception.stations import StationMap
-from examples.fetch_delivery.world import Fault
+from examples.fetch_delivery.world import Cameras, Fault
 from hfg.nodes import activity, flow
 from hfg.nodes.robotics import Disk
 
@@ -224,6 +224,7 @@ def build(
     faults: tuple[Fault, ...] = (),
     gated: bool = True,
     kind: type[Robot] = Robot,
+    cameras: Cameras = "light",
 ) -> hfg.Graph:
     """Build the arena with robots in it, each with a mission of its own.
 
@@ -234,9 +235,14 @@ def build(
       faults: what shall go wrong.
       gated: pictures are taken when a step asks for them; else all the time, to see what that saves.
       kind: what sort of robot; all have the same ports.
+      cameras: what draws the pictures: the light renderer, or MuJoCo, which needs a package and OpenGL.
     """
     graph = hfg.Graph("fetch-delivery")
-    world = graph.add(World(seed=seed, speed=speed, faults=faults, odometry=robots), name="world", max_rate_hz=RATE_HZ)
+    world = graph.add(
+        World(seed=seed, speed=speed, faults=faults, cameras=cameras, odometry=robots),
+        name="world",
+        max_rate_hz=RATE_HZ,
+    )
     for number in range(robots):
         robot = graph.add(kind(), name=f"robot_{number}")
         graph.start.activates(robot.begin)

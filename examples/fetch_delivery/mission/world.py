@@ -8,7 +8,7 @@ from annotated_types import Ge, Interval
 
 import hfg
 from examples.fetch_delivery.messages import Odometry, Picture, Scan, Twist
-from examples.fetch_delivery.world import Fault, Simulation
+from examples.fetch_delivery.world import Cameras, Fault, Simulation
 from examples.fetch_delivery.world.robots import Limits
 
 RATE_HZ = 10.0
@@ -24,6 +24,7 @@ class World(hfg.Node):
       seed: decides what looks like chance.
       speed: of the motors.
       faults: what shall go wrong.
+      cameras: what draws the pictures.
       odometry: of each robot; their number is that of the robots.
       scan: of each robot.
       message: what the referee says.
@@ -40,6 +41,7 @@ class World(hfg.Node):
     seed = hfg.Parameter(1, Ge(0))
     speed = hfg.Parameter(0.6, Interval(gt=0, le=3), unit="m/s")
     faults = hfg.Parameter[tuple[Fault, ...]](())
+    cameras = hfg.Parameter[Cameras]("light")
     odometry = hfg.Outputs(Odometry)
     scan = hfg.Outputs(Scan, "odometry")
     message = hfg.Output(str)
@@ -53,7 +55,9 @@ class World(hfg.Node):
     def setup(self) -> None:
         """Build the arena anew."""
         limits = Limits(speed=self.speed)
-        self.simulation = Simulation(self.seed, robots=len(self.odometry), limits=limits, faults=self.faults)
+        self.simulation = Simulation(
+            self.seed, robots=len(self.odometry), limits=limits, faults=self.faults, cameras=self.cameras
+        )
 
     def process(self) -> None:
         """Let a tenth of a second pass, and measure."""

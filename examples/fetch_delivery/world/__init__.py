@@ -2,7 +2,7 @@
 
 simulation ── robots ── arena
 │           └────── (limits, collisions, odometry)
-├──── rendering ─── what the cameras see
+├──── rendering ─── what the cameras see; mujoco_cameras: the same by OpenGL
 ├──── scanning ──── what the lasers see
 ├──── operators ─── people who put cubes in and take them out
 ├──── faults ────── what can be made to go wrong, by name
@@ -12,6 +12,6 @@ simulation ── robots ── arena
 from examples.fetch_delivery.world.arena import Arena, Station
 from examples.fetch_delivery.world.faults import FAULTS, Fault, fault
 from examples.fetch_delivery.world.scoring import Score
-from examples.fetch_delivery.world.simulation import Simulation
+from examples.fetch_delivery.world.simulation import Cameras, Simulation
 
-__all__ = ["FAULTS", "Arena", "Fault", "Score", "Simulation", "Station", "fault"]
+__all__ = ["FAULTS", "Arena", "Cameras", "Fault", "Score", "Simulation", "Station", "fault"]

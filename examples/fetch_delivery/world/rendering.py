@@ -145,6 +145,20 @@ class Renderer:
           sideways: how fast it moves to its side, in m/s; blurs it a little.
           shake: where the noise is cut from, below 128 each.
         """
+        picture = self._draw_front(pose, around, hidden)
+        length = round(FOCAL_PX * EXPOSURE_S * (abs(turning) + abs(sideways) / 3))
+        if length > 1:
+            picture = np.asarray(cv2.blur(picture, (length, 1)), np.uint8)
+        return self._with_noise(picture, shake)
+
+    def basket(self, cube: Cube | None, *, shake: tuple[int, int] = (0, 0)) -> Picture:
+        """Take a picture of the basket."""
+        return self._with_noise(self._draw_basket(cube), shake)
+
+    def _draw_front(
+        self, pose: tuple[float, float, float], around: tuple[Round, ...], hidden: frozenset[str]
+    ) -> Picture:
+        """Draw what is ahead, sharp and clean."""
         eye, turn = _camera(pose, FRONT)
         picture = self._empty.copy()
         self._paint(picture, self._outer, eye, turn, hidden)
@@ -154,13 +168,10 @@ class Renderer:
         self._paint(picture, self._inner, eye, turn, hidden)
         for thing in near:
             _paint_round(picture, thing, eye, turn)
-        length = round(FOCAL_PX * EXPOSURE_S * (abs(turning) + abs(sideways) / 3))
-        if length > 1:
-            picture = np.asarray(cv2.blur(picture, (length, 1)), np.uint8)
-        return self._with_noise(picture, shake)
+        return picture
 
-    def basket(self, cube: Cube | None, *, shake: tuple[int, int] = (0, 0)) -> Picture:
-        """Take a picture of the basket."""
+    def _draw_basket(self, cube: Cube | None) -> Picture:
+        """Draw the basket, sharp and clean."""
         picture = self._basket.copy()
         if cube is not None:
             eye, turn = _camera((0.0, 0.0, 0.0), BASKET)
@@ -176,7 +187,7 @@ class Renderer:
             top = np.array([[x + half * math.sqrt(2) * math.cos(f + 0.785), 0, z + half] for f in sides])
             top[:, 1] = [y + half * math.sqrt(2) * math.sin(f + 0.785) for f in sides]
             _paint_one(picture, (top - eye) @ turn.T, 225)
-        return self._with_noise(picture, shake)
+        return picture
 
     def _set_up_walls(self, arena: Arena) -> None:
         half = RADIUS_M * math.sin(math.pi / WALL_PANELS)

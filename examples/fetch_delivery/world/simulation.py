@@ -8,7 +8,7 @@ the same world.
 from __future__ import annotations
 
 import math
-from typing import TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 import cv2
 import numpy as np
@@ -36,6 +36,8 @@ ROBOT_HEIGHT_M = 0.42
 START_M = 4.2  # from the middle
 DRIVING = 0.05  # m/s
 
+Cameras: TypeAlias = Literal["light", "mujoco"]
+
 _Kind = TypeVar("_Kind", bound=Fault)
 
 
@@ -56,6 +58,7 @@ class Simulation:
         limits: Limits | None = None,
         faults: tuple[Fault, ...] = (),
         start_s: float = 1.0,
+        cameras: Cameras = "light",
     ) -> None:
         """Set everything up; equal arguments give equal worlds.
 
@@ -65,9 +68,11 @@ class Simulation:
           limits: what their motors can do.
           faults: what shall go wrong.
           start_s: when the referee says "start".
+          cameras: what draws the pictures: the light renderer, or MuJoCo, which needs a package and OpenGL.
 
         Raises:
           ValueError: if a value is out of its range.
+          CamerasMissing: if MuJoCo cannot draw here.
         """
         if not 1 <= robots <= 4:
             raise ValueError(f"one to four robots fit into the arena, not {robots}")
@@ -88,7 +93,7 @@ class Simulation:
         self._cubes: list[Cube | None] = [None] * robots
         self._touched = [False] * robots
         self._ticks = 0
-        self._renderer = Renderer(self.arena)
+        self._renderer = _renderer(cameras, self.arena)
         self._check_faults()
 
     @property
@@ -287,3 +292,11 @@ class Simulation:
             START_M * math.sin(angle),
             angle + math.pi / 2 + float(lots.uniform(-0.2, 0.2)),
         )
+
+
+def _renderer(cameras: Cameras, arena: Arena) -> Renderer:
+    if cameras == "light":
+        return Renderer(arena)
+    from examples.fetch_delivery.world.mujoco_cameras import MujocoRenderer  # OpenGL only for who wants it
+
+    return MujocoRenderer(arena)
