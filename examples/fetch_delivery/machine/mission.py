@@ -25,7 +25,8 @@ from examples.fetch_delivery.perception.signs import delivery_station
 from hfg.nodes.robotics import Disk
 
 _GRUDGE_S: Final = 40.0  # for how long a failure at a filling station counts
-_ATTEMPTS: Final = 3  # to deliver a cube
+_ATTEMPTS: Final = 3  # at a station to deliver a cube
+_BRINGS: Final = 2  # so often a sign is looked for anew, then nobody wants the cube
 _VIEWS: Final = 16  # in a row are more than once around
 _BEFORE_M: Final = 1.25  # a station, from where its sign is looked for
 
@@ -74,7 +75,7 @@ class Orders:
       look_into_basket: whether one of the basket shall be.
       ask: whether to begin anew with looking what lies in the basket.
       forget: the number of a sign that is not where it should be.
-      not_found: the number of a sign that was not found.
+      report: the number of a cube that cannot be delivered.
     """
 
     command: Twist = field(default_factory=Twist)
@@ -83,7 +84,7 @@ class Orders:
     look_into_basket: bool = False
     ask: bool = False
     forget: int | None = None
-    not_found: int | None = None
+    report: int | None = None
 
 
 class _State(NestedState):
@@ -97,6 +98,7 @@ class _Machine(HierarchicalMachine):
 _VISIT: Final[dict[str, Any]] = {
     "name": "visit",
     "initial": "go_to",
+    "on_enter": "count_attempt",
     "children": [
         {"name": "go_to", "on_enter": "begin_to_approach"},
         {"name": "position", "on_enter": "begin_to_position"},
@@ -120,6 +122,7 @@ STATES: Final[list[Any]] = [
     {
         "name": "explore",
         "initial": "view",
+        "on_enter": "begin_to_explore",
         "children": [
             "view",
             {"name": "look_around", "on_enter": "begin_to_turn"},
@@ -144,7 +147,7 @@ TRANSITIONS: Final[list[Any]] = [
     ["lost", "fetch/select", "fetch/look_around"],
     ["done", "fetch/look_around", "fetch/select"],
     {"trigger": "failed", "source": "fetch/visit", "dest": "fetch/select", "before": "bear_a_grudge"},
-    ["served", "fetch/visit", "read_cube"],
+    {"trigger": "served", "source": "fetch/visit", "dest": "read_cube", "before": "begin_to_bring"},
     {"trigger": "read", "source": "read_cube", "dest": "deliver", "conditions": "sign_is_known"},
     ["read", "read_cube", "explore"],
     ["lost", "read_cube", "fetch"],
@@ -153,7 +156,19 @@ TRANSITIONS: Final[list[Any]] = [
     {"trigger": "failed", "source": "explore/view", "dest": "fetch", "before": "give_the_cube_back"},
     ["done", ["explore/go_to", "explore/look_around"], "read_cube"],
     {"trigger": "failed", "source": "deliver/visit", "dest": "deliver/visit", "conditions": "may_try_again"},
-    {"trigger": "failed", "source": "deliver/visit", "dest": "read_cube", "before": "forget_sign"},
+    {
+        "trigger": "failed",
+        "source": "deliver/visit",
+        "dest": "read_cube",
+        "conditions": "may_bring_again",
+        "before": "forget_sign",
+    },
+    {
+        "trigger": "failed",
+        "source": "deliver/visit",
+        "dest": "fetch",
+        "before": ["forget_sign", "give_the_cube_back"],
+    },
     ["served", "deliver/visit", "fetch"],
     *_visit("fetch/visit"),
     *_visit("deliver/visit"),
@@ -202,7 +217,7 @@ class Mission:
         self._refused = 0  # number of a cube that is to be given back
         self.station: Station
         self._failures: dict[tuple[int, int], float] = {}
-        self._attempts = 0
+        self._attempts, self._in_vain = 0, 0
         self._wanted, self._views = 0, 0
         self._drive: Any = None
         self._view: Any = None
@@ -384,7 +399,7 @@ class Mission:
     def begin_to_deliver(self) -> None:
         """Where the sign says."""
         self.station = delivery_station(self.senses.signs[self._number])
-        self._attempts, self._views = 1, 0
+        self._attempts, self._views = 0, 0
 
     def lamp_on(self) -> None:
         """Ask people for help."""
@@ -402,24 +417,39 @@ class Mission:
         """Remember where it failed."""
         self._failures[_key(self.station)] = self.senses.now
 
+    def count_attempt(self) -> None:
+        """One more at this station."""
+        self._attempts += 1
+
     def may_try_again(self) -> bool:
         """Say whether the cube is worth another attempt at its station."""
-        self._attempts += 1
-        return self._attempts <= _ATTEMPTS
+        return self._attempts < _ATTEMPTS
+
+    def begin_to_bring(self) -> None:
+        """Here is a new cube."""
+        self._in_vain = 0
+
+    def may_bring_again(self) -> bool:
+        """Say whether another sign may be looked for with this cube."""
+        return self._in_vain + 1 < _BRINGS
 
     def forget_sign(self) -> None:
         """It is not where the map has it."""
         self.orders.forget = self._number
+        self._in_vain += 1
 
     def sign_is_known(self) -> bool:
-        """Say whether the station of the cube is in the map; count the views anew if another one is looked for."""
-        if self._number != self._wanted:
-            self._wanted, self._views = self._number, 0
+        """Say whether the station of the cube is in the map."""
         return self._number in self.senses.signs
 
+    def begin_to_explore(self) -> None:
+        """Count the views anew if another sign is looked for."""
+        if self._number != self._wanted:
+            self._wanted, self._views = self._number, 0
+
     def give_the_cube_back(self) -> None:
-        """All was looked at: wait for another cube, once."""
-        self._refused = self.orders.not_found = self._number
+        """Nobody wants it: say so, and wait for another cube, once."""
+        self._refused = self.orders.report = self._number
         self._views = 0
 
 

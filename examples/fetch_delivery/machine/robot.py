@@ -33,7 +33,7 @@ class Control(hfg.Node):
       look_into_basket: asks for one of the basket.
       ask: asks the cube detection to look anew.
       forget: the number of a sign that is not where it should be.
-      not_found: the number of a sign that was not found.
+      report: the number of a cube that cannot be delivered.
       entered: the state that was entered.
       begin: begin the mission.
       targets: bull's-eyes that are seen.
@@ -48,7 +48,7 @@ class Control(hfg.Node):
     localised, others = hfg.Input(Localised, optional=True), hfg.Input(list[Disk], optional=True)
     command, lamp = hfg.Output(Twist), hfg.Output(bool)
     look_ahead, look_into_basket = hfg.Output(object), hfg.Output(Scan)
-    ask, forget, not_found = hfg.Event(), hfg.Event(int), hfg.Event(int)
+    ask, forget, report = hfg.Event(), hfg.Event(int), hfg.Event(int)
     entered = hfg.Event(str)
 
     mission: hfg.State[Any] = hfg.State(None)
@@ -110,8 +110,8 @@ class Control(hfg.Node):
             self.ask.trigger()
         if orders.forget is not None:
             self.forget.trigger(orders.forget)
-        if orders.not_found is not None:
-            self.not_found.trigger(orders.not_found)
+        if orders.report is not None:
+            self.report.trigger(orders.report)
 
 
 class Robot(robot.Robot):
@@ -139,5 +139,5 @@ class Robot(robot.Robot):
         graph.connect(give_way.held, self.command.inner)
         for name in ("lamp", "look_ahead", "look_into_basket"):
             graph.connect(control.ports.outputs[name], self.ports.outputs[name].inner)
-        graph.connect(control.not_found, self.report.inner)
+        graph.connect(control.report, self.report.inner)
         graph.connect(perception.unreadable, self.report.inner)

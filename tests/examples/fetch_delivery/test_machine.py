@@ -181,7 +181,23 @@ def test_a_cube_is_taken_to_its_station_three_times_then_the_sign_is_forgotten()
     for _ in range(2):
         assert led(mission, "failed")[0] == "deliver/visit/go_to"
     state, orders = led(mission, "failed")
-    assert (state, orders.forget) == ("read_cube", 3)
+    assert (state, orders.forget, orders.report) == ("read_cube", 3, None)
+
+
+def test_a_cube_that_was_brought_in_vain_twice_is_given_back_for_another_one() -> None:
+    mission = in_state("deliver/visit/retreat")
+    for _ in range(3):
+        led(mission, "failed")
+    mission.step(sense(basket=3, signs={3: SIGN}))
+    for _ in range(2):
+        assert led(mission, "failed")[0] == "deliver/visit/go_to"
+    state, orders = led(mission, "failed")
+    assert (state, orders.forget, orders.report) == ("fetch/select", 3, 3)
+    mission.step(sense())
+    for _ in range(4):
+        mission.trigger("done")
+    mission.step(sense(basket=3))
+    assert mission.state == "fetch/visit/wait"
 
 
 def test_when_it_has_been_around_in_vain_it_gives_the_cube_back_for_another_one() -> None:
@@ -191,7 +207,7 @@ def test_when_it_has_been_around_in_vain_it_gives_the_cube_back_for_another_one(
         assert led(mission, "done")[0] == "read_cube"
         mission.step(sense(basket=3))
     orders = mission.step(sense())
-    assert (mission.state, orders.not_found) == ("fetch/select", 3)
+    assert (mission.state, orders.report) == ("fetch/select", 3)
     mission.step(sense())
     for _ in range(4):
         mission.trigger("done")
