@@ -11,10 +11,11 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench peers bench-peers bench-goals bench-docs bench-links docs-nodes soak setup clean
+.PHONY: help demo photographs test lint bench peers bench-peers bench-goals bench-docs bench-links docs-nodes soak setup clean
 
 help:
-	@echo "make demo    search, measure and report on real photographs, watched and steered"
+	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
+	@echo "make photographs   search, measure and report on real photographs, watched and steered"
 	@echo "make test    run all tests (without the long ones)"
 	@echo "make lint    ruff and mypy"
 	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md;"
@@ -24,7 +25,11 @@ help:
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything tools have left"
 
+# Ends earlier, with what there is by then, on a machine that is too slow for it.
 demo: $(READY)
+	$(BIN)/python -m examples.fetch_delivery --minutes 1.5 --within 120 --report out/fetch_delivery
+
+photographs: $(READY)
 	$(BIN)/python examples/photographs.py
 
 # As many processes as there are cores; without them: .venv/bin/python -m pytest

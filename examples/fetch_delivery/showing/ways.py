@@ -36,7 +36,8 @@ def ways(simulation: Simulation, robots: Sequence[Seen]) -> str:
             f'<circle cx="{body.x:.3f}" cy="{0 - body.y:.3f}" r="0.25" fill="{_colour(number)}"/>'
             f'<path d="{_path([(body.x, body.y), nose])}" stroke="#ffffff" stroke-width="0.06"/>\n'
         )
-    return "".join([*parts, *_legend(half), "</svg>\n"])
+    legend = _legend(half) if any(seen.way for seen in robots) else ()
+    return "".join([*parts, *legend, "</svg>\n"])
 
 
 def _station(station: Station) -> Iterator[str]:

@@ -24,6 +24,7 @@ from examples.fetch_delivery.perception.records import Localised, Sign
 from examples.fetch_delivery.perception.sighting import find_targets, read_digits
 from examples.fetch_delivery.running import Result, carry_out
 from examples.fetch_delivery.showing import Showing, cameras, video
+from examples.fetch_delivery.showing.figures import figure_16
 from examples.fetch_delivery.showing.observing import Observer
 from examples.fetch_delivery.showing.top_view import SIZE, TopView
 from examples.fetch_delivery.showing.ways import ways
@@ -249,3 +250,9 @@ def test_the_drawing_of_the_ways_has_a_way_for_each_robot_with_gaps_where_nothin
     believed = re.findall(r'<path d="([^"]*)" fill="none" stroke="#262c32"', drawn)
     assert believed[0] == "M0.000 0.000L0.100 0.000M0.300 0.000L0.400 0.000"
     assert drawn.count("opacity") == 2
+
+
+def test_the_picture_of_a_station_in_the_documentation_is_what_the_camera_sees() -> None:
+    kept = cv2.imread(str(ROOT / "docs" / "pictures" / "figure_16.jpg"))
+    assert kept is not None
+    assert np.abs(kept.astype(int) - figure_16().astype(int)).mean() < 4
