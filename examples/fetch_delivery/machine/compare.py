@@ -2,6 +2,7 @@
 
     python -m examples.fetch_delivery.machine.compare                  both tables, in Markdown; takes minutes
     python -m examples.fetch_delivery.machine.compare --minutes 0      what can be counted without a run
+    python -m examples.fetch_delivery.machine.compare --page FILE      both, into the page docs/machine-or-activity.md
 
 Every mission runs in a process of its own, one after another, the two sorts in turn. Processor time is that of the
 whole process while the graph runs: arena, cameras and perception, which are the same for both, and mission control.
@@ -14,6 +15,7 @@ import ast
 import inspect
 import io
 import json
+import re
 import statistics
 import subprocess
 import sys
@@ -21,6 +23,7 @@ import time
 import tokenize
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Final, Literal, TypeAlias, get_args
 
@@ -237,15 +240,34 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---", *["---:"] * (len(head) - 1)], *rows))
 
 
+def put_into(page: str, name: str, table: str) -> str:
+    """Put a table into a page, between its marks.
+
+    Raises:
+      ValueError: if the page has no such marks.
+    """
+    marked = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+    if not marked.search(page):
+        raise ValueError(f"the page has no place for the table {name!r}: <!-- {name} --> and, further on, <!-- end -->")
+    return marked.sub(lambda found: f"{found[1]}{table}\n{found[2]}", page, count=1)
+
+
 def main() -> None:
     arguments = argparse.ArgumentParser(prog="python -m examples.fetch_delivery.machine.compare", description=__doc__)
     arguments.add_argument("--minutes", type=float, default=10.0, help="simulated minutes of each mission; 0 runs none")
     arguments.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
+    arguments.add_argument("--page", type=Path, help="write the tables into this page instead of printing them")
     given = arguments.parse_args()
-    print(counted())
+    tables = {"counted": counted()}
     if given.minutes > 0:
-        print()
-        print(measured(missions(given.seeds, given.minutes)))
+        tables["measured"] = measured(missions(given.seeds, given.minutes))
+    if given.page is None:
+        print("\n\n".join(tables.values()))
+        return
+    page = given.page.read_text(encoding="utf-8")
+    for name, table in tables.items():
+        page = put_into(page, name, table)
+    given.page.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

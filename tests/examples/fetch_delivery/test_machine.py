@@ -316,6 +316,15 @@ def test_what_is_counted_is_what_is_there() -> None:
     assert graph["nodes"] >= graph["states"]
 
 
+def test_tables_go_into_a_page_between_their_marks() -> None:
+    page = "a\n<!-- counted -->\nold\n<!-- end -->\nb\n<!-- measured -->\n<!-- end -->\n"
+    page = compare.put_into(page, "counted", "| new |")
+    page = compare.put_into(page, "measured", "| n |")
+    assert page == "a\n<!-- counted -->\n| new |\n<!-- end -->\nb\n<!-- measured -->\n| n |\n<!-- end -->\n"
+    with pytest.raises(ValueError, match="no place for the table 'counted'"):
+        compare.put_into("a page", "counted", "| new |")
+
+
 def test_missions_of_both_sorts_are_measured() -> None:
     runs = [compare.mission(sort, 3, 0.02) for sort in compare.KINDS]
     assert [(run["sort"], run["seed"], run["delivered"]) for run in runs] == [("activity", 3, 0), ("machine", 3, 0)]
