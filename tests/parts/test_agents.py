@@ -97,6 +97,9 @@ class Computer:
     def forget(self, run: str) -> None:
         self.forgotten.append(run)
 
+    async def close(self) -> None:
+        """Nothing was begun."""
+
 
 class World:
     """A network with agents."""

@@ -101,8 +101,8 @@ class Cell:
         wait_for(lambda: len(self.values()) >= until)
 
     def processes(self) -> list[int]:
-        """Those that were begun by what was begun here."""
-        return children_of([one.pid for one in self.begun])
+        """Those that were begun by what was begun here, but for what waits there to be needed."""
+        return [one for one in children_of([one.pid for one in self.begun]) if not is_spare(one)]
 
 
 def children_of(processes: list[int]) -> list[int]:
@@ -118,6 +118,15 @@ def children_of(processes: list[int]) -> list[int]:
     while more := {pid for pid, parent in parents.items() if parent in found} - found:
         found |= more
     return sorted(found - set(processes))
+
+
+def is_spare(process: int) -> bool:
+    try:
+        about = Path(f"/proc/{process}")
+        is_or_was = (about / "cmdline").read_bytes().endswith(b"\0spare\0")
+        return is_or_was and not (about / "comm").read_text().startswith("hfg ")
+    except OSError:
+        return False
 
 
 def is_there(process: int) -> bool:

@@ -17,7 +17,7 @@ pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 
 NODES = """
     import asyncio, logging, os, signal, sys
-    from collections.abc import Iterator
+    from collections.abc import AsyncIterator, Iterator
     from pathlib import Path
     import hfg
 
@@ -119,6 +119,57 @@ def test_a_process_that_dies_is_begun_again_and_nothing_is_lost(tmp_path: Path, 
     assert 'the process of group "far" was begun again 1 times' in out
     assert ("has ended with code 3" if how == "exit" else "was ended by SIGKILL") in err
     nothing_is_left(tmp_path, pids)
+
+
+@pytest.mark.rule("L2")
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system does not tell the children of a process")
+def test_a_process_that_waits_already_takes_the_place_of_one_that_dies(tmp_path: Path) -> None:
+    running = program(
+        tmp_path,
+        f"""
+    from hfg.parts.processes import spares
+
+    waiting = []
+
+    def spare() -> int:
+        for child in Path(f"/proc/{{os.getpid()}}/task/{{os.getpid()}}/children").read_text().split():
+            if Path(f"/proc/{{child}}/cmdline").read_bytes().endswith(b"\\0spare\\0"):
+                return int(child)
+        return 0
+
+    @hfg.node
+    async def patient(*, count: int = 40) -> AsyncIterator[int]:
+        while not spare():
+            await asyncio.sleep(0.01)
+        waiting.append(spare())
+        for number in range(count):
+            yield number
+
+    @hfg.node
+    def where(value: int, *, flag: str) -> int:
+        if value == 20 and not Path(flag).exists():
+            Path(flag).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return os.getpid()
+
+    if __name__ == "__main__":
+        spares.AFTER_S = 0.0
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        source, one = graph.add(patient()), graph.add(where(flag={str(tmp_path / "flag")!r}), group="far")
+        graph.connect(source.out, one.value)
+        graph.connect(one.out, graph.output("out", int))
+        found = hfg.run(graph).outputs["out"]
+        assert len(found) == 40
+        assert found[0] != found[-1] == waiting[0], (found, waiting)
+        print(*found, spare())
+    """,
+    )
+    out, err = running.communicate(timeout=60)
+    assert running.returncode == 0, err
+    *processes, last_spare = map(int, out.split())
+    assert last_spare == 0
+    wait_for(lambda: not any(is_there(process) for process in processes))
 
 
 @pytest.mark.rule("L2", "X2")

@@ -92,6 +92,9 @@ class Host(Protocol):
     def forget(self, run: str) -> None:
         """No part of a run is here any more: nothing of it is to be left."""
 
+    async def close(self) -> None:
+        """Nothing more will be begun."""
+
 
 class _Charge:
     """One life of a part of a run.
@@ -218,6 +221,7 @@ class Agent:
         mains = [(key, charge) for key, charge in self._charges.items() if key[1] == _MAIN]
         await asyncio.gather(*(self._let_go(key, charge) for key, charge in mains))  # they ask for the end of others
         await asyncio.gather(*(self._let_go(key, charge) for key, charge in list(self._charges.items())))
+        await self._host.close()
         for timer in self._leaving.values():
             timer.cancel()
         for answer in self._answers:

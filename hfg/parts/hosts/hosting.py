@@ -21,6 +21,7 @@ import msgspec
 from hfg.errors import TransportError
 from hfg.parts.hosts.realm import Chunk, Deploy, Missing, Start, run_id
 from hfg.parts.processes.launching import Begun, PartProcess, beat_of
+from hfg.parts.processes.spares import Spares
 from hfg.parts.running.rings import sweep_run
 from hfg.transport import Session
 
@@ -64,6 +65,7 @@ class Computer:
         self._journal = journal
         self._folder = folder
         self._path = [str(folder), *(one for one in sys.path if one)]
+        self._spares = Spares(keeps_output=True)
 
     async def part(self, order: Start) -> PartProcess:
         """See `Host`."""
@@ -83,7 +85,7 @@ class Computer:
             beat=beat_of(order.run, order.part, life),
             level=order.level,
         )
-        process = await PartProcess.begin(order.part, begun, keeps_output=True)
+        process = await PartProcess.begin(order.part, begun, keeps_output=True, spares=self._spares)
         process.watch(self._session, begun.beat)
         self._journal.keep(order.run, order.part, process)
         return process
@@ -109,6 +111,10 @@ class Computer:
     def forget(self, run: str) -> None:
         """See `Host`."""
         sweep_run(run)
+
+    async def close(self) -> None:
+        """See `Host`."""
+        await self._spares.close()
 
 
 def _is_folder(path: str) -> bool:

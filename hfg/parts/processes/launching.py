@@ -23,6 +23,7 @@ import msgspec
 from hfg.errors import TransportError, UsageError, in_words
 from hfg.graph import Graph
 from hfg.parts.model.messages import Open
+from hfg.parts.processes.spares import PROCESS, Spares, start
 from hfg.parts.processes.worker import Worker
 from hfg.parts.running.channels import name_of
 from hfg.parts.transports import transport
@@ -187,6 +188,7 @@ class ProcessLauncher:
         self._said = settings
         self._folder: Path | None = None
         self._session: Session | None = None
+        self._spares = Spares()
 
     async def open(self) -> Session:
         """See `Launcher`: nobody but this user reaches the socket at which the parts meet."""
@@ -223,12 +225,13 @@ class ProcessLauncher:
             beat=beat_of(run, part, lives[0]),
             level=logging.getLogger("hfg").getEffectiveLevel(),
         )
-        process = await PartProcess.begin(part, begun)
+        process = await PartProcess.begin(part, begun, spares=self._spares)
         process.watch(self._session, begun.beat)
         return process
 
     async def close(self) -> None:
         """See `Launcher`."""
+        await self._spares.close()
         if self._session is not None:
             await self._session.close()
         if self._folder is not None:
@@ -316,8 +319,9 @@ class PartProcess:
         part: str,
         begun: msgspec.Struct,
         *,
-        module: str = "hfg.parts.processes.process",
+        module: str = PROCESS,
         keeps_output: bool = False,
+        spares: Spares | None = None,
     ) -> PartProcess:
         """Begin it.
 
@@ -326,21 +330,14 @@ class PartProcess:
           begun: what it is told on its standard input, which stays open.
           module: what it runs.
           keeps_output: what it writes is to be read from `output`; else it goes where that of this process goes.
+          spares: whose process it becomes if there is one; they agree in what they run and in `keeps_output`.
 
         Raises:
           TransportError: it cannot be begun.
         """
+        process = None if spares is None else spares.take()
         try:
-            process = await asyncio.create_subprocess_exec(
-                sys.executable,
-                "-m",
-                module,
-                part,
-                stdin=asyncio.subprocess.PIPE,
-                stdout=asyncio.subprocess.PIPE if keeps_output else None,
-                stderr=asyncio.subprocess.STDOUT if keeps_output else None,
-                process_group=0,  # Ctrl-C is for the main program, which ends this one
-            )
+            process = process or await start(part, module, keeps_output=keeps_output)
         except OSError as error:
             raise TransportError(f'no process can be begun for group "{part}": {error}') from error
         assert process.stdin is not None

@@ -31,6 +31,7 @@ from hfg.errors import HfgError, RunError, TransportError, in_words
 from hfg.graph import Graph
 from hfg.parts.model.messages import Logged, Open
 from hfg.parts.processes.launching import BEAT_S, Begun, build_graph
+from hfg.parts.processes.spares import SPARE
 from hfg.parts.processes.worker import Worker
 from hfg.parts.transports import transport
 from hfg.transport import Session, Traffic
@@ -45,10 +46,13 @@ def main() -> None:
     """Serve a part, until the run is over or whoever began this is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the main part, which ends this one
     line = sys.stdin.buffer.readline(_LONGEST)
+    if not line and sys.argv[1:] == [SPARE]:
+        return  # nobody needed it
     try:
         begun = msgspec.json.decode(line, type=Begun)
     except msgspec.DecodeError:
         raise SystemExit("this process serves a part of a run, which begins it; use hfg run") from None
+    _be_called(begun.part)
     sys.path[:] = begun.path
     sys.argv[:] = begun.argv
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -63,6 +67,12 @@ def main() -> None:
         raise SystemExit(1) from None
     finally:
         _sweep(begun)
+
+
+def _be_called(part: str) -> None:
+    """Let lists of processes show the part, also if this was a spare process; where the system has a way for that."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/comm").write_text(f"hfg {part}"[:15])
 
 
 def _sweep(begun: Begun) -> None:

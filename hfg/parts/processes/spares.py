@@ -1,0 +1,112 @@
+"""A process that has imported hfg and waits to be told what to serve, so that a part that dies is soon there again.
+
+Importing is most of what a new life of a part takes. Short runs have no spare process: it is begun some seconds after
+the last part was, when nobody is in a hurry. Stands on nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import sys
+from asyncio.subprocess import PIPE, STDOUT, Process
+from pathlib import Path
+from typing import Final
+
+__all__ = ["PROCESS", "SPARE", "Spares", "start"]
+
+PROCESS: Final = "hfg.parts.processes.process"
+"""The module that serves a part."""
+
+SPARE: Final = "spare"
+"""What a list of processes shows in place of the name of a group."""
+
+AFTER_S = 2.0
+"""How long after a part was begun a spare process is."""
+
+
+async def start(name: str, module: str = PROCESS, *, keeps_output: bool = False) -> Process:
+    """Start a process, which waits for what it is told on its standard input.
+
+    Args:
+      name: which a list of processes shows.
+      module: what it runs.
+      keeps_output: what it writes is to be read; else it goes where that of this process goes.
+
+    Raises:
+      OSError: it cannot be started.
+    """
+    return await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-m",
+        module,
+        name,
+        stdin=PIPE,
+        stdout=PIPE if keeps_output else None,
+        stderr=STDOUT if keeps_output else None,
+        process_group=0,  # Ctrl-C is for the main program, which ends this one
+    )
+
+
+class Spares:
+    """Has one spare process at a time.
+
+    Args:
+      keeps_output: see `start`.
+    """
+
+    def __init__(self, *, keeps_output: bool = False) -> None:
+        self._keeps_output = keeps_output
+        self._spare: Process | None = None
+        self._surroundings: object = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._making: asyncio.Task[None] | None = None
+        self._ending: set[asyncio.Task[int]] = set()
+
+    def take(self) -> Process | None:
+        """Give the spare process, if there is one that a new one would be like; another is begun after a while."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = asyncio.get_running_loop().call_later(AFTER_S, self._begin)
+        spare, self._spare = self._spare, None
+        if spare is None or spare.returncode is not None:
+            return None
+        if self._surroundings != _surroundings():
+            self._end(spare)
+            return None
+        return spare
+
+    def _begin(self) -> None:
+        if self._spare is None and (self._making is None or self._making.done()):
+            self._making = asyncio.create_task(self._make(), name="hfg spare process")
+
+    async def _make(self) -> None:
+        surroundings = _surroundings()
+        with contextlib.suppress(OSError):  # then there is none, and whoever needs a process is told why he gets none
+            self._spare = await start(SPARE, keeps_output=self._keeps_output)
+            self._surroundings = surroundings
+
+    def _end(self, spare: Process) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            spare.kill()
+        ending = asyncio.create_task(spare.wait())
+        self._ending.add(ending)
+        ending.add_done_callback(self._ending.discard)
+
+    async def close(self) -> None:
+        """Have none any more."""
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._making is not None:
+            await asyncio.wait({self._making})
+        if self._spare is not None:
+            self._end(self._spare)
+            self._spare = None
+        if self._ending:
+            await asyncio.wait(self._ending)
+
+
+def _surroundings() -> object:
+    """What a process takes over from this one when it is started."""
+    return dict(os.environ), Path.cwd()
