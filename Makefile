@@ -1,6 +1,9 @@
 # Each target sets up what it needs in .venv by itself; nothing but Python 3.11 or newer, pip and make has to be there.
 # Another Python: make PYTHON=python3.12 test (remove .venv first if it was made with a different one).
 
+# Many tests begin processes: without bytecode each would compile all that it imports.
+unexport PYTHONDONTWRITEBYTECODE
+
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
