@@ -21,8 +21,6 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from beartype.door import TypeHint, is_bearable
-from beartype.roar import BeartypeException
 from typing_extensions import is_protocol
 
 from hfg import generics
@@ -340,6 +338,9 @@ def _is_unpacked(hint: Any) -> bool:
 
 def _ask_beartype(source: Any, target: Any) -> str | None:
     """What we know nothing of."""
+    from beartype.door import TypeHint  # here, for it is a fifth of what importing hfg takes, and few programs need it
+    from beartype.roar import BeartypeException
+
     try:
         fits = TypeHint(source).is_subhint(TypeHint(target))
     except (BeartypeException, TypeError, ValueError) as error:
@@ -349,6 +350,9 @@ def _ask_beartype(source: Any, target: Any) -> str | None:
 
 
 def _is_hint(hint: Any) -> bool:
+    from beartype.door import TypeHint
+    from beartype.roar import BeartypeException
+
     try:
         TypeHint(hint)
     except (BeartypeException, TypeError, ValueError):
@@ -484,8 +488,20 @@ def _make_checker(hint: Any) -> Callable[[Any], bool]:
     if hint in _TOWER:
         allowed = (hint, *_TOWER[hint])
         return lambda value: isinstance(value, allowed)
+    if _is_plain_class(hint):
+        return lambda value: isinstance(value, hint)
+    if typing.get_origin(hint) is typing.Literal:
+        choices = typing.get_args(hint)
+        kinds = tuple(set(map(type, choices)))
+        return lambda value: isinstance(value, kinds) and value in choices
     items = _items_checker(typing.get_origin(hint), typing.get_args(hint))
-    return items or (lambda value: _bearable(value, hint))
+    return items or _bearable(hint)
+
+
+def _is_plain_class(hint: Any) -> bool:
+    """Whether `isinstance` says who belongs to it: not of a protocol, and not of a `TypedDict`."""
+    is_class = isinstance(hint, type) and typing.get_origin(hint) is None
+    return is_class and not typing.is_typeddict(hint) and not getattr(hint, "_is_protocol", False)
 
 
 def _items_checker(origin: Any, arguments: tuple[Any, ...]) -> Callable[[Any], bool] | None:
@@ -510,11 +526,17 @@ def _items_checker(origin: Any, arguments: tuple[Any, ...]) -> Callable[[Any], b
     return None
 
 
-def _bearable(value: Any, hint: Any) -> bool:
-    try:
-        return is_bearable(value, hint)
-    except BeartypeException:
-        return True  # what cannot be judged was refused where it was connected; here it is let through
+def _bearable(hint: Any) -> Callable[[Any], bool]:
+    from beartype.door import is_bearable
+    from beartype.roar import BeartypeException
+
+    def check(value: Any) -> bool:
+        try:
+            return is_bearable(value, hint)
+        except BeartypeException:
+            return True  # what cannot be judged was refused where it was connected; here it is let through
+
+    return check
 
 
 class ArrayFacts(NamedTuple):

@@ -18,7 +18,6 @@ from typing_extensions import TypeForm
 
 from hfg.errors import UsageError
 from hfg.graph.checks.checking import check
-from hfg.graph.drawing.formats import draw, view_of
 from hfg.graph.editing import transactions
 from hfg.graph.editing.commands import Command
 from hfg.graph.editing.telling import as_commands
@@ -457,6 +456,8 @@ class Graph:
           GraphError: a node is not in the graph, or is to be folded and no subgraph.
           UsageError: the file has another ending, or cannot be written, or an argument is none of its kind.
         """
+        from hfg.graph.drawing.formats import draw, view_of  # here, for most programs draw nothing
+
         return draw(self, path, format=format, view=view_of(self, depth, fold, active, ports))
 
     # --- editing ---
