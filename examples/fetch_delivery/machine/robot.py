@@ -47,7 +47,7 @@ class Control(hfg.Node):
     odometry, scan = hfg.Input(Odometry), hfg.Input(Scan)
     localised, others = hfg.Input(Localised, optional=True), hfg.Input(list[Disk], optional=True)
     command, lamp = hfg.Output(Twist), hfg.Output(bool)
-    look_ahead, look_into_basket = hfg.Output(object), hfg.Output(Scan)
+    look_ahead, look_into_basket = hfg.Output(bool), hfg.Output(bool)
     ask, forget, report = hfg.Event(), hfg.Event(int), hfg.Event(int)
     entered = hfg.Event(str)
 
@@ -104,7 +104,7 @@ class Control(hfg.Node):
         if orders.look_ahead:
             self.look_ahead.send(True)
         if orders.look_into_basket:
-            self.look_into_basket.send(scan)
+            self.look_into_basket.send(True)
         if orders.ask:
             self.newest.pop("basket", None)
             self.ask.trigger()

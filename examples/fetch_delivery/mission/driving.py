@@ -13,11 +13,11 @@ from annotated_types import Gt, Interval
 
 import hfg
 from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
+from examples.fetch_delivery.mission.looking import Shutter
 from examples.fetch_delivery.perception.following import FollowPath
 from examples.fetch_delivery.perception.laser import obstacle_ahead
 from examples.fetch_delivery.perception.planning import PlanPath
 from examples.fetch_delivery.perception.records import Localised, Sighting, Station, Wall, wrapped
-from hfg.nodes import flow
 from hfg.nodes.robotics import Disk
 
 
@@ -206,7 +206,7 @@ class GoTo(hfg.Subgraph):
     """
 
     localised, scan, others = hfg.Input(Localised), hfg.Input(Scan), hfg.Input(list[Disk])
-    command, look = hfg.Output(Twist), hfg.Output(object)
+    command, look = hfg.Output(Twist), hfg.Output(bool)
     go = hfg.slot(type=Vector)
     stop = hfg.slot(type=object)
     arrived, blocked = hfg.Event(), hfg.Event(object)
@@ -219,7 +219,7 @@ class GoTo(hfg.Subgraph):
         """Put the planner before the follower."""
         plan = graph.add(PlanPath(), name="plan", active_for_s=8.1)
         follow = graph.add(FollowPath(patience=6.0), name="follow")
-        shutter = graph.add(flow.EveryNth(n=3), name="shutter")
+        shutter = graph.add(Shutter(n=3), name="shutter")
         self.go.inner.activates(plan.goal)
         plan.path.activates(follow.ports.slots["path"])
         follow.arrived.activates(self.arrived.inner)
@@ -231,8 +231,8 @@ class GoTo(hfg.Subgraph):
         graph.connect(self.others.inner, plan.others)
         graph.connect(self.scan.inner, follow.scan)
         graph.connect(follow.command, self.command.inner)
-        graph.connect(self.localised.inner, shutter.value)
-        graph.connect(shutter.out, self.look.inner)
+        graph.connect(self.localised.inner, shutter.tick)
+        graph.connect(shutter.look, self.look.inner)
         graph.promote(self.near, follow.ports.parameters["near"])
         graph.promote(self.aligned, follow.ports.parameters["aligned"])
         graph.promote(self.lane, plan.ports.parameters["lane"])
@@ -251,20 +251,20 @@ class LookAround(hfg.Subgraph):
     """
 
     odometry = hfg.Input(Odometry)
-    command, look = hfg.Output(Twist), hfg.Output(object)
+    command, look = hfg.Output(Twist), hfg.Output(bool)
     begin = hfg.slot(type=object)
     done = hfg.Event()
 
     def build(self, graph: hfg.Graph) -> None:
         """Put a shutter beside the turn."""
         turn = graph.add(MoveRobot(turn=2 * math.pi), name="turn", active_for_s=15.1)
-        shutter = graph.add(flow.EveryNth(n=3), name="shutter")
+        shutter = graph.add(Shutter(n=3), name="shutter")
         self.begin.inner.activates(turn.begin)
         turn.done.activates(self.done.inner)
         turn.timeout.activates(self.done.inner)
         graph.connect(self.odometry.inner, turn.odometry)
-        graph.connect(self.odometry.inner, shutter.value)
+        graph.connect(self.odometry.inner, shutter.tick)
         graph.connect(turn.command, self.command.inner)
-        graph.connect(shutter.out, self.look.inner)
+        graph.connect(shutter.look, self.look.inner)
         for node in (turn, shutter):
             graph.gate(node, by=turn)

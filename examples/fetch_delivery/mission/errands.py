@@ -262,7 +262,7 @@ class Explore(hfg.Subgraph):
 
     localised, odometry = hfg.Input(Localised), hfg.Input(Odometry)
     scan, others = hfg.Input(Scan), hfg.Input(list[Disk])
-    command, look = hfg.Output(Twist), hfg.Output(object)
+    command, look = hfg.Output(Twist), hfg.Output(bool)
     begin, found = hfg.slot(type=int), hfg.slot(type=object)
     done, gave_up = hfg.Event(object), hfg.Event(int)
 

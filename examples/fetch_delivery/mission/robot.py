@@ -17,6 +17,7 @@ import hfg
 from examples.fetch_delivery.messages import Odometry, Picture, Scan, Twist
 from examples.fetch_delivery.mission.driving import MoveRobot
 from examples.fetch_delivery.mission.errands import DeliverCube, Explore, FetchCube, MapLookup
+from examples.fetch_delivery.mission.looking import Shutter
 from examples.fetch_delivery.mission.world import RATE_HZ, World
 from examples.fetch_delivery.perception.cube import CubeWatch
 from examples.fetch_delivery.perception.following import GiveWay
@@ -63,8 +64,10 @@ class Perception(hfg.Subgraph):
 
     def build(self, graph: hfg.Graph) -> None:
         """Connect what measures with what learns."""
-        localise, robots = graph.add(Localise(), name="localise"), graph.add(other_robots(), name="robots")
-        others = graph.add(FollowRobots(), name="others")
+        # In step also where a cut lies before it: who measures goes on when this has been understood.
+        localise = graph.add(Localise(), name="localise", release="sequential")
+        robots = graph.add(other_robots(), name="robots", release="sequential")
+        others = graph.add(FollowRobots(), name="others", release="sequential")
         targets, digits = graph.add(find_targets(), name="targets"), graph.add(read_digits(), name="digits")
         signs, stations = graph.add(SignMap(), name="signs"), graph.add(StationMap(), name="stations")
         cube = graph.add(CubeWatch(), name="cube")
@@ -101,6 +104,16 @@ class Perception(hfg.Subgraph):
         graph.connect(cube.unreadable, self.unreadable.inner)
 
 
+class NumberWhen(flow.SampleAndHold):
+    """Keep the newest number, and give it at each tick.
+
+    Attributes:
+      held: the number.
+    """
+
+    held = hfg.Output(int)
+
+
 class Robot(hfg.Subgraph):
     """A robot with its mission.
 
@@ -122,7 +135,7 @@ class Robot(hfg.Subgraph):
     odometry, scan, message = hfg.Input(Odometry), hfg.Input(Scan), hfg.Input(str)
     front, basket = hfg.Input(Picture), hfg.Input(Picture)
     command, lamp = hfg.Event(Twist), hfg.Output(bool)
-    look_ahead, look_into_basket = hfg.Output(object), hfg.Output(Scan)
+    look_ahead, look_into_basket = hfg.Output(bool), hfg.Output(bool)
     begin = hfg.slot(type=object)
     report = hfg.Event(int | None)
 
@@ -162,7 +175,7 @@ class Robot(hfg.Subgraph):
         graph.connect(lookup.sign, explore.found)
         graph.connect(perception.unreadable, self.report.inner)
         # A sign that could not be served is not where the map has it, and a cube that is given back is not taken again.
-        in_vain, refused = (graph.add(flow.SampleAndHold(), name=name) for name in ("in_vain", "refused"))
+        in_vain, refused = (graph.add(NumberWhen(), name=name) for name in ("in_vain", "refused"))
         for number, when in ((in_vain, deliver.gave_up), (refused, bring.exhausted)):
             graph.connect(read_cube.received, number.value, overflow="latest")
             graph.connect(when, number.tick)
@@ -180,13 +193,13 @@ class Robot(hfg.Subgraph):
         for name in ("odometry", "scan", "front", "basket"):
             graph.connect(self.ports.inputs[name].inner, perception.ports.inputs[name])
         # It turns to the middle and looks at it: so it knows which sides of the octagon are filling stations.
-        shutter = graph.add(flow.EveryNth(n=4), name="look_first")
-        graph.connect(self.scan.inner, shutter.value)
-        graph.connect(shutter.out, self.look_ahead.inner)
+        shutter = graph.add(Shutter(n=4), name="look_first")
+        graph.connect(self.scan.inner, shutter.tick)
+        graph.connect(shutter.look, self.look_ahead.inner)
         graph.gate(shutter, by=graph["advance"])
-        basket = graph.add(flow.EveryNth(n=2), name="look_again")
-        graph.connect(self.scan.inner, basket.value)
-        graph.connect(basket.out, self.look_into_basket.inner)
+        basket = graph.add(Shutter(n=2), name="look_again")
+        graph.connect(self.scan.inner, basket.tick)
+        graph.connect(basket.look, self.look_into_basket.inner)
         graph.gate(basket, by=graph["read_cube"])
         graph.connect(self.odometry.inner, graph["advance"].ports.inputs["odometry"])
         # Of all that drive only the active one sends commands; whichever it is, others come first.
@@ -223,6 +236,7 @@ def build(
     speed: float = 0.6,
     faults: tuple[Fault, ...] = (),
     gated: bool = True,
+    cut: bool = False,
     kind: type[Robot] = Robot,
     cameras: Cameras = "light",
 ) -> hfg.Graph:
@@ -234,17 +248,24 @@ def build(
       speed: of their motors, in m/s.
       faults: what shall go wrong.
       gated: pictures are taken when a step asks for them; else all the time, to see what that saves.
+      cut: perception and control of the robots run in a process each, beside that of the arena; in virtual time, which
+        processes do not share, they are cut as well, but run on one loop.
       kind: what sort of robot; all have the same ports.
       cameras: what draws the pictures: the light renderer, or MuJoCo, which needs a package and OpenGL.
     """
     graph = hfg.Graph("fetch-delivery")
+    if cut:
+        for group in ("perception", "control"):
+            graph.group(group, process=True)
     world = graph.add(
         World(seed=seed, speed=speed, faults=faults, cameras=cameras, odometry=robots),
         name="world",
         max_rate_hz=RATE_HZ,
     )
     for number in range(robots):
-        robot = graph.add(kind(), name=f"robot_{number}")
+        robot = graph.add(kind(), name=f"robot_{number}", group="control" if cut else None)
+        if cut:
+            graph.move(f"robot_{number}/perception", group="perception")
         graph.start.activates(robot.begin)
         graph.connect(world.odometry[number], robot.odometry)
         graph.connect(world.scan[number], robot.scan)
@@ -259,7 +280,7 @@ def build(
             graph.connect(robot.look_into_basket, world.look_into_basket[number])
             continue
         for camera, n in ((world.look_ahead, 2), (world.look_into_basket, 4)):
-            shutter = graph.add(flow.EveryNth(n=n))
-            graph.connect(world.scan[number], shutter.value)
-            graph.connect(shutter.out, camera[number])
+            shutter = graph.add(Shutter(n=n))
+            graph.connect(world.scan[number], shutter.tick)
+            graph.connect(shutter.look, camera[number])
     return graph

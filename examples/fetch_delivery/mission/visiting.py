@@ -13,9 +13,10 @@ from annotated_types import Gt
 import hfg
 from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
 from examples.fetch_delivery.mission.driving import GoTo, MoveRobot, MoveToObstacle, PositionToTarget
+from examples.fetch_delivery.mission.looking import Shutter
 from examples.fetch_delivery.perception.laser import wall_ahead
 from examples.fetch_delivery.perception.records import Localised, Sighting, Station
-from hfg.nodes import activity, flow
+from hfg.nodes import activity
 from hfg.nodes.robotics import Disk
 
 
@@ -23,6 +24,12 @@ from hfg.nodes.robotics import Disk
 def always(tick: Scan, *, value: bool = False) -> bool:
     """Give a value again and again."""
     return value
+
+
+@hfg.node
+def as_lamp(command: bool) -> bool:
+    """Give a command of no declared type as one for the lamp."""
+    return command
 
 
 class SetLamp(hfg.Subgraph):
@@ -47,7 +54,9 @@ class SetLamp(hfg.Subgraph):
         value, once = graph.add(always(), name="value"), graph.add(activity.OneShotCommand(), name="once")
         graph.connect(self.tick.inner, value.tick)
         graph.connect(value.out, once.value)
-        graph.connect(once.out, self.lamp.inner)
+        graph.add(as_lamp(), name="as_lamp")
+        graph.connect(once.out, graph["as_lamp"].ports.inputs["command"])
+        graph.connect(graph["as_lamp"].ports.outputs["out"], self.lamp.inner)
         self.begin.inner.activates(once.begin)
         once.done.activates(self.done.inner)
         graph.promote(self.on, value.ports.parameters["value"])
@@ -140,7 +149,7 @@ class AtStation(hfg.Subgraph):
     others, targets = hfg.Input(list[Disk]), hfg.Input(list[Sighting])
     number, none = hfg.slot(type=int), hfg.slot(type=object)
     command, lamp = hfg.Output(Twist), hfg.Output(bool)
-    look, look_into_basket = hfg.Output(object), hfg.Output(Scan)
+    look, look_into_basket = hfg.Output(bool), hfg.Output(bool)
     ask, done = hfg.Event(), hfg.Event(object)
 
 
@@ -216,7 +225,7 @@ class Visit(AtStation):
     def _feed(self, graph: hfg.Graph) -> None:
         """Give each step the data it needs, and let those that are not active rest."""
         wall = graph.add(wall_ahead(), name="wall")
-        shutter, basket = graph.add(flow.EveryNth(n=2), name="shutter"), graph.add(flow.EveryNth(n=4), name="basket")
+        shutter, basket = graph.add(Shutter(n=2), name="shutter"), graph.add(Shutter(n=4), name="basket")
         go_to, position, dock = graph["go_to"], graph["position"], graph["dock"]
         for drives in ("go_to", "position", "dock", "leave", "retreat"):
             graph.connect(graph[drives].ports.outputs["command"], self.command.inner)
@@ -231,10 +240,10 @@ class Visit(AtStation):
         graph.connect(wall.out, position.ports.inputs["wall"])
         graph.connect(self.scan.inner, dock.ports.inputs["scan"])
         graph.connect(self.targets.inner, position.ports.slots["see"])
-        graph.connect(self.localised.inner, shutter.value)
-        graph.connect(shutter.out, self.look.inner)
-        graph.connect(self.scan.inner, basket.value)
-        graph.connect(basket.out, self.look_into_basket.inner)
+        graph.connect(self.localised.inner, shutter.tick)
+        graph.connect(shutter.look, self.look.inner)
+        graph.connect(self.scan.inner, basket.tick)
+        graph.connect(basket.look, self.look_into_basket.inner)
         for gated, state in ((wall, "position"), (shutter, "position"), (basket, "wait")):
             graph.gate(gated, by=graph[state])
         for lamp in ("lamp_on", "lamp_off", "dark"):

@@ -85,13 +85,13 @@ class World(hfg.Node):
         """Note it down."""
         self.simulation.report(robot, number)
 
-    @hfg.Slots(object, "odometry")
+    @hfg.Slots(bool, "odometry")
     def look_ahead(self, robot: int) -> None:
         """Take a picture."""
         self.pictures += 1
         self.front[robot].trigger(self.simulation.front_picture(robot))
 
-    @hfg.Slots(object, "odometry")
+    @hfg.Slots(bool, "odometry")
     def look_into_basket(self, robot: int) -> None:
         """Take a picture."""
         self.pictures += 1
