@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import webbrowser
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -68,6 +68,12 @@ def main(
     machine: Annotated[
         bool, typer.Option("--machine", help="A state machine decides, not the flow of activity.")
     ] = False,
+    cut: Annotated[
+        bool, typer.Option("--cut", help="Perception and control run in processes of their own, on the real clock.")
+    ] = False,
+    record: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Record what the arena tells the robots, as MCAP.")
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write report.html there, with a video from above, ways, pictures and graph."),
@@ -78,11 +84,21 @@ def main(
 ) -> None:
     """Robots deliver cubes in a simulated arena; says in the end how they did."""
     faults: tuple[Fault, ...] = tuple(fault(name) for name in fault_names or [])
-    graph = build(seed, robots, faults=faults, kind=_kind(machine), cameras=cameras)
+    if cut and (record is not None or report is not None or show):
+        raise typer.BadParameter("a run in several processes cannot be recorded or shown; leave --cut or that out")
+    graph = build(seed, robots, faults=faults, cut=cut, kind=_kind(machine), cameras=cameras)
     showing = None
     if report is not None or show:
         showing = _showing(report or SHOWN_IN, graph, seed, robots, 60 * minutes)
-    result = carry_out(graph, 60 * minutes, within_s=within, begin=None if showing is None else showing.begin)
+
+    def begin(run: hfg.Run) -> None:
+        if record is not None:
+            run.record(record, select="world", images="png", force=True)
+        if showing is not None:
+            showing.begin(run)
+
+    clock: Literal["virtual", "real"] = "real" if cut else "virtual"
+    result = carry_out(graph, 60 * minutes, clock=clock, within_s=within, begin=begin)
     print(result)
     if result.error:
         print(result.error, file=sys.stderr)

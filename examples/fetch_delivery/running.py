@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -54,13 +55,19 @@ class Result:
 
 
 def carry_out(
-    graph: hfg.Graph, seconds: float, *, within_s: float | None = None, begin: Callable[[hfg.Run], object] | None = None
+    graph: hfg.Graph,
+    seconds: float,
+    *,
+    clock: Literal["virtual", "real"] = "virtual",
+    within_s: float | None = None,
+    begin: Callable[[hfg.Run], object] | None = None,
 ) -> Result:
-    """Run a mission in virtual time. Neither Ctrl-C nor an error of the graph is raised: the result says it.
+    """Run a mission. Neither Ctrl-C nor an error of the graph is raised: the result says it.
 
     Args:
       graph: with the arena as its node `world`.
       seconds: how long, in the arena's time.
+      clock: by which it runs; processes need the real one.
       within_s: end it earlier when that has taken so long on the wall's clock; None lets it take what it takes.
       begin: called with the run before it begins, to look at it.
     """
@@ -76,7 +83,7 @@ def carry_out(
                 begin(run)
 
         try:
-            hfg.run(graph, clock="virtual", until_s=seconds, begin=both, block_warning_s=0)
+            hfg.run(graph, clock=clock, until_s=seconds, begin=both, block_warning_s=0)
         except KeyboardInterrupt:
             outcome = "interrupted"
         except HfgError as problem:
@@ -88,15 +95,21 @@ def carry_out(
     simulation = world.simulation
     scores = () if simulation is None else tuple(simulation.scores)
     simulated_s = 0.0 if simulation is None else simulation.now_s
-    worked_s = time.process_time() - watch.worked
+    worked_s = _processor_s() - watch.worked
     return Result(outcome, simulated_s, time.monotonic() - watch.began, worked_s, scores, error)
+
+
+def _processor_s() -> float:
+    """Give how long processors have worked for this process, and for those of its own that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 class _Watch:
     """Looks at a mission twice a second of its own time: timers of the loop cost nothing in between."""
 
     def __init__(self, seconds: float, within_s: float | None, simulation: Callable[[], Any]) -> None:
-        self.began, self.worked = time.monotonic(), time.process_time()
+        self.began, self.worked = time.monotonic(), _processor_s()
         self.is_late = False
         console = Console(file=sys.stderr)
         columns = (

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 import hfg
-from examples.fetch_delivery.messages import Odometry, Picture, Scan, Twist
+from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.mission.driving import MoveRobot
 from examples.fetch_delivery.mission.errands import DeliverCube, Explore, FetchCube, MapLookup
 from examples.fetch_delivery.mission.looking import Shutter
@@ -28,6 +28,7 @@ from examples.fetch_delivery.perception.sighting import find_targets, read_digit
 from examples.fetch_delivery.perception.signs import SignMap
 from examples.fetch_delivery.perception.stations import StationMap
 from examples.fetch_delivery.world import Cameras, Fault
+from hfg.images import Gray
 from hfg.nodes import activity, flow
 from hfg.nodes.robotics import Disk
 
@@ -54,7 +55,7 @@ class Perception(hfg.Subgraph):
     """
 
     odometry, scan = hfg.Input(Odometry), hfg.Input(Scan)
-    front, basket = hfg.Input(Picture), hfg.Input(Picture)
+    front, basket = hfg.Input(Gray), hfg.Input(Gray)
     ask, forget = hfg.slot(type=object), hfg.slot(type=int)
     localised = hfg.Output(Localised)
     others, around = hfg.Output(list[Disk]), hfg.Output(list[Disk])
@@ -133,7 +134,7 @@ class Robot(hfg.Subgraph):
     """
 
     odometry, scan, message = hfg.Input(Odometry), hfg.Input(Scan), hfg.Input(str)
-    front, basket = hfg.Input(Picture), hfg.Input(Picture)
+    front, basket = hfg.Input(Gray), hfg.Input(Gray)
     command, lamp = hfg.Event(Twist), hfg.Output(bool)
     look_ahead, look_into_basket = hfg.Output(bool), hfg.Output(bool)
     begin = hfg.slot(type=object)

@@ -7,9 +7,10 @@ from typing import Any
 from annotated_types import Ge, Interval
 
 import hfg
-from examples.fetch_delivery.messages import Odometry, Picture, Scan, Twist
+from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.world import Cameras, Fault, Simulation
 from examples.fetch_delivery.world.robots import Limits
+from hfg.images import Gray
 
 RATE_HZ = 10.0
 
@@ -45,8 +46,8 @@ class World(hfg.Node):
     odometry = hfg.Outputs(Odometry)
     scan = hfg.Outputs(Scan, "odometry")
     message = hfg.Output(str)
-    front = hfg.Events(Picture, "odometry")
-    basket = hfg.Events(Picture, "odometry")
+    front = hfg.Events(Gray, "odometry")
+    basket = hfg.Events(Gray, "odometry")
     delivered = hfg.Events(int, "odometry")
 
     simulation: hfg.State[Any] = hfg.State(None)
