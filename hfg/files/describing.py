@@ -318,7 +318,7 @@ class _Telling:
 
     def built_anew(self, node: Subgraph) -> Subgraph | None:
         """The same subgraph as its type makes it."""
-        graph = Graph()
+        graph = Graph("built anew")
         for spec in self.root.whole.groups.by_name.values():
             level_of(graph).whole.groups.change(spec)
         try:
