@@ -394,6 +394,42 @@ def test_what_is_refused_leaves_graph_and_run_as_they_were(
     assert not [event for event in trace if isinstance(event, StructureChanged)]
 
 
+@pytest.mark.rule("P2", "R4")
+def test_a_second_edge_by_way_of_a_subgraph_is_refused_also_while_what_it_joins_is_moved() -> None:
+    """The edge that is there goes the same way as before, so nothing says that it changes."""
+    graph = hfg.Graph()
+    outer = graph.add(Outer(), name="outer")
+    graph.connect(outer.out, graph.add(sink(), name="last").value)
+    second, move = c.Connect("outer/second.out", "outer.out.inner"), c.Enclose(("last", "outer"), "box")
+
+    async def body(run: hfg.Run) -> None:
+        for commands in ((second,), (second, move)):
+            with pytest.raises(GraphError, match="takes one edge"):
+                await run.edit(*commands)
+        await run.edit(move)
+
+    drive(graph, body)
+
+
+class Inner(hfg.Subgraph):
+    """A source within a source."""
+
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.connect(graph.add(script(values=(1,))).out, self.out.inner)
+
+
+class Outer(hfg.Subgraph):
+    """Another source beside it."""
+
+    out = hfg.Output(int)
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.add(script(values=(2,)), name="second")
+        graph.connect(graph.add(Inner()).out, self.out.inner)
+
+
 def test_a_ring_without_delay_is_refused_also_while_it_runs() -> None:
     graph = pipeline(1, 2, 3)
     join = graph.add(add())

@@ -277,14 +277,15 @@ class _Comparing:
     def judge(self) -> None:
         """See whether the graph is sound beyond doubt; else a check of the whole is to say what is wrong (R4)."""
         found = self.found
-        changed = [way for way, running in found.ways if running is None or running.segments != way.segments]
+        changes = [(way, old) for way, old in found.ways if old is None or old.segments != way.segments]
+        changed = [way for way, _ in changes]
         closes_a_ring = self._closes_a_ring()  # asked in any case, for the index learns by that
         found.doubtful = (
             found.doubtful
             or closes_a_ring
             or bool(self.follower.flat.findings)
             or not all(map(self._fits, changed))
-            or self._are_doubled(changed)
+            or self._are_doubled(changes)
             or found.gates
             or self._waits_in_thread()
             or self._is_concurrency_touched(changed)
@@ -333,11 +334,11 @@ class _Comparing:
             return False
         return not way.initial and not way.buffer and not any(part.options.for_events for part in way.segments)
 
-    def _are_doubled(self, changed: Sequence[FlatEdge]) -> bool:
+    def _are_doubled(self, changes: Sequence[tuple[FlatEdge, Any]]) -> bool:
         """Whether an input may have two edges, or two ports be connected twice (P2)."""
-        lost, into = set(self.found.lost), set()
-        kept = {running for _, running in self.found.ways}
-        for way in changed:
+        into = set()
+        moved = {*self.found.lost, *(running for _, running in changes)}  # all others stay where they are
+        for way, _ in changes:
             source, target = way.source.port, way.target.port
             alone = way.target.kind in _JOINED
             key = (None if alone else source, target, way.target.kind)
@@ -346,7 +347,7 @@ class _Comparing:
             into.add(key)
             worker = self._at_border(target) if isinstance(target, InnerTarget) else self._of_node(target)
             for other in () if worker is None else worker.edges_in():
-                if other in lost or other in kept or other.target_port is not target:
+                if other in moved or other.target_port is not target:
                     continue
                 if other.target_kind == way.target.kind and (alone or other.source_port is source):
                     return True
