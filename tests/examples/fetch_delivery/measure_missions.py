@@ -8,6 +8,7 @@ which one process uses one core: what else the machine does has an influence on 
 
 from __future__ import annotations
 
+import hashlib
 import time
 from dataclasses import dataclass
 from typing import Annotated
@@ -32,6 +33,7 @@ class Row:
     pictures: int
     cost: float  # seconds of processor time for each simulated one
     found: list[str]
+    story: str  # which step began when: two rows with equal counts are equal missions only if this is equal too
 
     def __str__(self) -> str:
         delivered = " ".join(f"{count:2d}" for count in self.delivered)
@@ -39,7 +41,7 @@ class Row:
         stuck = ", ".join(map(str, self.stuck)) or "none"
         return (
             f"| {self.seed} | {delivered} | {self.wrong} | {self.returned} | {contact} | {stuck} | {self.pictures} "
-            f"| {1 / self.cost:.1f} | {len(self.found)} |"
+            f"| {1 / self.cost:.1f} | {len(self.found)} | {self.story} |"
         )
 
 
@@ -59,6 +61,7 @@ def measured(seed: int, robots: int, minutes: float) -> Row:
         watch.pictures,
         cost,
         watch.found,
+        hashlib.sha256(repr(watch.steps).encode()).hexdigest()[:8],
     )
 
 
@@ -82,8 +85,9 @@ def main(
     """Run missions and write a table."""
     first, _, last = seeds.partition("-")
     print(f"{robots} robots, {minutes:g} minutes\n")
-    print("| seed | delivered | wrong | returned | contact, s | stuck | pictures | times real time | not as it must |")
-    print("|---|---|---|---|---|---|---|---|---|", flush=True)
+    columns = "seed, delivered, wrong, returned, contact (s), stuck, pictures, times real time, not as it must, story"
+    print("| " + columns.replace(", ", " | ") + " |")
+    print("|" + "---|" * len(columns.split(", ")), flush=True)
     rows = []
     for seed in range(int(first), int(last or first) + 1):
         rows.append(measured(seed, robots, minutes))
