@@ -19,6 +19,7 @@ from examples.fetch_delivery.machine.mission import LIMITS, Orders, Senses
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.mission import build
 from examples.fetch_delivery.perception.records import Localised, Sighting, Sign, Station
+from examples.fetch_delivery.world import Fault, fault
 from examples.fetch_delivery.world.scanning import ANGLES
 from hfg.nodes.robotics import Disk
 from hfg.trace import EventTriggered, TraceEvent
@@ -360,8 +361,8 @@ class MachineWatch(Watch):
             self._enters(robot, event.token.value)
 
 
-def watched(seed: int, minutes: float) -> MachineWatch:
-    graph = build(seed, kind=Robot)
+def watched(seed: int, minutes: float, *faults: Fault) -> MachineWatch:
+    graph = build(seed, kind=Robot, faults=faults)
     watch = MachineWatch(graph)
     hfg.run(graph, clock="virtual", until_s=60 * minutes, trace=watch)
     return watch
@@ -393,6 +394,28 @@ def test_one_robot_alone_delivers_for_ten_minutes(seed: int) -> None:
     assert score.wrong == []
     assert score.lamp_while_driving_s == 0
     assert score.contact_s < 6
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(
+    ("seed", "minutes", "wrong", "number"),
+    [
+        pytest.param(1, 2.5, fault("hidden sign", at_s=0, digit=1), 1, id="hidden sign"),
+        pytest.param(
+            2, 5, fault("absent operator", at_s=0, kind="delivery", number=2), 2, id="nobody at a delivery station"
+        ),
+    ],
+)
+def test_a_cube_that_cannot_be_delivered_is_reported_and_given_back(
+    seed: int, minutes: float, wrong: Fault, number: int
+) -> None:
+    watch = watched(seed, minutes, wrong)
+    (score,) = watch.simulation.scores
+    assert watch.found == []
+    assert score.wrong == []
+    assert [cube for _, cube in score.reported] == [cube for _, cube in score.returned] == [number]
+    assert score.delivered
 
 
 @pytest.mark.soak
