@@ -31,7 +31,7 @@ import hfg
 from examples.fetch_delivery.machine import driving as plain_driving
 from examples.fetch_delivery.machine import mission as machine_mission
 from examples.fetch_delivery.machine import robot as machine_robot
-from examples.fetch_delivery.mission import build, driving, errands, robot, visiting
+from examples.fetch_delivery.mission import build, driving, errands, looking, robot, visiting
 from examples.fetch_delivery.perception import following, planning
 from hfg.graph.flat import ROOT, FlatEdge, flatten
 
@@ -104,8 +104,9 @@ def lines(sort: Sort) -> dict[str, int]:
         return {"how it drives": laws, "what it does when, and wiring": order + wiring}
     laws = code_lines(driving, only=_LAWS) + code_lines(planning, only=["PlanPath"])
     laws += code_lines(following, only=["FollowPath"])
-    order = code_lines(driving, without=_LAWS) + code_lines(visiting) + code_lines(errands)
-    return {"how it drives": laws, "what it does when, and wiring": order + code_lines(robot, only=["Robot"])}
+    order = code_lines(driving, without=_LAWS) + code_lines(looking) + code_lines(visiting) + code_lines(errands)
+    order += code_lines(robot, only=["Robot", "NumberWhen"])
+    return {"how it drives": laws, "what it does when, and wiring": order}
 
 
 # --- structure ---
