@@ -30,7 +30,7 @@ help:
 
 # Ends earlier, with what there is by then, on a machine that is too slow for it.
 demo: $(READY)
-	$(BIN)/python -m examples.fetch_delivery --minutes 1.5 --within 120 --report out/fetch_delivery
+	$(BIN)/python -m examples.fetch_delivery --minutes 2 --within 120 --report out/fetch_delivery
 
 photographs: $(READY)
 	$(BIN)/python examples/photographs.py

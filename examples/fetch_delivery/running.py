@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
 import sys
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -64,6 +67,8 @@ def carry_out(
 ) -> Result:
     """Run a mission. Neither Ctrl-C nor an error of the graph is raised: the result says it.
 
+    A request to end (SIGTERM) is treated like Ctrl-C.
+
     Args:
       graph: with the arena as its node `world`.
       seconds: how long, in the arena's time.
@@ -75,7 +80,7 @@ def carry_out(
     watch = _Watch(seconds, within_s, lambda: world.simulation)
     outcome: Outcome = "over"
     error = ""
-    with watch.bar:
+    with watch.bar, _ends_like_ctrl_c(signal.SIGTERM):
 
         def both(run: hfg.Run) -> None:
             watch.begin(run)
@@ -103,6 +108,18 @@ def _processor_s() -> float:
     """Give how long processors have worked for this process, and for those of its own that have ended."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
+
+
+@contextmanager
+def _ends_like_ctrl_c(number: signal.Signals) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():  # Python lets no other handle signals
+        yield
+        return
+    before = signal.signal(number, lambda _number, _frame: signal.raise_signal(signal.SIGINT))
+    try:
+        yield
+    finally:
+        signal.signal(number, before)
 
 
 class _Watch:

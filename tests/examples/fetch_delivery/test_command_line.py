@@ -52,9 +52,10 @@ def test_what_is_out_of_range_is_refused_in_a_sentence(arguments: tuple[str, ...
     assert sentence in said(result)
 
 
-def test_ctrl_c_ends_a_mission_with_what_it_has_reached() -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def test_ctrl_c_ends_a_mission_with_what_it_has_reached_and_so_does_a_request_to_end(number: signal.Signals) -> None:
     def press(_run: hfg.Run) -> None:
-        asyncio.get_running_loop().call_later(0.75, signal.raise_signal, signal.SIGINT)
+        asyncio.get_running_loop().call_later(0.75, signal.raise_signal, number)
 
     result = carry_out(build(), 60, begin=press)
     assert result.outcome == "interrupted"
