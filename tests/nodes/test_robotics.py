@@ -265,3 +265,9 @@ def test_track_disks_follows_them_in_a_graph() -> None:
             "disks"
         ]
     assert [round(one.x, 1) for one in disks] == [3.0]
+
+
+def test_track_disks_refuses_a_scan_whose_angles_are_not_those_of_its_ranges() -> None:
+    node = robotics.TrackDisks()
+    with pytest.raises(ValueError, match="each range has an angle, got 271 ranges and 3 angles"):
+        fire(node, seen=[], pose=np.zeros(3), ranges=np.full(271, 9.0), angles=np.zeros(3))

@@ -21,6 +21,7 @@ __all__ = [
     "expected_ranges",
     "find_disks",
     "nearest_obstacle",
+    "need_pairs",
     "scan_points",
     "seen_from",
 ]
@@ -111,9 +112,14 @@ def nearest_obstacle(
     return float(inside.min()) if len(inside) else math.inf
 
 
-def _hits(ranges: Any, angles: Any, max_range: float) -> Any:
+def need_pairs(ranges: Any, angles: Any) -> None:
+    """Refuse a scan in which they do not belong together."""
     if len(ranges) != len(angles):
         raise ValueError(f"each range has an angle, got {len(ranges)} ranges and {len(angles)} angles")
+
+
+def _hits(ranges: Any, angles: Any, max_range: float) -> Any:
+    need_pairs(ranges, angles)
     with np.errstate(invalid="ignore"):
         return (ranges > 0) & (ranges < max_range) & np.isfinite(angles)
 

@@ -9,7 +9,7 @@ import numpy as np
 from annotated_types import Interval
 
 from hfg.clock import now
-from hfg.nodes.robotics._scans import Disk, Pose, Ranges
+from hfg.nodes.robotics._scans import Disk, Pose, Ranges, need_pairs
 from hfg.nodetype import Node
 from hfg.ports import Input, Output, Parameter, State
 
@@ -94,7 +94,8 @@ def _is_hidden(at: Any, pose: Any, ranges: Any, angles: Any, radius: float) -> b
     if far <= radius or not len(angles):
         return True
     bearing = math.atan2(up, across) - float(pose[2])
-    off = np.abs(np.remainder(angles - bearing + math.pi, 2 * math.pi) - math.pi)
+    with np.errstate(invalid="ignore"):  # a pose or an angle that is no number hides nothing
+        off = np.abs(np.remainder(angles - bearing + math.pi, 2 * math.pi) - math.pi)
     on = off < 0.6 * math.asin(radius / far)
     if not on.any():
         return True  # behind the laser, or between two beams
@@ -118,6 +119,9 @@ class TrackDisks(Node):
       ranges: how far each beam went, in metres.
       angles: of the beams, in radians, counter-clockwise from straight ahead.
       disks: with their velocities.
+
+    Raises:
+      ValueError: there are more or fewer angles than ranges.
     """
 
     memory = Parameter(4.0, Interval(ge=0), unit="s")
@@ -133,6 +137,7 @@ class TrackDisks(Node):
 
     def process(self, seen: list[Disk], pose: Pose, ranges: Ranges, angles: Ranges) -> list[Disk]:
         """Follow them."""
+        need_pairs(ranges, angles)
         if self.tracks is None:
             self.tracks = DiskTracks()
         self.tracks.memory, self.tracks.fastest, self.tracks.radius = self.memory, self.fastest, self.radius
