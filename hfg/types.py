@@ -479,23 +479,26 @@ def _make_checker(hint: Any) -> Callable[[Any], bool]:
         return lambda value: any(check(value) for check in checkers)
     dtype = _dtype_of(hint)
     if dtype is not None:
-        dtypes = typing.get_args(dtype) if _is_union(dtype) else (np.generic if dtype is Any else dtype,)
-        return lambda value: (
-            isinstance(value, np.ndarray)
-            and issubclass(value.dtype.type, dtypes)
-            and all(layout.accepts(value.shape) for layout in layouts)
-        )
+        return _array_checker(dtype, layouts)
     if hint in _TOWER:
         allowed = (hint, *_TOWER[hint])
         return lambda value: isinstance(value, allowed)
     if _is_plain_class(hint):
         return lambda value: isinstance(value, hint)
-    if typing.get_origin(hint) is typing.Literal:
-        choices = typing.get_args(hint)
-        kinds = tuple(set(map(type, choices)))
-        return lambda value: isinstance(value, kinds) and value in choices
-    items = _items_checker(typing.get_origin(hint), typing.get_args(hint))
-    return items or _bearable(hint)
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is typing.Literal:
+        kinds = tuple(set(map(type, arguments)))
+        return lambda value: isinstance(value, kinds) and value in arguments
+    return _items_checker(origin, arguments) or _bearable(hint)
+
+
+def _array_checker(dtype: Any, layouts: tuple[Shape, ...]) -> Callable[[Any], bool]:
+    dtypes = typing.get_args(dtype) if _is_union(dtype) else (np.generic if dtype is Any else dtype,)
+    return lambda value: (
+        isinstance(value, np.ndarray)
+        and issubclass(value.dtype.type, dtypes)
+        and all(layout.accepts(value.shape) for layout in layouts)
+    )
 
 
 def _is_plain_class(hint: Any) -> bool:

@@ -36,7 +36,7 @@ from hfg.cli.target import load_graph
 from hfg.engine import Run
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import RunPage
-from hfg.errors import TargetError
+from hfg.errors import HfgError, TargetError
 from hfg.graph import Graph
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
@@ -127,12 +127,17 @@ def run(
         raise output.broken
     if json and report is not None:
         show.json(report)
+    if error is None and report is not None and not interrupt.count and (not json or verbose):
+        show.report(graph.name, report, verbose)
+    return _ended(graph, error, interrupt)
+
+
+def _ended(graph: Graph, error: HfgError | None, interrupt: Interrupt) -> int:
+    """Say what went wrong, if anything did."""
     if error is not None:
         show.failure(error)
     if interrupt.count:
         show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
-    elif error is None and report is not None and (not json or verbose):
-        show.report(graph.name, report, verbose)
     return 1 if interrupt.count or error is not None else 0
 
 

@@ -19,6 +19,7 @@ from hfg.trace import (
     CallStarted,
     ErrorRaised,
     FiringStarted,
+    RunEnded,
     RunStarted,
     StructureChanged,
     TokenDropped,
@@ -198,6 +199,7 @@ class Observed:
             TokenDropped: self._drop,
             StructureChanged: self._edit,
             RunStarted: self._begin,
+            RunEnded: lambda _event: None,  # it says until when
             **({TokenSent: self._sent} if pictures else {}),
         }
 

@@ -49,7 +49,6 @@ class ReportPage(Sections):
         """Take one event of the run."""
         self._observed(event)
         if isinstance(event, RunEnded):
-            self._observed.now = event.time
             self._outcome = event.outcome
             self.write()
 

@@ -12,7 +12,7 @@ import math
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final, TypeGuard
 
 import numpy as np
 
@@ -77,10 +77,12 @@ class Sections:
         elif isinstance(picture, np.ndarray) and is_picture(picture):
             kind, data = "png", png(picture)
         else:
-            found = getattr(picture, "shape", None)
+            kind_of_array = (
+                f" of shape {picture.shape} and type {picture.dtype}" if isinstance(picture, np.ndarray) else ""
+            )
             raise UsageError(
                 f"{self._title}: a picture is an image of 8 bits, the text of an SVG drawing or a file, got "
-                f"{type(picture).__name__}{'' if found is None else f' of shape {found} and type {picture.dtype}'}"  # type: ignore[attr-defined]
+                f"{type(picture).__name__}{kind_of_array}"
             )
         time = ""
         if at_s is not None:
@@ -158,7 +160,7 @@ class Sections:
             raise UsageError(f"{self._title}: {name} is a text, got {value!r:.80}")
 
     def _need_number(self, name: str, value: object) -> None:
-        if not _is_number(value) or not math.isfinite(value):  # type: ignore[arg-type]
+        if not _is_number(value) or not math.isfinite(value):
             raise UsageError(f"{self._title}: {name}= is a number of seconds, got {value!r:.80}")
 
 
@@ -174,7 +176,7 @@ def _in_galleries(parts: list[str]) -> list[str]:
     return [*found, "</div>\n"] if within else found
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

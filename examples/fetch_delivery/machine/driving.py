@@ -1,7 +1,7 @@
 """How the robot drives in a state, as plain classes: made when the state is entered, asked for a command at each tick.
 
-A step returns the command and how it ended: nothing while it goes on. The laws are those of the nodes of
-`mission.driving`; the algorithms, plans, paths and walls, are the same functions.
+A step returns the command and how it ended: nothing while it goes on. Laws, plans, paths and walls are the functions
+that the nodes of `mission.driving` call too.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
+from examples.fetch_delivery import laws
 from examples.fetch_delivery.messages import Odometry, Scan, Twist
 from examples.fetch_delivery.perception.following import Limits, follow
-from examples.fetch_delivery.perception.laser import obstacle_ahead, wall_ahead
+from examples.fetch_delivery.perception.laser import wall_ahead
 from examples.fetch_delivery.perception.planning import Path, length_of, plan, queue
 from examples.fetch_delivery.perception.records import Localised, Sighting, Station, wrapped
 from hfg.nodes.robotics import Disk
@@ -41,17 +42,9 @@ class Move:
 
     def step(self, odometry: Odometry) -> Step:
         """Steer to where it leads from the pose of the first step."""
-        x, y, theta = odometry.pose
-        cos, sin = math.cos(theta), math.sin(theta)
         if self.goal is None:
-            self.goal = (x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, theta + self.turn)
-        dx, dy, turn = self.goal[0] - x, self.goal[1] - y, self.goal[2] - theta
-        left = math.hypot(dx, dy)
-        if left < 0.05 and (not self.turn or abs(turn) < 0.2):
-            return Twist(), "done"
-        pace = min(self.speed, 0.05 + 1.2 * left) / max(left, 0.05)
-        omega = max(-0.8, min(0.8, turn)) if self.turn else 0.0  # without a turn the heading may drift
-        return Twist(pace * (cos * dx + sin * dy), pace * (cos * dy - sin * dx), omega), None
+            self.goal = laws.destination(odometry, self.x, self.y, self.turn)
+        return _ended(laws.move(odometry, self.goal, turns=bool(self.turn), speed=self.speed))
 
 
 @dataclass
@@ -156,32 +149,14 @@ class Position:
         self._follow(localised, seen)
         if self.target is None or localised.stamp - self.since > self.patience:
             return Twist(), "lost" if localised.stamp - self.since > self.patience else None
-        x, y, theta = localised.pose
-        dx, dy = self.target[0] - x, self.target[1] - y
-        ahead, left = math.cos(theta) * dx + math.sin(theta) * dy, math.cos(theta) * dy - math.sin(theta) * dx
-        wall = wall_ahead.function(scan)
-        turn = wall.angle if wall is not None else float(wrapped(self.station.theta + math.pi - theta))
-        far = wall.distance if wall is not None else ahead
-        aside = math.cos(turn) * left - math.sin(turn) * ahead  # along the wall
-        if abs(aside) < 0.025 and abs(turn) < 0.05 and far < self.distance + 0.1:
-            self.steady += 1
-            return Twist(), "done" if self.steady >= 2 else None
-        self.steady = 0
-        on = max(-0.2, min(0.3, 0.8 * (far - self.distance)))
-        across = max(-0.25, min(0.25, 1.2 * aside))
-        cos, sin = math.cos(turn), math.sin(turn)
-        return Twist(cos * on - sin * across, sin * on + cos * across, max(-0.6, min(0.6, 1.2 * turn))), None
+        twist = laws.stand_before(localised, self.target, wall_ahead.function(scan), self.station, self.distance)
+        self.steady = self.steady + 1 if twist is None else 0
+        return twist or Twist(), "done" if self.steady >= 2 else None
 
     def _follow(self, localised: Localised, seen: Sequence[Sighting]) -> None:
-        """Take in what was seen: of several bull's-eyes that which is nearest to where it should be."""
-        expected = self.target if self.target is not None else (self.station.x, self.station.y)
-        places = [localised.place(one.x, one.y) for one in seen]
-        near = [place for place in places if math.dist(place, expected) < 0.7]
-        if near:
-            best = min(near, key=lambda place: math.dist(place, expected))
-            old, gain = (best, 1.0) if self.target is None else (self.target, 0.5)
-            self.target = (old[0] + gain * (best[0] - old[0]), old[1] + gain * (best[1] - old[1]))
-            self.since = localised.stamp
+        target = laws.sighted(localised, seen, self.station, self.target)
+        if target is not None:
+            self.target, self.since = target, localised.stamp
 
 
 @dataclass
@@ -198,7 +173,9 @@ class Dock:
 
     def step(self, scan: Scan) -> Step:
         """Look ahead."""
-        left = obstacle_ahead.function(scan, width=0.3) - self.distance
-        if left < 0.015:
-            return Twist(), "done"
-        return Twist(min(self.speed, 0.03 + math.sqrt(2 * 0.25 * left))), None
+        return _ended(laws.approach(scan, self.distance, self.speed))
+
+
+def _ended(twist: Twist | None) -> Step:
+    """Give the step of a law that ends by itself."""
+    return (Twist(), "done") if twist is None else (twist, None)

@@ -12,12 +12,12 @@ from typing import Any
 from annotated_types import Gt, Interval
 
 import hfg
+from examples.fetch_delivery import laws
 from examples.fetch_delivery.messages import Odometry, Scan, Twist, Vector
 from examples.fetch_delivery.mission.looking import Shutter
 from examples.fetch_delivery.perception.following import FollowPath
-from examples.fetch_delivery.perception.laser import obstacle_ahead
 from examples.fetch_delivery.perception.planning import PlanPath
-from examples.fetch_delivery.perception.records import Localised, Sighting, Station, Wall, wrapped
+from examples.fetch_delivery.perception.records import Localised, Sighting, Station, Wall
 from hfg.nodes.robotics import Disk
 
 
@@ -46,18 +46,12 @@ class MoveRobot(hfg.Node):
 
     def process(self, odometry: Odometry) -> Twist:
         """Steer to where it leads from the pose of the first firing."""
-        x, y, theta = odometry.pose
-        cos, sin = math.cos(theta), math.sin(theta)
         if self.goal is None:
-            self.goal = (x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, theta + self.turn)
-        dx, dy, turn = self.goal[0] - x, self.goal[1] - y, self.goal[2] - theta
-        left = math.hypot(dx, dy)
-        if left < 0.05 and (not self.turn or abs(turn) < 0.2):
+            self.goal = laws.destination(odometry, self.x, self.y, self.turn)
+        twist = laws.move(odometry, self.goal, turns=bool(self.turn), speed=self.speed)
+        if twist is None:
             self.done.trigger()
-            return Twist()
-        pace = min(self.speed, 0.05 + 1.2 * left) / max(left, 0.05)
-        omega = max(-0.8, min(0.8, turn)) if self.turn else 0.0  # without a turn the heading may drift
-        return Twist(pace * (cos * dx + sin * dy), pace * (cos * dy - sin * dx), omega)
+        return twist or Twist()
 
     @hfg.slot
     def begin(self) -> None:
@@ -106,35 +100,18 @@ class PositionToTarget(hfg.Node):
             if localised.stamp - self.since > self.patience:
                 self.lost.trigger()
             return Twist()
-        x, y, theta = localised.pose
-        dx, dy = self.target[0] - x, self.target[1] - y
-        ahead, left = math.cos(theta) * dx + math.sin(theta) * dy, math.cos(theta) * dy - math.sin(theta) * dx
-        turn = wall.angle if wall is not None else float(wrapped(self.station.theta + math.pi - theta))
-        far = wall.distance if wall is not None else ahead
-        aside = math.cos(turn) * left - math.sin(turn) * ahead  # along the wall
-        if abs(aside) < 0.025 and abs(turn) < 0.05 and far < self.distance + 0.1:
-            self.steady += 1
-            if self.steady >= 2:
-                self.done.trigger()
-            return Twist()
-        self.steady = 0
-        on = max(-0.2, min(0.3, 0.8 * (far - self.distance)))
-        across = max(-0.25, min(0.25, 1.2 * aside))
-        cos, sin = math.cos(turn), math.sin(turn)
-        return Twist(cos * on - sin * across, sin * on + cos * across, max(-0.6, min(0.6, 1.2 * turn)))
+        twist = laws.stand_before(localised, self.target, wall, self.station, self.distance)
+        self.steady = self.steady + 1 if twist is None else 0
+        if self.steady >= 2:
+            self.done.trigger()
+        return twist or Twist()
 
     def _follow(self, localised: Localised) -> None:
-        """Take in what was seen: of several bull's-eyes that which is nearest to where it should be."""
-        expected = self.target if self.target is not None else (self.station.x, self.station.y)
-        places = [localised.place(one.x, one.y) for one in self.seen]
+        """Take in what was seen."""
+        target = laws.sighted(localised, self.seen, self.station, self.target)
         self.seen = ()
-        near = [place for place in places if math.dist(place, expected) < 0.7]
-        if near:
-            best = min(near, key=lambda place: math.dist(place, expected))
-            gain = 1.0 if self.target is None else 0.5
-            old = best if self.target is None else self.target
-            self.target = (old[0] + gain * (best[0] - old[0]), old[1] + gain * (best[1] - old[1]))
-            self.since = localised.stamp
+        if target is not None:
+            self.target, self.since = target, localised.stamp
 
     @hfg.slot
     def aim(self, station: Station) -> None:
@@ -172,11 +149,10 @@ class MoveToObstacle(hfg.Node):
 
     def process(self, scan: Scan) -> Twist:
         """Look ahead."""
-        left = obstacle_ahead.function(scan, width=0.3) - self.distance
-        if left < 0.015:
+        twist = laws.approach(scan, self.distance, self.speed)
+        if twist is None:
             self.done.trigger()
-            return Twist()
-        return Twist(min(self.speed, 0.03 + math.sqrt(2 * 0.25 * left)))
+        return twist or Twist()
 
     @hfg.slot
     def begin(self) -> None:

@@ -87,9 +87,9 @@ class Level:
                 continue
             inwards = lets_in(port)
             width = width_of(shortened(port.name, LONGEST_PORT), PORT) + 10
-            block = Block(width, 17.0, [Dock("right" if inwards else "left", 15.0)], "first" if inwards else "last")
-            block.tier = _side(port) != "top" if inwards else _side(port) == "bottom"
-            self.add(Part(port, block))
+            dock = Dock("right" if inwards else "left", 15.0)
+            tier = _side(port) != "top" if inwards else _side(port) == "bottom"
+            self.add(Part(port, Block(width, 17.0, [dock], "first" if inwards else "last", tier)))
 
     def arrange(self, lines: Sequence[Line]) -> None:
         """Lay it out."""
@@ -113,19 +113,24 @@ class Level:
         part = Part(box, Block(round(width), round(height), []), *texts, inside=self)
         _add_docks(part, over, width - right - sum(room for _, room in over))
         _add_docks(part, under, self._left)
+        docks = {
+            port.id: Dock("top", self._left - 8.0 - _BESIDE * number, is_fixed=True)
+            for number, port in enumerate(upper)
+        }
+        first = part.block.width - right + 8.0
+        docks |= {
+            port.id: Dock("bottom", first + 10.0 * number, is_fixed=True) for number, port in enumerate(reversed(lower))
+        }
         for port in self.ports:
-            if port in self._outer:
-                continue
-            if port in upper:
-                dock = Dock("top", self._left - 8.0 - _BESIDE * upper.index(port), is_fixed=True)
-            elif port in lower:
-                x = part.block.width - right + 8.0 + 10.0 * (len(lower) - 1 - lower.index(port))
-                dock = Dock("bottom", x, is_fixed=True)
-            else:
-                at = self._top + self.plan.blocks[self.part_of[port.id]][1] + 15.0
-                dock = Dock("left" if lets_in(port) else "right", at)
-            part.add_dock(key_on_box(port), dock, is_port=port.type_name != "active")
+            if port not in self._outer:
+                dock = docks.get(port.id) or self._dock_beside(port)
+                part.add_dock(key_on_box(port), dock, is_port=port.type_name != "active")
         return part
+
+    def _dock_beside(self, port: Shape) -> Dock:
+        """Let a port be on the left or right border, where its line comes to inside."""
+        at = self._top + self.plan.blocks[self.part_of[port.id]][1] + 15.0
+        return Dock("left" if lets_in(port) else "right", at)
 
     def _on_border(self, side: Side) -> list[tuple[Shape, float]]:
         """Give the ports of a side that have no line inside, and how much of the border each takes."""

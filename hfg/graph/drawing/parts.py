@@ -173,20 +173,15 @@ def node(of: Shape, pins: dict[Key, Pin]) -> Part:
     y += _ROW * max(left.rows, right.rows) + (12.0 if bottom.is_named else 0.0) + 7.0
     most = max(0 if side.is_named else len(side.ports) for side in (left, right))
     height = max(y, 30.0, 12.0 * most + 8.0)
+    centre = middle if most == 1 else height / 2
     for side, x, anchor in ((left, 8.0, "start"), (right, width - 8.0, "end")):
         if side.is_named:
-            rows = [first_row + _ROW * index for index in range(len(side.ports))]
-            texts += (
-                Text(x, at + 3.5, _port_name(pin), PORT, anchor) for at, (_, pin) in zip(rows, side.ports, strict=True)
-            )
+            ports = zip(side.places(first_row, centre), side.ports, strict=True)
+            texts += (Text(x, at + 3.5, _port_name(pin), PORT, anchor) for at, (_, pin) in ports)
     part = Part(of, Block(width, height, []), *texts)
     for side in (left, right, top, bottom):
-        for index, (key, pin) in enumerate(side.ports):
-            at = 0.0  # the layout chooses it
-            if side.side in ("left", "right"):
-                centre = middle if most == 1 else height / 2
-                at = first_row + _ROW * index if side.is_named else centre + 12.0 * (index - (len(side.ports) - 1) / 2)
-            named = None if pin.is_plain or side.side in ("left", "right") else pin.name
+        for at, (key, pin) in zip(side.places(first_row, centre), side.ports, strict=True):
+            named = None if pin.is_plain or side.is_upright else pin.name
             dock = Dock(side.side, at, room=_room(pin))
             part.add_dock(key, dock, is_port=pin.kind != "active", named=named)
     return part
@@ -197,6 +192,11 @@ class _Side(NamedTuple):
 
     side: Side
     ports: list[tuple[Key, Pin]]
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether ports are one below the other."""
+        return self.side in ("left", "right")
 
     @property
     def is_named(self) -> bool:
@@ -216,6 +216,15 @@ class _Side(NamedTuple):
     def room(self) -> float:
         """What the ports need side by side."""
         return sum(_room(pin) for _, pin in self.ports)
+
+    def places(self, first_row: float, centre: float) -> list[float]:
+        """Give where each port is: named ones in rows, others around a place; on top and bottom the layout says."""
+        count = len(self.ports)
+        if not self.is_upright:
+            return [0.0] * count
+        if self.is_named:
+            return [first_row + _ROW * index for index in range(count)]
+        return [centre + 12.0 * (index - (count - 1) / 2) for index in range(count)]
 
 
 def _side(side: Side, pins: dict[Key, Pin]) -> _Side:

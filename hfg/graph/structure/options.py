@@ -174,14 +174,7 @@ def _checked(where: str, given: dict[str, Any]) -> NodeOptions:
         _need_positive(where, name, given[name])
     for name, least in (("priority", None), ("restart_limit", 0), ("retries", 0), ("concurrency", 1)):
         _need_whole(where, name, given[name], least, GraphError)
-    for name, what in _PAUSES.items():
-        if not _is_number(given[name]) or given[name] < 0:
-            raise GraphError(f"{where}: {name} must be seconds from 0 on, got {given[name]!r}; {what}")
-    jitter = given["retry_jitter"]
-    if not _is_number(jitter) or not 0 <= jitter <= 1:
-        raise GraphError(
-            f"{where}: retry_jitter must be a number from 0 to 1, got {jitter!r}; 0.5 makes pauses up to a half shorter"
-        )
+    _need_pauses(where, given)
     for name in ("enabled", "ordered"):
         if type(given[name]) is not bool:
             raise GraphError(f"{where}: {name} must be True or False, got {given[name]!r}")
@@ -192,6 +185,17 @@ def _checked(where: str, given: dict[str, Any]) -> NodeOptions:
             'declare it with graph.group("vision", threads=1)'
         )
     return NodeOptions(**given)
+
+
+def _need_pauses(where: str, given: dict[str, Any]) -> None:
+    for name, what in _PAUSES.items():
+        if not _is_number(given[name]) or given[name] < 0:
+            raise GraphError(f"{where}: {name} must be seconds from 0 on, got {given[name]!r}; {what}")
+    jitter = given["retry_jitter"]
+    if not _is_number(jitter) or not 0 <= jitter <= 1:
+        raise GraphError(
+            f"{where}: retry_jitter must be a number from 0 to 1, got {jitter!r}; 0.5 makes pauses up to a half shorter"
+        )
 
 
 @functools.lru_cache(maxsize=1024)

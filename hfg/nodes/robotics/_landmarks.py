@@ -65,24 +65,24 @@ class LandmarkMixture:
     """The places of all labels; the plain part of `LandmarkMap`.
 
     Args:
-      spread: how far sightings of one thing lie apart although they were thought exact, in metres.
       fading: what a place keeps of its count when another place of its label is seen.
       most: places for one label.
     """
 
-    def __init__(self, *, spread: float = 0.08, fading: float = 0.95, most: int = 6) -> None:
-        self.spread, self.fading, self.most = spread, fading, most
+    def __init__(self, *, fading: float = 0.95, most: int = 6) -> None:
+        self.fading, self.most = fading, most
         self._places: dict[str, list[_Place]] = {}
 
-    def learn(self, seen: Landmark, outliers: float = 0.1, area: float = 100.0) -> None:
+    def learn(self, seen: Landmark, spread: float = 0.08, outliers: float = 0.1, area: float = 100.0) -> None:
         """Take in one sighting.
 
         Args:
           seen: with a sigma of its own.
+          spread: how far sightings of one thing lie apart although they were thought exact, in metres.
           outliers: how many of the sightings belong to no place.
           area: over which those are spread, in square metres.
         """
-        at, variance = np.array([seen.x, seen.y]), max(seen.sigma, 1e-3) ** 2 + self.spread**2
+        at, variance = np.array([seen.x, seen.y]), max(seen.sigma, 1e-3) ** 2 + spread**2
         if not (np.isfinite(at).all() and math.isfinite(variance)):
             return
         known = math.isfinite(seen.heading)
@@ -102,7 +102,7 @@ class LandmarkMixture:
         for one, share in zip(places, shares, strict=True):
             if share > 1e-3:
                 # What is seen from one place errs in one direction: no number of sightings makes it quite sure.
-                one.learn(share, at, variance, look, least=(self.spread / 5) ** 2)
+                one.learn(share, at, variance, look, least=(spread / 5) ** 2)
             if share < 0.5:
                 one.fade(self.fading)
 
@@ -156,19 +156,15 @@ class LandmarkMap(Node):
     seen = Input(list[Landmark])
     known = Output(dict[str, Landmark])
 
-    mixture: State[Any] = State(None)
+    mixture: State[LandmarkMixture] = State(factory=LandmarkMixture)
 
     def process(self, seen: list[Landmark]) -> dict[str, Landmark]:
         """Learn."""
-        if self.mixture is None:
-            self.mixture = LandmarkMixture(spread=self.spread)
-        self.mixture.spread = self.spread
         for one in seen:
-            self.mixture.learn(one)
-        return self.mixture.known(self.least, self.ahead)  # type: ignore[no-any-return]
+            self.mixture.learn(one, self.spread)
+        return self.mixture.known(self.least, self.ahead)
 
     @slot
     def forget(self, label: str) -> None:
         """Forget one thing, or all."""
-        if self.mixture is not None:
-            self.mixture.forget(label or None)
+        self.mixture.forget(label or None)

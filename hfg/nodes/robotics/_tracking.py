@@ -21,11 +21,40 @@ _STILL = 0.05  # m/s: a standing thing is never measured as quite still
 
 
 class _Track:
+    """One disk: where it is, how it moves, and since when it was not seen."""
+
     __slots__ = ("at", "disk", "missed", "seen", "speed")
 
     def __init__(self, disk: Disk, now: float) -> None:
         self.disk, self.at, self.speed = disk, np.array([disk.x, disk.y]), np.zeros(2)
         self.seen, self.missed = now, 0
+
+    def expected(self, dt: float) -> Any:
+        """Give where it should be now; what is out of sight stands."""
+        return self.at if self.missed else self.at + self.speed * dt
+
+    def correct(self, disk: Disk, dt: float, now: float, fastest: float) -> None:
+        """It was seen."""
+        expected = self.expected(dt)
+        off = np.array([disk.x, disk.y]) - expected
+        if self.missed:  # it has come into sight again, anywhere: that says nothing of how fast it is
+            self.at, self.speed = expected + off, np.zeros(2)
+        else:
+            self.at = expected + _GAIN * off
+            self.speed = self.speed + _SPEED_GAIN / dt * off
+            self.speed *= min(1.0, fastest / max(float(np.hypot(*self.speed)), 1e-9))
+        self.disk, self.seen, self.missed = disk, now, 0
+
+    def miss(self) -> None:
+        """It was not seen."""
+        self.missed += 1
+
+    def tell(self) -> Disk:
+        """Give it as it is known."""
+        x, y = map(float, self.at)
+        moves = not self.missed and float(np.hypot(*self.speed)) > _STILL
+        vx, vy = map(float, self.speed) if moves else (0.0, 0.0)
+        return Disk(x, y, self.disk.points, vx, vy)
 
 
 class DiskTracks:
@@ -38,9 +67,13 @@ class DiskTracks:
     """
 
     def __init__(self, *, memory: float = 4.0, fastest: float = 1.0, radius: float = 0.25) -> None:
-        self.memory, self.fastest, self.radius = memory, fastest, radius
+        self.limit(memory, fastest, radius)
         self._tracks: list[_Track] = []
         self._last = -math.inf
+
+    def limit(self, memory: float, fastest: float, radius: float) -> None:
+        """Follow them by other limits from now on."""
+        self._memory, self._fastest, self._radius = memory, fastest, radius
 
     def update(self, seen: list[Disk], pose: Any, ranges: Any, angles: Any, now: float) -> list[Disk]:
         """Take in what is seen now; give that, and what is out of sight, all with their velocities.
@@ -55,36 +88,20 @@ class DiskTracks:
         dt, self._last = max(now - self._last, 1e-3), now
         left = list(seen)
         for track in sorted(self._tracks, key=lambda one: -one.seen):
-            expected = track.at + track.speed * dt if not track.missed else track.at
-            reach = _JUMP + (self.fastest * (now - track.seen) if track.missed else 0.0)
+            expected = track.expected(dt)
+            reach = _JUMP + (self._fastest * (now - track.seen) if track.missed else 0.0)
             near = [one for one in left if math.dist((one.x, one.y), expected) < reach]
             if near:
                 best = min(near, key=lambda one: math.dist((one.x, one.y), expected))
                 left.remove(best)
-                self._correct(track, best, expected, dt, now)
-            else:
-                track.missed += 1
-                hidden = _is_hidden(track.at, pose, ranges, angles, self.radius)
-                if now - track.seen > self.memory or (not hidden and track.missed > 1):
-                    self._tracks.remove(track)
+                track.correct(best, dt, now, self._fastest)
+                continue
+            track.miss()
+            hidden = _is_hidden(track.at, pose, ranges, angles, self._radius)
+            if now - track.seen > self._memory or (not hidden and track.missed > 1):
+                self._tracks.remove(track)
         self._tracks += [_Track(one, now) for one in left]
-        return [self._tell(track) for track in self._tracks]
-
-    def _correct(self, track: _Track, disk: Disk, expected: Any, dt: float, now: float) -> None:
-        off = np.array([disk.x, disk.y]) - expected
-        if track.missed:  # it has come into sight again, anywhere: that says nothing of how fast it is
-            track.at, track.speed = expected + off, np.zeros(2)
-        else:
-            track.at = expected + _GAIN * off
-            track.speed = track.speed + _SPEED_GAIN / dt * off
-            track.speed *= min(1.0, self.fastest / max(float(np.hypot(*track.speed)), 1e-9))
-        track.disk, track.seen, track.missed = disk, now, 0
-
-    def _tell(self, track: _Track) -> Disk:
-        x, y = map(float, track.at)
-        moves = not track.missed and float(np.hypot(*track.speed)) > _STILL
-        vx, vy = map(float, track.speed) if moves else (0.0, 0.0)
-        return Disk(x, y, track.disk.points, vx, vy)
+        return [track.tell() for track in self._tracks]
 
 
 def _is_hidden(at: Any, pose: Any, ranges: Any, angles: Any, radius: float) -> bool:
@@ -133,12 +150,10 @@ class TrackDisks(Node):
     angles = Input(Ranges)
     disks = Output(list[Disk])
 
-    tracks: State[Any] = State(None)
+    tracks: State[DiskTracks] = State(factory=DiskTracks)
 
     def process(self, seen: list[Disk], pose: Pose, ranges: Ranges, angles: Ranges) -> list[Disk]:
         """Follow them."""
         need_pairs(ranges, angles)
-        if self.tracks is None:
-            self.tracks = DiskTracks()
-        self.tracks.memory, self.tracks.fastest, self.tracks.radius = self.memory, self.fastest, self.radius
-        return self.tracks.update(seen, pose, ranges, angles, now())  # type: ignore[no-any-return]
+        self.tracks.limit(self.memory, self.fastest, self.radius)
+        return self.tracks.update(seen, pose, ranges, angles, now())

@@ -6,7 +6,7 @@ Stands on nodetype and ports.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +39,8 @@ __all__ = [
     "replace_by",
 ]
 
+T = TypeVar("T")
+
 VectorArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None)]
 MatrixArray: TypeAlias = Annotated[npt.NDArray[np.float64], Shape(None, None)]
 Rows: TypeAlias = Sequence[Sequence[float]]
@@ -53,7 +55,7 @@ def has_floats(value: Any) -> bool:
     return True
 
 
-def as_array(values: Any, axes: int) -> Any:
+def as_array(values: Any, axes: int) -> npt.NDArray[np.float64]:
     """Make an array of numbers; an empty one has as many axes as others."""
     array = np.asarray(values, dtype=np.float64)
     return array if array.ndim == axes else array.reshape((0,) * axes)
@@ -64,13 +66,11 @@ class _Constant(Node):
 
     told = State(factory=list[Any])
 
-    def _give(self, value: Any, changed: EventPort[Any]) -> Any:
-        if self.told and self.told[0] is not value and self.told[0] != value:  # a NaN differs from itself
-            changed.trigger(self._made(value))
-        self.told = [value]
-        return self._made(value)
-
-    def _made(self, value: Any) -> Any:
+    def _give(self, found: Any, value: T, changed: EventPort[T]) -> T:
+        """Give a value that is made of what the parameter was found to be, which can be compared."""
+        if self.told and self.told[0] is not found and self.told[0] != found:  # a NaN differs from itself
+            changed.trigger(value)
+        self.told = [found]
         return value
 
 
@@ -92,7 +92,7 @@ class ConstantBool(_Constant):
 
     def process(self) -> bool:
         """Give the value."""
-        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+        return self._give(self.value, self.value, self.changed)
 
 
 class ConstantInt(_Constant):
@@ -115,7 +115,7 @@ class ConstantInt(_Constant):
 
     def process(self) -> int:
         """Give the value."""
-        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+        return self._give(self.value, self.value, self.changed)
 
 
 class ConstantFloat(_Constant):
@@ -138,7 +138,7 @@ class ConstantFloat(_Constant):
 
     def process(self) -> float:
         """Give the value."""
-        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+        return self._give(self.value, self.value, self.changed)
 
 
 class ConstantText(_Constant):
@@ -161,7 +161,7 @@ class ConstantText(_Constant):
 
     def process(self) -> str:
         """Give the value."""
-        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+        return self._give(self.value, self.value, self.changed)
 
 
 class ConstantVector(_Constant):
@@ -184,10 +184,7 @@ class ConstantVector(_Constant):
 
     def process(self) -> VectorArray:
         """Give the value."""
-        return self._give(tuple(self.value), self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
-
-    def _made(self, value: Any) -> VectorArray:
-        return as_array(value, 1)  # type: ignore[no-any-return]  # numpy says Any
+        return self._give(tuple(self.value), as_array(self.value, 1), self.changed)
 
 
 class ConstantMatrix(_Constant):
@@ -210,10 +207,7 @@ class ConstantMatrix(_Constant):
 
     def process(self) -> MatrixArray:
         """Give the value."""
-        return self._give(tuple(map(tuple, self.value)), self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
-
-    def _made(self, value: Any) -> MatrixArray:
-        return as_array(value, 2)  # type: ignore[no-any-return]  # numpy says Any
+        return self._give(tuple(map(tuple, self.value)), as_array(self.value, 2), self.changed)
 
 
 class ConstantColour(_Constant):
@@ -234,7 +228,7 @@ class ConstantColour(_Constant):
 
     def process(self) -> Colour:
         """Give the value."""
-        return self._give(self.value, self.changed)  # type: ignore[no-any-return]  # of the type of the parameter
+        return self._give(self.value, self.value, self.changed)
 
 
 # --- given out at a signal ---

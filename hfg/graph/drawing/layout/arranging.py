@@ -235,11 +235,7 @@ class _Part:
         right: list[Ties] = [[] for _ in range(count)]
         pulled_left: list[Pulls] = [[] for _ in range(count)]
         pulled_right: list[Pulls] = [[] for _ in range(count)]
-        for channel, (one, here), (other, there) in {leg for legs in self.legs for leg in legs}:
-            if self.at_column[one] == self.at_column[other]:
-                continue  # it turns back in its channel
-            if self.at_column[one] > channel:
-                (one, here), (other, there) = (other, there), (one, here)
+        for (one, here), (other, there) in self._from_left_to_right():
             from_top, to_top = here / (self.heights[one] or 1.0), there / (self.heights[other] or 1.0)
             right[one].append((other, min(to_top, 0.999), min(from_top, 0.999)))
             left[other].append((one, min(from_top, 0.999), min(to_top, 0.999)))
@@ -250,6 +246,12 @@ class _Part:
             for one_ties in ties:
                 one_ties.sort()  # what comes from a set has no order
         return left, right, pulled_left, pulled_right
+
+    def _from_left_to_right(self) -> Iterator[tuple[tuple[int, float], tuple[int, float]]]:
+        """Give both ends of what leads from a column into another, once each, in no order."""
+        for channel, one, other in {leg for legs in self.legs for leg in legs}:
+            if self.at_column[one[0]] != self.at_column[other[0]]:  # or it turns back in its channel
+                yield (other, one) if self.at_column[one[0]] > channel else (one, other)
 
     def _length(self, order: list[list[int]], y: list[float]) -> float:
         """Say how long the upright parts of all lines are, and how high all is."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 import msgspec
+from msgspec import structs
 
 __all__ = ["Block", "Dock", "Label", "Line", "Plan", "Point", "Side"]
 
@@ -49,8 +50,7 @@ class Block(msgspec.Struct):
 
     def settle(self, places: Sequence[float]) -> None:
         """Take the places of the docks from the layout."""
-        for dock, at in zip(self.docks, places, strict=True):
-            dock.at = at
+        self.docks = [structs.replace(dock, at=at) for dock, at in zip(self.docks, places, strict=True)]
 
 
 class Label(msgspec.Struct, frozen=True):
