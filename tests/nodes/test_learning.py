@@ -145,6 +145,16 @@ def test_classes_weigh_as_said() -> None:
         trained(learning.RandomTreesTrainer(priors=[1.0]), *few, *many)
 
 
+def test_random_trees_are_those_of_the_seed_whatever_opencv_has_done_before() -> None:
+    samples = [Sample((float(one % 7), float(one % 5)), int(one % 7 > one % 5)) for one in range(35)]
+
+    def grown(seed: int, before: int) -> str:
+        cv2.setRNGSeed(before)
+        return Path(trained(learning.RandomTreesTrainer(seed=seed, variables=1), *samples)).read_text()
+
+    assert grown(3, before=1) == grown(3, before=2) != grown(4, before=1)
+
+
 @pytest.mark.parametrize(
     ("samples", "sentence"),
     [

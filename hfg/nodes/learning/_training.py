@@ -86,6 +86,8 @@ class RandomTreesTrainer(_Trainer):
       trees: how many there are, at most.
       accuracy: with so small a part of errors there are trees enough.
       priors: how much each class weighs, in the order of their labels; none for equal weights.
+      seed: of what is chosen at random; OpenCV's generator, which its other functions in this thread use too, begins
+        there each time.
       train: learn now.
       clear: forget the samples.
       trained: the path, when the file is there.
@@ -104,6 +106,7 @@ class RandomTreesTrainer(_Trainer):
     trees = Parameter(16, Interval(ge=1, le=1024))
     accuracy = Parameter(0.06, Interval(ge=0, le=1))
     priors = Parameter[Sequence[float]]((), type=Sequence[float])
+    seed = Parameter(0, Interval(ge=0, le=2**31 - 1))
 
     def _model(self, samples: int, classes: int) -> Any:
         if self.priors and (len(self.priors) != classes or not all(0 < one < 1e6 for one in self.priors)):
@@ -115,6 +118,7 @@ class RandomTreesTrainer(_Trainer):
         model.setTermCriteria((cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, self.trees, self.accuracy))
         if self.priors:
             model.setPriors(np.array(self.priors, np.float32))
+        cv2.setRNGSeed(self.seed)  # of this thread: what OpenCV has done before must not decide what is learned
         return model
 
 
