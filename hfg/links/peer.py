@@ -26,11 +26,14 @@ class Peer:
       owed: it is to be probed at once.
       since: when something was last sent to it or learnt of it.
       patience_s: how long after that it is probed.
+      answers: something was heard of it since it was last probed.
+      silent: it was probed again, for it had not answered.
     """
 
     __slots__ = (
         "_shortest_s",
         "accepted",
+        "answers",
         "done",
         "expected",
         "in_step",
@@ -41,6 +44,7 @@ class Peer:
         "owed",
         "patience_s",
         "sent",
+        "silent",
         "since",
     )
 
@@ -52,6 +56,8 @@ class Peer:
         self.accepted = self.done = self.limit = self.sent = done
         self.last_serial = 0
         self.owed = True
+        self.answers = True
+        self.silent = False
         self.since = float("-inf")
         self.patience_s = self._shortest_s = patience_s
 
@@ -112,6 +118,13 @@ class Peer:
         """It is to be probed at once."""
         self.owed = True
 
+    def heard(self) -> None:
+        """There was a word of it, whatever it says; after a silence the next one is not taken for a long one."""
+        self.answers = True
+        if self.silent:
+            self.silent = False
+            self.ask_soon()
+
     def ask_soon(self) -> None:
         """Something new was heard of it: the next silence is not taken for a long one."""
         self.patience_s = self._shortest_s
@@ -125,6 +138,7 @@ class Peer:
     def probed(self, now: float, slowest_s: float) -> None:
         """It is asked; if it was silent, the next time later."""
         if not self.owed:
+            self.silent = not self.answers
             self.patience_s = min(2 * self.patience_s, slowest_s)
-        self.owed = False
+        self.owed = self.answers = False
         self.since = now

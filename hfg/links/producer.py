@@ -120,7 +120,7 @@ class ExactProducer:
         largest_batch: int = 60_000,
         largest_token: int = 2**30,
         probe_s: float = 0.1,
-        slowest_probe_s: float = 0.5,
+        slowest_probe_s: float = 0.25,
     ) -> None:
         if epoch < 1 or window < 1 or depth < 0:
             raise UsageError(f"a link needs epoch >= 1, window >= 1 and depth >= 0, got {epoch}, {window}, {depth}")
@@ -294,6 +294,7 @@ class ExactProducer:
                 self._learn(peer, status)
 
     def _learn(self, peer: Peer, status: Status) -> None:
+        peer.heard()
         if status.incarnation != peer.incarnation:
             self.counts.restarts += peer.incarnation > 0
             peer.begin(status.incarnation)

@@ -175,6 +175,22 @@ def test_an_absent_consumer_is_probed_less_and_less_often_and_never_sent_a_token
 
 
 @pytest.mark.rule("L3")
+def test_who_is_heard_again_after_a_silence_is_soon_asked_again_though_it_says_nothing_new() -> None:
+    producer, consumer = pair(probe_s=0.1, slowest_probe_s=0.4)
+    producer.send(token("x"))
+    settle(producer, consumer)
+    waits = [producer.due or 0.0]
+    for _ in range(3):  # it is cut off, and is slow with what it has
+        producer.flush(waits[-1])
+        waits.append(producer.due or 0.0)
+    assert waits == pytest.approx([0.1, 0.3, 0.7, 1.1])
+    settle(producer, consumer, now=waits[-1])
+    assert producer.due == pytest.approx(1.2)
+    settle(producer, consumer, now=producer.due or 0.0)
+    assert producer.due == pytest.approx(1.4), "it answers, so it is there and slow"
+
+
+@pytest.mark.rule("L3")
 def test_nobody_speaks_while_nothing_is_to_be_done() -> None:
     producer, consumer = pair()
     assert producer.due is None

@@ -18,7 +18,7 @@ LONG: Final = 256 * 1024
 _BATCHES: Final = 16
 """Of 64 KiB that wait in each priority. With two, as it comes, a burst of tokens finds no room and is dropped, and each
 that is dropped costs its link a round trip; with sixteen 100,000 puts in a row lost none."""
-_RETRY: Final = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
+_RETRY: Final = {"period_init_ms": 50, "period_max_ms": 250, "period_increase_factor": 2}
 _ROOM: Final = 64 * 1024
 """What Zenoh adds to a message: the key, lengths."""
 
