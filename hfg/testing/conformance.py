@@ -278,10 +278,15 @@ class Replay:
                 self._apply(move)
 
     def _end_tasks(self, node: str) -> None:
-        """Nobody sees tasks end that were cancelled, but that their node begins something."""
+        """Nobody sees tasks end that were cancelled, or a reset, but that their node begins something."""
         for move in self.machine.moves():
-            if move.kind == "task" and move.node == node and self.machine.task_of(move).cancelled:
+            cancelled = move.kind == "task" and self.machine.task_of(move).cancelled
+            if move.node == node and (cancelled or self._resets(move)):
                 self._apply(move)
+
+    def _resets(self, move: Move) -> bool:
+        """Whether the node is reset by this, because a subgraph around it is (G2)."""
+        return move.kind == "go on" and self.machine.under_way(move).kind == "reset"
 
     def _end(self, event: RunEnded) -> None:
         if not any(move.kind == "finish" for move in self.machine.moves()):
@@ -358,7 +363,7 @@ class Replay:
         """Whether it is a step of which nothing need be seen: of a task, a restart, or to a firing's turn (F14)."""
         if move.kind == "timer":
             return not (move.node and self.machine.times_out(self.machine.paths[move.node]))
-        return move.kind == "task" or (move.kind == "go on" and isinstance(event, QueueGrown))
+        return move.kind == "task" or self._resets(move) or (move.kind == "go on" and isinstance(event, QueueGrown))
 
     def _strangeness(self, move: Move, event: TraceEvent) -> tuple[bool, bool, bool]:
         """Of several firings of one node (F14) the step of which is least likely to be behind the event.

@@ -141,6 +141,57 @@ def test_another_type_takes_the_place_of_a_node_with_its_edges_and_gates() -> No
 # --- G1 ---
 
 
+class Straight(hfg.Subgraph):
+    """What comes in goes out."""
+
+    heard = hfg.slot(type=Any)
+    told = hfg.Event(Any)
+
+    def build(self, graph: hfg.Graph) -> None:
+        graph.connect(self.heard.inner, self.told.inner)
+
+
+def straight(**behind: Any) -> hfg.Graph:
+    """An edge that runs straight through a subgraph; its queue is that of its first part."""
+    graph = hfg.Graph()
+    source, box, tally = graph.add(Counter(), name="source"), graph.add(Straight(), name="box"), graph.add(Tally())
+    graph.connect(source.processed, box.heard, capacity=3)
+    graph.connect(box.told, tally.activate, **behind)
+    return graph
+
+
+@pytest.mark.rule("G1")
+def test_a_border_that_would_give_an_edge_another_queue_is_refused() -> None:
+    graph = straight(overflow="latest")
+    assert flatten(graph).edges[0].capacity == 3
+    before = drawn(graph)
+    message = (
+        "grouping would change the queue of source.processed -> box.heard, which runs through a subgraph and on as "
+        'box.told -> tally.activate: one has capacity=3, overflow="wait", the other capacity=1, overflow="latest", '
+        "and the outer of the two holds (rule G1); give both the same"
+    )
+    with pytest.raises(GraphError, match=re.escape(message)):
+        graph.edit(c.Enclose(("source", "box"), "group"))
+    assert drawn(graph) == before
+    for members in (("box",), ("box", "tally"), ("source", "tally"), ("source",), ("source", "box", "tally")):
+        graph.edit(c.Enclose(members, "group"))
+        assert flatten(graph).edges[0].capacity == 3
+        graph.edit(c.Dissolve("group"))
+        assert flatten(graph).edges[0].capacity == 3
+
+
+@pytest.mark.rule("G1")
+def test_taking_a_border_away_that_gives_an_edge_its_queue_is_refused() -> None:
+    graph = straight(capacity=3)
+    graph.edit(c.Enclose(("source", "box"), "group"))
+    graph.edit(c.SetEdge("group.told", "tally.activate", capacity=5))
+    assert flatten(graph).edges[0].capacity == 5
+    with pytest.raises(GraphError, match=r"dissolving would change the queue of .*capacity=3.*capacity=5"):
+        graph.edit(c.Dissolve("group"))
+    graph.edit(c.SetEdge("group/source.processed", "group/box.heard", capacity=5), c.Dissolve("group"))
+    assert flatten(graph).edges[0].capacity == 5
+
+
 @pytest.mark.rule("G1", "R4")
 @pytest.mark.parametrize("seed", range(60))
 def test_grouping_and_dissolving_leave_the_flat_graph_as_it_was(seed: int) -> None:

@@ -1,7 +1,7 @@
 """Grouping nodes into a subgraph and dissolving one, so that nobody else can tell (rule G1).
 
 Each edge over the border gets a port of its own, in order, so that what a node sends keeps its order. Stands on
-`changes` and levels.
+`changes`, `straight` and levels.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import msgspec
 
 from hfg.errors import GraphError, HfgError
 from hfg.graph.editing.changes import Change, EdgeChange, GateChange, NodeChange, PromotionChange
+from hfg.graph.editing.straight import refuse_other_queue
 from hfg.graph.structure.connecting import refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
 from hfg.graph.structure.level import Level, level_of
@@ -75,7 +76,8 @@ def enclose(do: Do, members: Sequence[Node], name: str) -> None:
     """Put nodes of one graph into a new subgraph beside them.
 
     Raises:
-      GraphError: the nodes are not of one graph, the name is taken, or a parameter of them is promoted.
+      GraphError: the nodes are not of one graph, the name is taken, a parameter of them is promoted, or an edge would
+        have another queue.
     """
     around = _common_level(members)
     if need_name("a subgraph", name) in around.nodes and around.nodes[name] not in members:
@@ -85,6 +87,9 @@ def enclose(do: Do, members: Sequence[Node], name: str) -> None:
     near = around.connections.at(*members)
     edges = [edge for edge in near if not inner.isdisjoint((owner_of(edge.source), owner_of(edge.target)))]
     crossing = [edge for edge in edges if not {owner_of(edge.source), owner_of(edge.target)} <= inner]
+    for edge in crossing:
+        if owner_of(edge.source) in inner:
+            refuse_other_queue(around, edge, edge.options, crossing.__contains__, "grouping")
     ports = _Names(crossing, inner)
     box = _box_with({port: _declaration(kind, type_) for port, kind, type_ in ports.of.values()})
     halves = [(edge, around.connections.position(edge), _outer_half(edge, box, ports, inner)) for edge in edges]
@@ -198,10 +203,14 @@ def dissolve(do: Do, box: Node, levels: Sequence[Level]) -> None:
     """Put what is inside a subgraph in its place.
 
     Raises:
-      GraphError: it is no subgraph, something is said about the subgraph itself, or a name inside is taken outside.
+      GraphError: it is no subgraph, something is said about the subgraph itself, a name inside is taken outside, or an
+        edge would have another queue.
     """
     around, within = level_of(box.place.graph), _need_dissolvable(box, levels)
     border = _Border(box, around, within)
+    for outer in around.connections.at(box):
+        for edge in border.into(outer):
+            refuse_other_queue(within, edge, outer.options, border.is_at, "dissolving")
     joined = {edge: border.through(edge) for edge in around.connections.at(box) if border.is_at(edge)}
     spots = [around.connections.position(edge) for edge in joined]
     own = [whole for edge in within.edges for whole in border.through(edge)]
@@ -319,6 +328,11 @@ class _Border:
     def is_at(self, edge: Edge) -> bool:
         """Say whether an edge begins or ends at a port of the subgraph."""
         return _relay(edge.source, self.box) is not None or _relay(edge.target, self.box) is not None
+
+    def into(self, edge: Edge) -> list[Edge]:
+        """Give the edges inside that go on as one outside."""
+        port = _relay(edge.source, self.box)
+        return [] if port is None else [one for one in self.within if _relay(one.target, self.box) is port]
 
     def through(self, edge: Edge) -> list[Edge]:
         """Give the edges that one becomes when the border is gone; what begins there is met on the way."""

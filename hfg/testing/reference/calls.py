@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 from hfg.errors import Aborted, NodeError
@@ -32,11 +33,16 @@ class Calling(Tending):
         if is_box(owner) and lying.token.activity == 1:  # it has no activity but that of its nodes (G2)
             self.lose_activity(line.edge.label)
         if owner < 0:
-            self.call_of_whole(owner, name)
-            self.observe(CallEnded(self.now, self.path_of(owner), number, "done"))
-            if not line.edge.is_event and line.unprocessed:
-                self.process(line)
-            self.settle()
+            self.calling_boxes.add(owner)
+
+            def over() -> None:
+                self.calling_boxes.remove(owner)
+                self.observe(CallEnded(self.now, self.path_of(owner), number, "done"))
+                if not line.edge.is_event and line.unprocessed:
+                    self.process(line)
+                self.settle()
+
+            self.call_of_whole(owner, name, over)
             return
         station = self.stations[owner]
         flight = Flight(station, "call", number, "call", lying.token.stamp, slot=name, line=line)
@@ -150,8 +156,8 @@ class Calling(Tending):
             flight.right = False
         self.set_active(index, False, "slot")
 
-    def call_of_whole(self, owner: int, name: str) -> None:
-        """Slots of the graph (A10) and of subgraphs (G2)."""
+    def call_of_whole(self, owner: int, name: str, then: Callable[[], None]) -> None:
+        """Slots of the graph (A10) and of subgraphs (G2); `then` follows when all is done."""
         if owner == ROOT:
             if name == "stop":
                 self.finish("stopped")
@@ -164,11 +170,37 @@ class Calling(Tending):
         elif name == "deactivate":
             self.quench(-2 - owner, "slot")
         else:
-            for station in self.members_of(owner):
-                if not station.is_amid and not station.tasks:
-                    self.reset(station)
-                else:
-                    station.afterwards = station.afterwards or "reset"
+            self.reset_each(iter(self.members_of(owner)), then)
+            return
+        then()
+
+    def reset_each(self, stations: Iterator[Station], then: Callable[[], None]) -> None:
+        """One after the other; who is amid a firing or call follows after that, and nobody waits for it (G2)."""
+        for station in stations:
+            if station.is_amid or station.tasks:
+                station.afterwards = station.afterwards or "reset"
+            elif self.closes_in_thread(station):
+                flight = Flight(station, "call", 0, "reset", self.now, in_thread=True)
+                station.flights.append(flight)
+                self.launch(
+                    flight, lambda: None, partial(self.end_reset, flight, lambda: self.reset_each(stations, then))
+                )
+                return
+            else:
+                self.reset(station)
+        then()
+
+    def closes_in_thread(self, station: Station) -> bool:
+        """Whether its teardown has something to do in the thread of its group, for which others do not wait (R1)."""
+        has_work = station.iterator is not None and not station.ending and station.type.process_kind == "generator"
+        return has_work and station.set_up and self.structure.threads.get(station.leaf.options.group, 0) > 0
+
+    def end_reset(self, flight: Flight, then: Callable[[], None], _result: Any, _error: BaseException | None) -> None:
+        """What a subgraph around the node has asked for is done."""
+        self.reset(flight.station)
+        flight.station.flights.remove(flight)
+        self.be_idle(flight.station)
+        then()
 
     def reset(self, station: Station) -> None:
         """A9: it has not ended, so what was to end it behind firings whose turn has not come does so no more (F14)."""

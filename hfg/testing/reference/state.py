@@ -232,6 +232,7 @@ class State:
         self.graph = graph
         self.now = 0.0
         self.tick = 0
+        self.calling_boxes: set[int] = set()  # whose slot call is under way, for something inside is in a thread
         self.stations = [Station(leaf, fresh(leaf)) for leaf in self.structure.leaves]
         self.lines = [Line(edge, edge.capacity) for edge in self.structure.edges]
         self.box_enabled = [bool(box.options.enabled) for box in self.structure.boxes]
@@ -469,6 +470,8 @@ class State:
 
     def next_call(self, owner: int) -> Line | None:
         """The edge with the oldest token that waits for a call; of a disabled node only `enable` answers."""
+        if owner in self.calling_boxes:
+            return None
         candidates = [
             line
             for line in self.lines_called(owner)

@@ -1,0 +1,89 @@
+"""Edges that run straight through subgraphs, in at one port and out at another, and whose queue they have (rule G1).
+
+Of the edges that one consists of the outermost says how its queue is, among several the one nearest to the source. As
+long as no edge runs straight through a subgraph there is one that is outermost, wherever borders are drawn. One that
+does has two, and a border around the first of them alone would let the other one have its say. Stands on levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from hfg.errors import GraphError
+from hfg.graph.structure.edge import Edge
+from hfg.graph.structure.level import Level
+from hfg.graph.structure.options import EdgeOptions
+from hfg.graph.structure.subgraph import inside
+from hfg.ports import InnerSource, InnerTarget, Port
+
+__all__ = ["refuse_other_queue"]
+
+
+def refuse_other_queue(
+    level: Level, edge: Edge, options: EdgeOptions, is_at_border: Callable[[Edge], bool], what: str
+) -> None:
+    """Refuse a border that would change whose queue it is, being drawn or taken away.
+
+    Args:
+      level: where the edge lies.
+      edge: it crosses the border outwards.
+      options: which of it hold outside.
+      is_at_border: whether another edge of this level crosses the border.
+      what: "grouping" or "dissolving".
+
+    Raises:
+      GraphError: an edge that leads straight into this one has another queue.
+    """
+    for first in _origins(level, edge, is_at_border):
+        if _queue(first.options) != _queue(options):
+            raise GraphError(
+                f"{what} would change the queue of {first.label}, which runs through a subgraph and on as "
+                f"{edge.label}: one has {_said(first.options)}, the other {_said(options)}, and the outer of the two "
+                "holds (rule G1); give both the same"
+            )
+
+
+def _origins(level: Level, edge: Edge, is_at_border: Callable[[Edge], bool]) -> Iterator[Edge]:
+    """Give the edges of this level at which begins what leads straight into one; not that itself."""
+    stack, met = [edge], {edge}
+    while stack:
+        one = stack.pop()
+        before = list(_before(level, one))
+        if not before and one is not edge:
+            yield one
+        for other in before:
+            if other not in met and not is_at_border(other):
+                met.add(other)
+                stack.append(other)
+
+
+def _before(level: Level, edge: Edge) -> Iterator[Edge]:
+    """Give the edges of a level that go on as this one, behind a subgraph that they run straight through."""
+    port = edge.source
+    within = inside(port.node) if isinstance(port, Port) and port.kind == "event" else None
+    if within is not None:
+        entries = _entries(within, port)
+        yield from (one for one in level.connections.at(port.node) if one.target in entries)
+
+
+def _entries(within: Level, port: Port) -> list[Port]:
+    """Give the ports of a subgraph from which edges run straight to one of its events."""
+    own = within.connections.at(port.node)
+    stack = [one for one in own if isinstance(one.target, InnerTarget) and one.target.outer is port]
+    found: list[Port] = []
+    while stack:
+        one = stack.pop()
+        if isinstance(one.source, InnerSource):
+            found.append(one.source.outer)
+        else:
+            stack += _before(within, one)
+    return found
+
+
+def _queue(options: EdgeOptions) -> tuple[object, ...]:
+    return options.capacity, options.overflow, options.capacity_limit
+
+
+def _said(options: EdgeOptions) -> str:
+    limit = "" if options.capacity_limit is None else f", capacity_limit={options.capacity_limit}"
+    return f'capacity={options.capacity}, overflow="{options.overflow}"{limit}'
