@@ -37,6 +37,7 @@ class Introduction(msgspec.Struct, frozen=True, array_like=True):
       fingerprint: of the type.
       lossless: a publisher: whether he waits for those who want every value; a consumer: whether he wants every one.
       type: its description; empty where it is too long to be said.
+      stream: a publisher with an outbox: what all his lives publish, so that nobody takes a value twice; else empty.
     """
 
     version: Annotated[int, msgspec.Meta(ge=1)]
@@ -44,13 +45,14 @@ class Introduction(msgspec.Struct, frozen=True, array_like=True):
     fingerprint: Annotated[str, msgspec.Meta(max_length=64)]
     lossless: bool
     type: Annotated[str, msgspec.Meta(max_length=_LONGEST_TYPE)]
+    stream: Annotated[str, msgspec.Meta(max_length=64)] = ""
 
 
 _encode: Final = msgspec.msgpack.Encoder().encode
 _decode: Final = msgspec.msgpack.Decoder(Introduction).decode
 
 
-def introduce(hint: Any, who: str, *, lossless: bool) -> bytes:
+def introduce(hint: Any, who: str, *, lossless: bool, stream: str = "") -> bytes:
     """Give what is announced.
 
     Raises:
@@ -58,7 +60,7 @@ def introduce(hint: Any, who: str, *, lossless: bool) -> bytes:
     """
     described = description_of(hint)
     said = described if len(described) <= _LONGEST_TYPE else ""
-    return _encode(Introduction(VERSION, who[:300], type_fingerprint(hint), lossless, said))
+    return _encode(Introduction(VERSION, who[:300], type_fingerprint(hint), lossless, said, stream))
 
 
 def read_introduction(metadata: bytes) -> Introduction | None:

@@ -174,6 +174,12 @@ class LinkSender:
         self._turns.wake()
         return number
 
+    async def wait_free(self) -> None:
+        """Wait until there is room for a token; who sends it without a pause between has it."""
+        if not self.free:
+            await self._wait(None)
+            self._turns.wake()
+
     async def wait_finished(self) -> None:
         """Wait until all that was sent is done."""
         while self.machine.unfinished:

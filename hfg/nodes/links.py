@@ -13,17 +13,18 @@ import os
 import socket
 from typing import Any, Literal
 
-from annotated_types import Ge
+from annotated_types import Ge, Predicate
 
 from hfg.clock import now
 from hfg.encoding import type_fingerprint, wire_problem
-from hfg.errors import EndOfStream, UsageError
+from hfg.errors import EndOfStream, HfgError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import flatten
 from hfg.graph.structure.level import level_of
-from hfg.links.meeting import Publication, Subscription
+from hfg.links.meeting import OutboxFile, Publication, Subscription
 from hfg.links.offers import need_link_name
 from hfg.nodes._sessions import share
+from hfg.nodes.files.access import is_a_path
 from hfg.nodetype import Node
 from hfg.ports import Input, Output, Parameter
 from hfg.token import END, Token
@@ -46,13 +47,18 @@ class Publish(Node):
       window: how many values may be on their way to them.
       absent: what to do while nobody has subscribed: "pass" lets values go by; "wait" waits, also for somebody who
         takes the place of the last subscriber, and then nothing is lost by its death.
+      outbox: a file that keeps what is published and not done, on the disk before it leaves: a program that is killed
+        and begun again goes on with it, and subscribers that have lived on get each value once. It waits as with
+        absent="wait"; empty: what was on its way is lost with the program.
       transport: "zenoh" or "memory"; empty: the environment variable HFG_TRANSPORT, else Zenoh, and memory in virtual
         time.
       settings: the settings file of Zenoh, or the name of a network in memory; empty: HFG_SETTINGS, else this computer
         alone.
 
     Raises:
-      UsageError: it is connected to no port whose values can cross, or the name is none.
+      UsageError: it is connected to no port whose values can cross, the name is none, or an outbox is asked for with
+        lossless=False.
+      RunError: the outbox cannot be used.
       TransportError: the transport cannot be used, or a value is too large for it.
       EncodingError: a value is not of the type.
     """
@@ -62,23 +68,38 @@ class Publish(Node):
     lossless = Parameter(True)
     window = Parameter(8, Ge(1))
     absent = Parameter("pass", type=Literal["pass", "wait"])
+    outbox = Parameter("", Predicate(is_a_path), save=True)
     transport = Parameter("")
     settings = Parameter("")
 
     async def setup(self) -> None:
         """Say what is published."""
         hint = _type_of(self)
+        name = need_link_name(self.name)
+        if self.outbox and not self.lossless:
+            raise UsageError(
+                f'"{name}" is published with lossless=False, which waits for nobody, and with an outbox, from which '
+                "nothing is to get lost: take one of the two"
+            )
         self._share = share(_whole(self), self.transport, self.settings)
-        self._end = Publication(
-            await self._share.session(),
-            need_link_name(self.name),
-            hint,
-            who=_who(self),
-            lossless=self.lossless,
-            window=self.window,
-            absent=self.absent,
-            complain=self.log.warning,
-        )
+        session = await self._share.session()
+        outbox = OutboxFile(self.outbox, name, type_fingerprint(hint)) if self.outbox else None
+        try:
+            self._end = Publication(
+                session,
+                name,
+                hint,
+                who=_who(self),
+                lossless=self.lossless,
+                window=self.window,
+                absent=self.absent,
+                outbox=outbox,
+                complain=self.log.warning,
+            )
+        except HfgError:
+            if outbox is not None:
+                outbox.close()
+            raise
 
     async def process(self, value: Token[Any]) -> None:
         """Publish it; wait while the subscribers have no room."""

@@ -38,7 +38,8 @@ def settings(tmp_path: Path) -> Path:
 
 @contextmanager
 def program(name: str, settings: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    command = [sys.executable, "-m", "hfg", "run", f"examples/meeting/{name}.py", *arguments]
+    file = name if name.endswith(".py") else f"examples/meeting/{name}.py"
+    command = [sys.executable, "-m", "hfg", "run", file, *arguments]
     environment = {**os.environ, "HFG_SETTINGS": str(settings), "HFG_TRANSPORT": "zenoh"}
     pipe = subprocess.PIPE
     with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=pipe, stderr=pipe, text=True) as one:
@@ -76,3 +77,54 @@ def test_a_viewer_that_is_killed_has_an_heir_that_goes_on_where_it_was(settings:
     rest = re.findall(r"the disc is at row \d+, column \d+", after)
     assert len(places) + len(rest) in (60, 61, 62), errors  # what it had shown and not said to be done comes again
     assert rest[0] in places[-2:] or len(places) + len(rest) == 60
+
+
+_COUNTER = """
+from collections.abc import Iterator
+import hfg
+
+@hfg.node
+def counter(*, begin: int = 0, to: int = 10**9) -> Iterator[int]:
+    yield from range(begin, to)
+
+graph = hfg.Graph("counter")
+hfg.publish("numbers", graph.add(counter()).out)
+"""
+_TELLER = """
+import hfg
+
+@hfg.node
+def tell(number: int) -> None:
+    print("got", number, flush=True)
+
+graph = hfg.Graph("teller")
+hfg.subscribe("numbers", graph.add(tell()).number)
+"""
+
+
+@pytest.mark.rule("L2", "L3")
+def test_a_publisher_with_an_outbox_that_is_killed_loses_nothing_and_nobody_gets_a_value_twice(
+    settings: Path, tmp_path: Path
+) -> None:
+    for name, text in (("counter", _COUNTER), ("teller", _TELLER)):
+        (tmp_path / f"{name}.py").write_text(text)
+    counter, teller = str(tmp_path / "counter.py"), str(tmp_path / "teller.py")
+    outbox = ("--param", f"publish.outbox={tmp_path / 'numbers.outbox'}")
+    got: list[int] = []
+    with program(teller, settings) as view:
+        assert view.stdout is not None
+        for life in range(3):
+            with program(counter, settings, *outbox, "--param", f"counter.begin={life * 10_000}"):
+                while not got or got[-1] < life * 10_000 + 20:
+                    got.append(int(view.stdout.readline().split()[1]))
+        last = ("--param", "counter.begin=30000", "--param", "counter.to=30005")
+        with program(counter, settings, *outbox, *last) as ends:
+            rest, errors = view.communicate(timeout=PATIENCE_S)
+            assert view.returncode == 0, errors
+            assert ends.wait(PATIENCE_S) == 0
+    got += [int(number) for number in re.findall(r"got (\d+)", rest)]
+    for life in range(4):
+        of_life = [number for number in got if number // 10_000 == life]
+        assert of_life == list(range(life * 10_000, life * 10_000 + len(of_life)))
+    assert got == sorted(got)
+    assert got[-1] == 30_004

@@ -6,7 +6,8 @@ others; a consumer announces that it takes part, and is admitted. Who announces 
 tells, within the lease of the transport. Stands on `hfg.links.running` and `offers`.
 """
 
+from hfg.links.meeting.outbox import OutboxFile
 from hfg.links.meeting.publication import Absent, Publication, PublicationCounts
 from hfg.links.meeting.subscription import Subscription, SubscriptionCounts
 
-__all__ = ["Absent", "Publication", "PublicationCounts", "Subscription", "SubscriptionCounts"]
+__all__ = ["Absent", "OutboxFile", "Publication", "PublicationCounts", "Subscription", "SubscriptionCounts"]

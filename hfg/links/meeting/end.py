@@ -45,13 +45,22 @@ class End:
       hint: the declared type of the values.
       who: for people, whose end this is.
       lossless: whether it takes part in what gets every value.
+      stream: what all lives of this publisher publish, if he has an outbox.
       complain: told each sentence about somebody who does not fit, once.
     """
 
     def __init__(
-        self, session: Session, name: str, hint: Any, who: str, *, lossless: bool, complain: Callable[[str], None]
+        self,
+        session: Session,
+        name: str,
+        hint: Any,
+        who: str,
+        *,
+        lossless: bool,
+        complain: Callable[[str], None],
+        stream: str = "",
     ) -> None:
-        said = introduce(hint, who, lossless=lossless)
+        said = introduce(hint, who, lossless=lossless, stream=stream)
         mine = read_introduction(said)
         assert mine is not None
         self.name = name

@@ -5,21 +5,28 @@ Stands on `end` and `hfg.links.running`.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
+from msgspec.structs import replace
 
-from hfg.errors import TransportError
+from hfg.errors import EncodingError, RunError, TransportError
+from hfg.links import Outbox
 from hfg.links.meeting.end import MOST, End
+from hfg.links.meeting.outbox import KeptValue, OutboxFile
 from hfg.links.offers import key_of, read_introduction, unfit
 from hfg.links.running import BoundedSender, LinkSender
 from hfg.token import END, Token
-from hfg.transport import Closing, Presence, Session
+from hfg.transport import Closing, EncodedToken, Presence, Session
 
 __all__ = ["Absent", "Publication", "PublicationCounts"]
 
 Absent: TypeAlias = Literal["pass", "wait"]
+
+_BEFORE: Final = "(before)"  # the place of those who were there in a former life
+_RETURN_S: Final = 3.0  # in which they come back once one of them has: the lease of a connection, and some more
 
 
 class PublicationCounts(msgspec.Struct):
@@ -28,6 +35,7 @@ class PublicationCounts(msgspec.Struct):
     Attributes:
       sent: values that somebody was there for.
       passed: values that nobody was there for.
+      restored: values of a former life that were not done, and are sent again.
       joined: consumers that have come.
       left: those that have gone, whatever the reason.
       refused: those that do not fit.
@@ -36,6 +44,7 @@ class PublicationCounts(msgspec.Struct):
 
     sent: int = 0
     passed: int = 0
+    restored: int = 0
     joined: int = 0
     left: int = 0
     refused: int = 0
@@ -54,6 +63,8 @@ class Publication(End):
       window: how many values may be on their way to them.
       absent: "pass": values go by while nobody is there; "wait": they wait until somebody comes, who also gets what the
         last one that has gone had not done.
+      outbox: keeps what is not done for the next life of this publisher, which waits for those who want every value;
+        it is closed with this.
       complain: told each sentence about somebody who does not fit, once.
 
     Attributes:
@@ -70,19 +81,24 @@ class Publication(End):
         lossless: bool = True,
         window: int = 8,
         absent: Absent = "pass",
+        outbox: OutboxFile | None = None,
         complain: Callable[[str], None] = lambda _: None,
     ) -> None:
-        super().__init__(session, name, hint, who, lossless=lossless, complain=complain)
+        stream = "" if outbox is None else outbox.stream
+        super().__init__(session, name, hint, who, lossless=lossless, complain=complain, stream=stream)
         self.counts = PublicationCounts()
-        self._waits = absent == "wait"
-        self._number = 0
+        self._waits = absent == "wait" or outbox is not None
+        self._outbox = outbox
+        self._number = 0 if outbox is None else outbox.last
         self._latest: Token[Any] | None = None
         self._over = False
         self._members: set[str] = set()  # who gets every value
         self._left: list[str] = []  # who did, and whose place waits for an heir
         self._listeners: set[str] = set()  # who gets what arrives
+        self._expected = set() if outbox is None else set(outbox.members)  # who was there in a former life
+        self._returning: asyncio.TimerHandle | None = None  # until when they come back
         key = key_of(name, self._id)
-        self._exact = LinkSender(session, f"{key}/exact", epoch=1, window=window)
+        self._exact = self._sender(f"{key}/exact", window)
         self._bounded = BoundedSender(session, f"{key}/bounded", epoch=1)
         self._open: list[Closing] = [
             session.answer(f"{key}/latest", self._tell_latest),
@@ -90,6 +106,37 @@ class Publication(End):
             session.watch(key_of(name), self._changed),
             session.announce(f"{key}/offer", self._said),
         ]
+
+    def _sender(self, key: str, window: int) -> LinkSender:
+        """Make the link of those who get every value; what was not done in a former life is on it already."""
+        if self._outbox is None:
+            return LinkSender(self._session, key, epoch=1, window=window)
+        kept = self._restored(self._outbox)
+        if kept:
+            self._number = kept[-1].number
+        tokens = tuple((one.metadata, one.value) for one in kept)
+        before = Outbox(1, self._number + 1 - len(kept), tokens)
+        link = LinkSender(self._session, key, epoch=1, window=max(window, len(kept)), outbox=before)
+        self.counts.restored = len(kept)
+        if self._outbox.last:  # there was a former life, and those who were there may come back
+            self._left.append(_BEFORE)
+            link.admit(_BEFORE, 1, after=0)
+        return link
+
+    def _restored(self, outbox: OutboxFile) -> list[KeptValue]:
+        """Give what is to be sent again; an end was the end of that life."""
+        found = []
+        for one in outbox.kept:
+            try:
+                token = self._codec.decode(one.metadata, one.value)
+            except EncodingError as error:
+                raise RunError(
+                    f'outbox "{outbox.path}" of "{self.name}" is broken: {error}; restore it from a copy, or remove it '
+                    "to begin anew"
+                ) from error
+            if token.value is not END:
+                found.append(one)
+        return found
 
     @property
     def attended(self) -> bool:
@@ -112,12 +159,27 @@ class Publication(End):
         if not self.attended:
             self.counts.passed += 1
             return
-        encoded = self._codec.encode(token)
-        if self._members:
-            await self._exact.send(encoded)
+        if self._outbox is not None:
+            encoded = await self._send_kept(self._outbox, token)
+        else:
+            encoded = self._codec.encode(token)
+            if self._members or self._left:
+                await self._exact.send(encoded)
         if self._listeners:
             self._bounded.send_nowait(encoded)
         self.counts.sent += 1
+
+    async def _send_kept(self, outbox: OutboxFile, token: Token[Any]) -> EncodedToken:
+        """Send a value that is on the disk by then; by its number, that on the link, consumers know what they had."""
+        await self._exact.wait_free()
+        self._number = self._exact.machine.position.sequence + 1
+        encoded = self._codec.encode(replace(token, sequence=self._number))
+        kept = KeptValue(self._number, *map(bytes, encoded))
+        members = {_identity(one) for one in self._members} | self._expected
+        await asyncio.to_thread(outbox.keep, kept, self._exact.released, members)
+        self._need_open()
+        await self._exact.send(encoded)
+        return encoded
 
     async def end(self, stamp: float) -> None:
         """Say that nothing more comes, and wait until all who get every value have done with it."""
@@ -125,6 +187,9 @@ class Publication(End):
         if self.attended or self._waits:
             await self.send(END, stamp)
         self._latest = None
+        if self._outbox is not None:  # who lacks something waits for the next life of this publisher, if it dies now
+            await self._exact.wait_finished()
+            await asyncio.to_thread(self._outbox.clear)
         self._open.append(self._session.announce(f"{key_of(self.name, self._id)}/end"))
         await self._exact.wait_finished()
 
@@ -136,9 +201,18 @@ class Publication(End):
         for one in reversed(self._open):  # the offer before the end, which says why it is gone
             one.close()
         await self._bounded.close()
-        self.counts.lost += self._exact.machine.unfinished
+        done = self._exact.released
+        if self._outbox is None:
+            self.counts.lost += self._exact.machine.unfinished
         await self._exact.close()
         self._news.tell()
+        if self._returning is not None:
+            self._returning.cancel()
+        if self._outbox is not None:
+            try:
+                await asyncio.to_thread(self._outbox.forget, done)
+            finally:
+                self._outbox.close()
 
     def statistics(self) -> dict[str, int]:
         """What has happened, in numbers."""
@@ -207,10 +281,26 @@ class Publication(End):
             self._left.remove(consumer)
         elif self._left:
             self._exact.admit(consumer, 1, after=0)  # all that its predecessors have not done
-            while self._left:
-                self._exact.dismiss(self._left.pop())
+            self._dismiss_left(but=_BEFORE)
+            self._expected.discard(_identity(consumer))
+            if not self._expected:
+                self._dismiss_left()
+            elif self._returning is None:  # each of those who come back gets all, and takes what is new
+                self._returning = asyncio.get_running_loop().call_later(_RETURN_S, self._all_are_back)
         else:
             self._exact.admit(consumer, 1)
+
+    def _all_are_back(self) -> None:
+        """Nobody who was there in a former life is waited for any more; the place of who has gone by now is his own."""
+        self._expected.clear()
+        if _BEFORE in self._left:
+            self._left.remove(_BEFORE)
+            self._exact.dismiss(_BEFORE)
+
+    def _dismiss_left(self, but: str = "") -> None:
+        for one in [one for one in self._left if one != but]:
+            self._left.remove(one)
+            self._exact.dismiss(one)
 
     def _leave(self, consumer: str) -> None:
         if consumer in self._listeners:
@@ -226,3 +316,8 @@ class Publication(End):
         else:
             return
         self.counts.left += 1
+
+
+def _identity(consumer: str) -> str:
+    """Who a consumer is, each time that he takes part."""
+    return consumer.partition(".")[0]

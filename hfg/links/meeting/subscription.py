@@ -28,6 +28,7 @@ class SubscriptionCounts(msgspec.Struct):
 
     Attributes:
       received: values that were taken.
+      repeated: values that were taken from a former life of the publisher already, and are not given again.
       joined: publishers that were joined.
       left: those that have gone or ended.
       refused: publishers that do not fit, and values that are not of the type.
@@ -36,6 +37,7 @@ class SubscriptionCounts(msgspec.Struct):
     """
 
     received: int = 0
+    repeated: int = 0
     joined: int = 0
     left: int = 0
     refused: int = 0
@@ -84,9 +86,11 @@ class Subscription(End):
         self._ended: set[str] = set()
         self._protests: dict[str, Closing] = {}  # what tells those who do not fit that somebody would take part
         self._joined = ""
+        self._stream = ""  # of whom it takes part in, if he has an outbox
         self._part: Closing | None = None
         self._receiver: LinkReceiver | BoundedReceiver | None = None
         self._undone = False
+        self._taken: dict[str, int] = {}  # the last number of each stream of a publisher with an outbox
         self._watch = session.watch(key_of(name), self._changed)
 
     async def take(self) -> Token[Any] | None:
@@ -161,11 +165,26 @@ class Subscription(End):
                 return None
             self._undone = True
             try:
-                return self._codec.decode(*delivery.token)
+                token = self._codec.decode(*delivery.token)
             except EncodingError as error:
                 self.counts.refused += 1
                 self._tell_once(f'"{self.name}": {error}')
-                self._done()
+            else:
+                if self._is_new(token):
+                    return token
+                self.counts.repeated += 1
+            self._done()
+
+    def _is_new(self, token: Token[Any]) -> bool:
+        """Whether it was not taken before; publishers with an outbox send again what may not be done."""
+        stream = self._stream
+        if not stream or token.value is END:
+            return True
+        if token.sequence <= self._taken.get(stream, 0):
+            return False
+        if stream in self._taken or len(self._taken) < MOST:
+            self._taken[stream] = token.sequence
+        return True
 
     def _done(self) -> None:
         if self._undone and isinstance(self._receiver, LinkReceiver):
@@ -213,6 +232,7 @@ class Subscription(End):
                 self._protests[publisher] = self._session.announce(f"{key}/join {consumer}", self._said)
                 continue
             self._joined = publisher
+            self._stream = theirs.stream if self._overflow == "wait" else ""
             self.counts.joined += 1
             token = await self._ask_latest(key) if self._wants_latest else None
             if self._overflow == "wait":

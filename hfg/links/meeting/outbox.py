@@ -1,0 +1,151 @@
+"""What is published and not done, in a file: whoever publishes by that file next goes on with it (rule L2).
+
+A value is in the file before it leaves, and is taken out behind those that are known to be done, with the next one. A
+file is SQLite's, and open to one publisher at a time.
+"""
+
+from __future__ import annotations
+
+import secrets
+import sqlite3
+import threading
+from collections.abc import Sequence, Set
+from typing import NamedTuple
+
+from hfg.errors import RunError
+
+__all__ = ["KeptValue", "OutboxFile"]
+
+
+class KeptValue(NamedTuple):
+    """A value that was published and may not be done.
+
+    Attributes:
+      number: its number in the stream; they follow one another.
+      metadata, value: it, encoded.
+    """
+
+    number: int
+    metadata: bytes
+    value: bytes
+
+
+class OutboxFile:
+    """Keeps the values of one publisher.
+
+    Args:
+      path: of the file; it is made if there is none.
+      name: by which the programs meet.
+      fingerprint: of the type of the values.
+
+    Attributes:
+      path: see above.
+      stream: an identity of what is published by this file, by all lives of the publisher together.
+      last: the number of the last value that was ever kept; 0 if there was none.
+      kept: what was in the file when it was opened, in order.
+      members: who was there for every value then.
+
+    Raises:
+      RunError: it is no outbox, keeps values of another name or type, or another publisher has it open.
+    """
+
+    def __init__(self, path: str, name: str, fingerprint: str) -> None:
+        self.path = path
+        self._name = name
+        self._lock = threading.Lock()
+        try:
+            self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
+            self._file.execute("PRAGMA synchronous = FULL")
+            self._file.execute("PRAGMA locking_mode = EXCLUSIVE")
+            self._file.execute("BEGIN EXCLUSIVE")
+            self._file.execute(
+                "CREATE TABLE IF NOT EXISTS hfg_outbox (name TEXT PRIMARY KEY, type TEXT, stream TEXT, last INT)"
+            )
+            self._file.execute(
+                "CREATE TABLE IF NOT EXISTS hfg_outbox_value (number INTEGER PRIMARY KEY, metadata BLOB, value BLOB)"
+            )
+            self._file.execute("CREATE TABLE IF NOT EXISTS hfg_outbox_member (id TEXT PRIMARY KEY)")
+            self._file.execute("COMMIT")
+            self.stream, self.last = self._begin(fingerprint)
+            rows = self._file.execute("SELECT number, metadata, value FROM hfg_outbox_value ORDER BY number")
+            self.kept = [KeptValue(*row) for row in rows]
+            self.members = {one for (one,) in self._file.execute("SELECT id FROM hfg_outbox_member")}
+        except sqlite3.Error as error:
+            raise self._refuse(error) from error
+
+    def _begin(self, fingerprint: str) -> tuple[str, int]:
+        """Give the stream that is carried on, and its last number; a new one if nothing of an old one is left."""
+        found = self._file.execute("SELECT name, type, stream, last FROM hfg_outbox").fetchone()
+        count = self._file.execute("SELECT count(*) FROM hfg_outbox_value").fetchone()[0]
+        if found is not None and found[:2] == (self._name, fingerprint):
+            return found[2], found[3]
+        if found is not None and count:
+            self._file.close()
+            what = f'of "{found[0]}"' if found[0] != self._name else "of another type"
+            raise RunError(
+                f'outbox "{self.path}" keeps {count} values {what}, and "{self._name}" cannot be published by it: let '
+                "that publisher finish, or give another file"
+            )
+        stream = secrets.token_hex(8)
+        self._file.execute("DELETE FROM hfg_outbox")
+        self._file.execute("DELETE FROM hfg_outbox_member")
+        self._file.execute("INSERT INTO hfg_outbox VALUES (?, ?, ?, 0)", (self._name, fingerprint, stream))
+        return stream, 0
+
+    def keep(self, value: KeptValue, done: int, members: Set[str]) -> None:
+        """Keep one more, no longer those up to a number, and who is there; when it returns that is on the disk.
+
+        Raises:
+          RunError: it cannot be.
+        """
+        others: list[tuple[str, Sequence[object]]] = []
+        if members != self.members:
+            others = [("DELETE FROM hfg_outbox_member", ())]
+            others += [("INSERT INTO hfg_outbox_member VALUES (?)", (one,)) for one in members]
+        self._change(
+            *others,
+            ("DELETE FROM hfg_outbox_value WHERE number <= ?", (done,)),
+            ("INSERT OR REPLACE INTO hfg_outbox_value VALUES (?, ?, ?)", value),  # of an end that was not heard
+            ("UPDATE hfg_outbox SET last = ?", (value.number,)),
+        )
+        self.members = set(members)
+
+    def forget(self, done: int) -> None:
+        """Keep no longer those up to a number.
+
+        Raises:
+          RunError: the file cannot be written.
+        """
+        self._change(("DELETE FROM hfg_outbox_value WHERE number <= ?", (done,)))
+
+    def clear(self) -> None:
+        """All is done and ended: the next publisher by this file begins a stream of its own.
+
+        Raises:
+          RunError: the file cannot be written.
+        """
+        self._change(*((f"DELETE FROM hfg_outbox{one}", ()) for one in ("", "_value", "_member")))
+
+    def close(self) -> None:
+        """End it; what is kept stays."""
+        with self._lock:
+            self._file.close()
+
+    def _change(self, *statements: tuple[str, Sequence[object]]) -> None:
+        """All or nothing; somebody who was cancelled may begin another while a thread still makes this one."""
+        with self._lock:
+            try:
+                self._file.execute("BEGIN")
+                for statement, values in statements:
+                    self._file.execute(statement, values)
+                self._file.execute("COMMIT")
+            except sqlite3.Error as error:
+                if self._file.in_transaction:
+                    self._file.execute("ROLLBACK")
+                raise self._refuse(error) from error
+
+    def _refuse(self, error: sqlite3.Error) -> RunError:
+        return RunError(
+            f'outbox "{self.path}" of "{self._name}" cannot be used: {error}; give a path that can be written, of a '
+            "file that is an outbox or not there, and that no other publisher has open"
+        )
