@@ -135,3 +135,39 @@ def test_who_is_freed_first_by_a_taken_wave_goes_first_fused_or_not(monkeypatch:
         orders.append([path for path, _ in calls.take()[0]])
     assert orders[0] == orders[1]
     assert orders[0][-6:] == ["both", "first", "second", "both", "first", "second"]
+
+
+class SlowSink(hfg.Node):
+    """Takes a second for each value."""
+
+    value = hfg.Input(int)
+
+    async def process(self, value: int) -> None:
+        await asyncio.sleep(1.0)
+
+
+class Around(hfg.Subgraph):
+    """Its `activated` comes back to the node inside."""
+
+    value = hfg.Input(int)
+    again = hfg.slot(type=Any)
+
+    def build(self, graph: hfg.Graph) -> None:
+        sink = graph.add(SlowSink(), name="sink")
+        graph.connect(self.value.inner, sink.value, active=True)
+        graph.connect(self.again.inner, sink.ports.slots["activate"])
+
+
+@pytest.mark.rule("F9", "A6", "G2", "P4")
+def test_a_value_that_waits_behind_one_that_brings_activity_has_its_place_before_what_that_sets_off(
+    perform: Any,
+) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        source, box = graph.add(Script(count=2), name="source"), graph.add(Around(), name="box")
+        graph.connect(source.out, box.value, active=True, buffer=2, initial=[0])
+        graph.connect(graph.start, source.ports.slots["activate"])
+        graph.connect(box.ports.events["activated"], box.again)
+        return graph
+
+    assert perform(build, order_of("box/sink"))[:4] == ["process", "process", "process", "activate"]

@@ -118,6 +118,10 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         for edge, token in zip(edges, tokens, strict=True):
             core.trace(TokenTaken(now, edge.label, token))
     _free_places(worker, edges)
+    if worker.flights is None and kind != "end":
+        if kind == "process":
+            note_start(worker)
+        _place_next(worker)
     if modifiers:
         _receive(worker, modifiers)
     _set_parameters(worker, edges, tokens)
@@ -127,12 +131,9 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         end(worker, edges, tokens)
     elif kind == "silent":
         worker.fire_silently()
-        _place_next(worker)
         put_outputs(worker, None)
         finish_firing(worker, "silent")
     else:
-        note_start(worker)
-        _place_next(worker)
         _run_process(worker, edges, tokens)
 
 
@@ -167,12 +168,12 @@ def _fire_plainly(worker: Worker) -> None:
     worker.took(shape.sequential, stamp)
     if shape.pipelined:
         release(shape.pipelined)
+    if worker.calls is not None:
+        _place_next(worker)
     for token in tokens:
         if token.activity:
             _receive(worker, [one.activity for one in tokens if one.activity])
             break
-    if worker.calls is not None:
-        _place_next(worker)
     if shape.direct:
         worker.core.code.execute(worker, worker.process, [token.value for token in tokens], when_done(worker))  # type: ignore[arg-type]
     else:
@@ -187,15 +188,6 @@ def _free_places(worker: Worker, edges: Sequence[Any]) -> None:
             rewire(worker)
 
 
-def _note_start(worker: Worker, now: float) -> None:
-    """The function is about to run: that counts for a rate (F11) and for a gate that throttles (A11)."""
-    if worker.options.max_rate_hz:
-        worker.note_start(worker.options.max_rate_hz)
-    worker.note_gated_start(now)
-    if worker.paced:
-        worker.unplace()  # what an input that has ended gave a place to is held by the rate from now on
-
-
 def _receive(worker: Worker, modifiers: Sequence[int]) -> None:
     """A6: what a firing has taken acts, and by that on the subgraphs around."""
     if worker.scopes:
@@ -205,7 +197,10 @@ def _receive(worker: Worker, modifiers: Sequence[int]) -> None:
 
 
 def _place_next(worker: Worker) -> None:
-    """What the next firing asks for may hold already: then it has its place before the calls that come now (F9, D1)."""
+    """What the next firing asks for may hold already: then it has its place before the calls that come now (F9, D1).
+
+    Those are the calls that come of what was taken, too: of the activity that it brings to subgraphs around (A6, G2).
+    """
     if worker.calls is not None and not worker.inputs.missing:
         consider(worker)
 
