@@ -131,7 +131,7 @@ def test_whatever_dies_when_on_a_bad_network_who_lives_on_gets_each_value_once_a
         draw = random.Random(seed)
         world.network.faults = Faults(loss=draw.choice([0.0, 0.2]))
         views = [
-            viewer(world, pause_s=draw.choice([0.0, 0.05, 0.3]), capacity=draw.randint(1, 9), at_end="wait")
+            viewer(world, pause_s=draw.choice([0.02, 0.1, 0.3]), capacity=draw.randint(1, 9), at_end="wait")
             for _ in range(draw.randint(1, 3))
         ]
         lives = draw.randint(2, 5)
@@ -141,7 +141,7 @@ def test_whatever_dies_when_on_a_bad_network_who_lives_on_gets_each_value_once_a
             await asyncio.sleep(0.1)
             for life in range(lives):
                 is_last = life == lives - 1
-                to = 1000 * life + (10 if is_last else 999)
+                to = 1000 * life + (10 if is_last else 150)
                 one = camera(world, rate=None, begin=1000 * life, to=to, outbox=file, window=draw.randint(1, 8))
                 async with running(one):
                     sessions = len(world.network.sessions)

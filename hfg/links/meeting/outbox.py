@@ -57,6 +57,7 @@ class OutboxFile:
             self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
             self._file.execute("PRAGMA synchronous = FULL")
             self._file.execute("PRAGMA locking_mode = EXCLUSIVE")
+            self._file.execute("PRAGMA journal_mode = WAL")  # one wait for the disk a change instead of three
             self._file.execute("BEGIN EXCLUSIVE")
             self._file.execute(
                 "CREATE TABLE IF NOT EXISTS hfg_outbox (name TEXT PRIMARY KEY, type TEXT, stream TEXT, last INT)"
