@@ -165,7 +165,7 @@ def found(strategy: st.SearchStrategy[Any], wanted: Callable[[Any], bool]) -> bo
     """Whether a strategy gives such a value within some hundred draws."""
     seen: list[bool] = []
 
-    @settings(max_examples=150, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=300, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
     @given(strategy)
     def look(value: Any) -> None:
         seen.append(wanted(value))

@@ -118,10 +118,8 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         for edge, token in zip(edges, tokens, strict=True):
             core.trace(TokenTaken(now, edge.label, token))
     _free_places(worker, edges)
-    if worker.flights is None and kind != "end":
-        if kind == "process":
-            note_start(worker)
-        _place_next(worker)
+    if worker.flights is None:
+        _note(worker, kind)
     if modifiers:
         _receive(worker, modifiers)
     _set_parameters(worker, edges, tokens)
@@ -135,6 +133,14 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         finish_firing(worker, "silent")
     else:
         _run_process(worker, edges, tokens)
+
+
+def _note(worker: Worker, kind: FiringKind) -> None:
+    """What a firing of that kind means to the next one."""
+    if kind == "process":
+        note_start(worker)
+    if kind != "end":
+        _place_next(worker)
 
 
 def note_start(worker: Worker) -> None:

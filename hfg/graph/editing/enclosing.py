@@ -7,14 +7,14 @@ Each edge over the border gets a port of its own, in order, so that what a node 
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import msgspec
 
 from hfg.errors import GraphError, HfgError
 from hfg.graph.editing.changes import Change, EdgeChange, GateChange, NodeChange, PromotionChange
-from hfg.graph.editing.straight import refuse_other_queue
+from hfg.graph.editing.straight import refuse_other_queues
 from hfg.graph.structure.connecting import refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
 from hfg.graph.structure.level import Level, level_of
@@ -87,9 +87,8 @@ def enclose(do: Do, members: Sequence[Node], name: str) -> None:
     near = around.connections.at(*members)
     edges = [edge for edge in near if not inner.isdisjoint((owner_of(edge.source), owner_of(edge.target)))]
     crossing = [edge for edge in edges if not {owner_of(edge.source), owner_of(edge.target)} <= inner]
-    for edge in crossing:
-        if owner_of(edge.source) in inner:
-            refuse_other_queue(around, edge, edge.options, crossing.__contains__, "grouping")
+    outwards = ((edge, edge.options) for edge in crossing if owner_of(edge.source) in inner)
+    refuse_other_queues(around, outwards, crossing.__contains__, "grouping")
     ports = _Names(crossing, inner)
     box = _box_with({port: _declaration(kind, type_) for port, kind, type_ in ports.of.values()})
     halves = [(edge, around.connections.position(edge), _outer_half(edge, box, ports, inner)) for edge in edges]
@@ -208,9 +207,7 @@ def dissolve(do: Do, box: Node, levels: Sequence[Level]) -> None:
     """
     around, within = level_of(box.place.graph), _need_dissolvable(box, levels)
     border = _Border(box, around, within)
-    for outer in around.connections.at(box):
-        for edge in border.into(outer):
-            refuse_other_queue(within, edge, outer.options, border.is_at, "dissolving")
+    refuse_other_queues(within, border.outwards(), border.is_at, "dissolving")
     joined = {edge: border.through(edge) for edge in around.connections.at(box) if border.is_at(edge)}
     spots = [around.connections.position(edge) for edge in joined]
     own = [whole for edge in within.edges for whole in border.through(edge)]
@@ -329,10 +326,12 @@ class _Border:
         """Say whether an edge begins or ends at a port of the subgraph."""
         return _relay(edge.source, self.box) is not None or _relay(edge.target, self.box) is not None
 
-    def into(self, edge: Edge) -> list[Edge]:
-        """Give the edges inside that go on as one outside."""
-        port = _relay(edge.source, self.box)
-        return [] if port is None else [one for one in self.within if _relay(one.target, self.box) is port]
+    def outwards(self) -> Iterator[tuple[Edge, EdgeOptions]]:
+        """Give the edges inside that go on outside, and the options that hold there."""
+        outside = [(port, one.options) for one in self.around if (port := _relay(one.source, self.box)) is not None]
+        for edge in self.within if outside else ():
+            relay = _relay(edge.target, self.box)
+            yield from ((edge, options) for port, options in outside if port is relay)
 
     def through(self, edge: Edge) -> list[Edge]:
         """Give the edges that one becomes when the border is gone; what begins there is met on the way."""

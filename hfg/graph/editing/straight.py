@@ -7,7 +7,7 @@ does has two, and a border around the first of them alone would let the other on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from hfg.errors import GraphError
 from hfg.graph.structure.edge import Edge
@@ -16,26 +16,30 @@ from hfg.graph.structure.options import EdgeOptions
 from hfg.graph.structure.subgraph import inside
 from hfg.ports import InnerSource, InnerTarget, Port
 
-__all__ = ["refuse_other_queue"]
+__all__ = ["refuse_other_queues"]
 
 
-def refuse_other_queue(
-    level: Level, edge: Edge, options: EdgeOptions, is_at_border: Callable[[Edge], bool], what: str
+def refuse_other_queues(
+    level: Level,
+    outwards: Iterable[tuple[Edge, EdgeOptions]],
+    is_at_border: Callable[[Edge], bool],
+    what: str,
 ) -> None:
     """Refuse a border that would change whose queue it is, being drawn or taken away.
 
     Args:
-      level: where the edge lies.
-      edge: it crosses the border outwards.
-      options: which of it hold outside.
-      is_at_border: whether another edge of this level crosses the border.
+      level: where the edges lie.
+      outwards: those that cross the border outwards, and the options that hold outside.
+      is_at_border: whether an edge of this level crosses the border.
       what: "grouping" or "dissolving".
 
     Raises:
-      GraphError: an edge that leads straight into this one has another queue.
+      GraphError: an edge that leads straight into one of them has another queue.
     """
-    for first in _origins(level, edge, is_at_border):
-        if _queue(first.options) != _queue(options):
+    for edge, options in outwards:
+        for first in _origins(level, edge, is_at_border):
+            if _queue(first.options) == _queue(options):
+                continue
             raise GraphError(
                 f"{what} would change the queue of {first.label}, which runs through a subgraph and on as "
                 f"{edge.label}: one has {_said(first.options)}, the other {_said(options)}, and the outer of the two "

@@ -1,13 +1,13 @@
 """The publishing end of programs that meet by a name.
 
-Stands on `end` and `hfg.links.running`.
+Stands on `end`, `outbox`, `returning` and `hfg.links.running`.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 from msgspec.structs import replace
@@ -16,6 +16,7 @@ from hfg.errors import EncodingError, RunError, TransportError
 from hfg.links import Outbox
 from hfg.links.meeting.end import MOST, End
 from hfg.links.meeting.outbox import KeptValue, OutboxFile
+from hfg.links.meeting.returning import Returning, identity_of
 from hfg.links.offers import key_of, read_introduction, unfit
 from hfg.links.running import BoundedSender, LinkSender
 from hfg.token import END, Token
@@ -24,9 +25,6 @@ from hfg.transport import Closing, EncodedToken, Presence, Session
 __all__ = ["Absent", "Publication", "PublicationCounts"]
 
 Absent: TypeAlias = Literal["pass", "wait"]
-
-_BEFORE: Final = "(before)"  # the place of those who were there in a former life
-_RETURN_S: Final = 3.0  # in which they come back once one of them has: the lease of a connection, and some more
 
 
 class PublicationCounts(msgspec.Struct):
@@ -95,8 +93,7 @@ class Publication(End):
         self._members: set[str] = set()  # who gets every value
         self._left: list[str] = []  # who did, and whose place waits for an heir
         self._listeners: set[str] = set()  # who gets what arrives
-        self._expected = set() if outbox is None else set(outbox.members)  # who was there in a former life
-        self._returning: asyncio.TimerHandle | None = None  # until when they come back
+        self._returning: Returning | None = None  # who did in a former life
         key = key_of(name, self._id)
         self._exact = self._sender(f"{key}/exact", window)
         self._bounded = BoundedSender(session, f"{key}/bounded", epoch=1)
@@ -119,8 +116,7 @@ class Publication(End):
         link = LinkSender(self._session, key, epoch=1, window=max(window, len(kept)), outbox=before)
         self.counts.restored = len(kept)
         if self._outbox.last:  # there was a former life, and those who were there may come back
-            self._left.append(_BEFORE)
-            link.admit(_BEFORE, 1, after=0)
+            self._returning = Returning(link, self._outbox.members)
         return link
 
     def _restored(self, outbox: OutboxFile) -> list[KeptValue]:
@@ -175,7 +171,9 @@ class Publication(End):
         self._number = self._exact.machine.position.sequence + 1
         encoded = self._codec.encode(replace(token, sequence=self._number))
         kept = KeptValue(self._number, *map(bytes, encoded))
-        members = {_identity(one) for one in self._members} | self._expected
+        members = {identity_of(one) for one in self._members}
+        if self._returning is not None:
+            members |= self._returning.expected
         await asyncio.to_thread(outbox.keep, kept, self._exact.released, members)
         self._need_open()
         await self._exact.send(encoded)
@@ -207,7 +205,7 @@ class Publication(End):
         await self._exact.close()
         self._news.tell()
         if self._returning is not None:
-            self._returning.cancel()
+            self._returning.close()
         if self._outbox is not None:
             try:
                 await asyncio.to_thread(self._outbox.forget, done)
@@ -279,28 +277,14 @@ class Publication(End):
         self._members.add(consumer)
         if consumer in self._left:  # it was cut off, and its place is still there
             self._left.remove(consumer)
-        elif self._left:
+        elif self._left or (self._returning is not None and self._returning.open):
             self._exact.admit(consumer, 1, after=0)  # all that its predecessors have not done
-            self._dismiss_left(but=_BEFORE)
-            self._expected.discard(_identity(consumer))
-            if not self._expected:
-                self._dismiss_left()
-            elif self._returning is None:  # each of those who come back gets all, and takes what is new
-                self._returning = asyncio.get_running_loop().call_later(_RETURN_S, self._all_are_back)
+            while self._left:
+                self._exact.dismiss(self._left.pop())
         else:
             self._exact.admit(consumer, 1)
-
-    def _all_are_back(self) -> None:
-        """Nobody who was there in a former life is waited for any more; the place of who has gone by now is his own."""
-        self._expected.clear()
-        if _BEFORE in self._left:
-            self._left.remove(_BEFORE)
-            self._exact.dismiss(_BEFORE)
-
-    def _dismiss_left(self, but: str = "") -> None:
-        for one in [one for one in self._left if one != but]:
-            self._left.remove(one)
-            self._exact.dismiss(one)
+        if self._returning is not None:
+            self._returning.back(consumer)
 
     def _leave(self, consumer: str) -> None:
         if consumer in self._listeners:
@@ -316,8 +300,3 @@ class Publication(End):
         else:
             return
         self.counts.left += 1
-
-
-def _identity(consumer: str) -> str:
-    """Who a consumer is, each time that he takes part."""
-    return consumer.partition(".")[0]
