@@ -1,8 +1,9 @@
 """What recording costs: ten ports of a chain, 10,000 tokens a second all together, with a recording and without.
 
 Measured: the processor time of the whole process, the writing thread included, over the same second of the graph's
-life, and of the graph's own thread; pairs of runs in turn, in one process, and the ratio of the medians. The functions
-of the chain do some work, about 10 us each, or none at all. `python -m benchmarks.bench_recording`
+life, and of the graph's own thread; pairs of runs in turn, in one process, and the median of the pairs' ratios, so that
+a machine whose speed drifts tells as little as may be. The functions of the chain do some work, about 10 us each, or
+none at all. `python -m benchmarks.bench_recording`
 """
 
 from __future__ import annotations
@@ -90,7 +91,8 @@ def ratios(function: Callable[[], Any], folder: Path, *, pairs: int, seconds: fl
     for index, name in enumerate(("process", "thread")):
         mean[f"{name}_without_s"] = statistics.median(one[index] for one in without)
         mean[f"{name}_recorded_s"] = statistics.median(one[index] for one in recorded)
-        mean[f"{name}_ratio"] = mean[f"{name}_recorded_s"] / mean[f"{name}_without_s"]
+        pairs_of = zip(recorded, without, strict=True)
+        mean[f"{name}_ratio"] = statistics.median(after[index] / before[index] for after, before in pairs_of)
     return mean
 
 

@@ -27,6 +27,7 @@ __all__ = [
     "MARKERS",
     "Images",
     "Marked",
+    "PlainToken",
     "Timed",
     "TokenReader",
     "TokenWriter",
@@ -70,6 +71,15 @@ class Timed(_Circumstances):
     """A token that passed at another time than that of its stamp, in virtual time, which is exact."""
 
     value: Any
+    activity: int
+    stamp: float
+    sequence: int
+
+
+class PlainToken(msgspec.Struct, gc=False):
+    """A token with a number, as it is in the file; made in great numbers, so the garbage collector is not to look."""
+
+    value: float
     activity: int
     stamp: float
     sequence: int

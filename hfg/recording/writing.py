@@ -7,6 +7,7 @@ Stands on `mcap` and `messages`.
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from array import array
@@ -24,8 +25,8 @@ import numpy.typing as npt
 from hfg.engine.observing.recorder import ITEM
 from hfg.errors import UsageError
 from hfg.recording.mcap import Writer
-from hfg.recording.messages import EVENTS, MARKERS, Marked, TokenWriter, circumstances
-from hfg.token import Marker, Token
+from hfg.recording.messages import EVENTS, MARKERS, Marked, PlainToken, TokenWriter, circumstances
+from hfg.token import NO_MESSAGE, Marker, Token
 
 __all__ = ["PROFILE", "RecordingWriter", "open_new"]
 
@@ -146,14 +147,14 @@ class RecordingWriter:
         self._declare_places()
         if not self._file.chunk_messages:
             self._chunk_since = time.monotonic()
-        places, tokens, whens = batch[::ITEM], batch[1::ITEM], batch[2::ITEM]
-        columns = self._plain_columns(places, tokens, whens) or self._columns(places, tokens, whens)
-        bodies, channels, sequences, stamps = columns
+        places, passed, stamps, sequences, whens = (batch[at::ITEM] for at in range(ITEM))
+        columns = self._plain_columns(places, passed, stamps, sequences, whens)
+        bodies, channels, sequences, stamps = columns or self._columns(places, passed, stamps, sequences, whens)
         lines = self._encode.encode_lines(bodies).split(b"\n")
         lines.pop()  # behind the last line
-        passed = np.maximum.accumulate(np.maximum(_nanoseconds(whens), self._last_ns))
-        self._last_ns = passed[-1]
-        self._file.add_messages(channels, sequences, passed, _nanoseconds(stamps), lines)
+        times = np.maximum.accumulate(np.maximum(_nanoseconds(whens), self._last_ns))
+        self._last_ns = times[-1]
+        self._file.add_messages(channels, sequences, times, _nanoseconds(stamps), lines)
         if self._file.chunk_bytes > _CHUNK_BYTES or self._file.chunk_messages > _CHUNK_MESSAGES:
             self._file.end_chunk()
 
@@ -164,15 +165,26 @@ class RecordingWriter:
             place.channel = self._file.add_channel(place.path, schema, "json", place.metadata)
             self._declared += 1
 
-    def _plain_columns(self, places: Sequence[Any], tokens: Sequence[Any], whens: Sequence[float]) -> Any:
-        """Where all are finite numbers, tokens are what is encoded; None: somewhere there is something else."""
+    def _plain_columns(
+        self,
+        places: Sequence[Any],
+        passed: Sequence[Any],
+        stamps: Sequence[float],
+        sequences: Sequence[int],
+        whens: Sequence[float],
+    ) -> Any:
+        """Where all are finite numbers, they need not be looked at one by one; None: there is something else."""
         counts = Counter(places)
-        if None in counts or any(place.keep is not None for place in counts) or {*map(type, tokens)} != _PLAIN:
+        if None in counts or any(place.keep is not None for place in counts):
             return None
-        values = [token.value for token in tokens]
+        values, bodies = passed, passed
+        if {*map(type, passed)} == _PLAIN:
+            values = [token.value for token in passed]
+            stamps, sequences = [token.stamp for token in passed], [token.sequence for token in passed]
+        else:
+            bodies = [*map(PlainToken, passed, itertools.repeat(0), stamps, sequences)]
         if not _NUMBERS.issuperset(map(type, values)):
             return None
-        stamps = [token.stamp for token in tokens]
         try:
             if not isfinite(sum(values)) or (self._exact and stamps != whens):
                 return None
@@ -181,19 +193,28 @@ class RecordingWriter:
         channels = [place.channel for place in places]
         for place, count in counts.items():
             place.values += count
-        return tokens, channels, [token.sequence for token in tokens], stamps
+        return bodies, channels, sequences, stamps
 
-    def _columns(self, places: Sequence[Any], tokens: Sequence[Any], whens: Sequence[float]) -> Any:
+    def _columns(
+        self,
+        places: Sequence[Any],
+        passed: Sequence[Any],
+        stamps: Sequence[float],
+        sequences: Sequence[int],
+        whens: Sequence[float],
+    ) -> Any:
         bodies: list[Any] = []
         rest: list[tuple[int, int, float]] = []
-        for place, token, when in zip(places, tokens, whens, strict=True):
+        for place, token, stamp, sequence, when in zip(places, passed, stamps, sequences, whens, strict=True):
             if place is None:
                 bodies.append(token)
                 rest.append((self._own_channel(EVENTS), 0, when))
                 continue
-            passed = when if self._exact and when != token.stamp else None
+            if not isinstance(token, Token):  # it has passed in a wave
+                token = Token(NO_MESSAGE if token is None else token, 0, stamp, sequence)
+            late = when if self._exact and when != token.stamp else None
             if type(token.value) is Marker:
-                told = circumstances(token, passed)
+                told = circumstances(token, late)
                 bodies.append(
                     Marked(place.path, token.value.value, token.stamp, token.activity, token.sequence, **told)
                 )
@@ -202,7 +223,7 @@ class RecordingWriter:
                 continue
             if place.keep is not None:
                 self.bytes_taken += self.sizes.popleft()
-            bodies.append(place.message(token, passed))
+            bodies.append(place.message(token, late))
             place.values += 1
             rest.append((place.channel, token.sequence, token.stamp))
         return bodies, *zip(*rest, strict=True)

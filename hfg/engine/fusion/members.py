@@ -47,11 +47,16 @@ def _values_in_and_out(worker: Worker) -> bool:
 
 
 def _nobody_looks(worker: Worker) -> bool:
-    """No edit waits for it, nobody at its barriers, no breakpoint; and no tap where a wave runs in a thread."""
+    """No edit waits for it, nobody at its barriers, no breakpoint; and no tap where a wave runs in a thread.
+
+    Nor does anybody look at the events of its slots, who would want to know in which call a signal was triggered: in a
+    wave calls are not numbered one by one.
+    """
     return (
         not worker.observed
         and worker.on_idle is None
         and worker.halt is None
+        and not (worker.slot_edges and any(event.tap for event in worker.events.values()))
         and not (worker.group.threaded and any(edge.tap is not None for edges in worker.out_edges for edge in edges))
     )
 

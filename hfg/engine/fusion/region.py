@@ -28,6 +28,7 @@ from types import CodeType, CoroutineType, FrameType
 from typing import Any
 
 from hfg.engine.fusion.schedule import Schedule
+from hfg.engine.fusion.telling import tell_rest
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
 from hfg.engine.model.core import PENDING
 from hfg.engine.model.worker import CALLS_BLOCKED, Worker
@@ -67,6 +68,7 @@ class Region:
       amid: "", or "firing" while the wave under way has given way to others and all members are busy.
       called_off: the wave that has given way ends behind its present call; the flags are cleared meanwhile.
       flags: not empty: the wave under way ends behind its present call.
+      ending: some producer before the head sends END as soon as its outputs are free.
     """
 
     def __init__(self, schedule: Schedule, respecialise: Callable[[Worker], None]) -> None:
@@ -91,6 +93,7 @@ class Region:
         self._may_give_way = schedule.may_give_way()
         self._lender = next((worker for worker in order if worker.is_async), None)
         self._put_off = self._patience = 0  # waves before one asks again whether it may be armed
+        self.ending = any(edge.source.pending_end for edge in self.held_entries)
         self.waves = 0  # not yet in the counts of members and edges
         self.silent = [0] * len(order)  # silent firings, likewise
         self.spread = [0] * len(order)  # how often all behind a member were silent since it was
@@ -171,6 +174,10 @@ class Region:
         elif worker is not self.head:
             self.disarm()
 
+    def expect_end(self) -> None:
+        """Before it a node is over, and END comes as soon as what it has sent is processed."""
+        self.ending = True
+
     def interrupt(self) -> None:
         """The run is paused, or over: let the wave under way end behind its present call."""
         if self.running:
@@ -250,7 +257,13 @@ class Region:
         elif self.held_entries:
             if len(self.order) > 1:  # then those behind it free its outputs, and by that it lets go of what it took
                 agenda.consider(head)
-            release(self.held_entries)
+                release(self.held_entries)
+            elif self.ending:  # the END that may come of it finds the head amid its firing, and enables it by its end
+                head.be_in_wave()
+                release(self.held_entries)
+                agenda.idle_again(head)
+            else:
+                release(self.held_entries)
         if self.doomed:
             self.dissolve()
         elif self._wave is self._measured and all(worker.meter.left <= 0 for worker in self.order):
@@ -351,6 +364,7 @@ class Region:
         """Members before k have fired and k is amid its firing: let the interpreted way see it so."""
         self.waves += found["done"]
         self.settle_counts()
+        tell_rest(self.schedule.outs, self._wave.untold.get(k, []), found, self.core.now)
         self.armed = self.running = False
         stamp = found["stamp"]
         silent_calls: set[SyncEdge] = set()

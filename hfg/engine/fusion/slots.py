@@ -16,7 +16,7 @@ from hfg.engine.model.worker import CALLS_BLOCKED, RunningEvent, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
 from hfg.engine.rules.calls import await_call
-from hfg.engine.rules.modifiers import derive_scopes
+from hfg.engine.rules.modifiers import derive_scopes, set_active, tell_activity
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import bring_activity, trigger
 from hfg.ports.edges import EventEdge, SyncEdge
@@ -76,7 +76,10 @@ def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
             if lies.full:
                 freed(lies)
         if token.activity:
-            worker.active = node._active = token.activity > 0
+            if core.seldom is None:
+                worker.active = node._active = token.activity > 0
+            else:
+                set_active(worker, token.activity > 0, "token")
         if not while_active or worker.active:  # T4: it was when the token came
             core.speaker = worker
             worker.stamp = token.stamp
@@ -192,5 +195,7 @@ def _give_activity(worker: Worker, target: Worker) -> None:
     """A5: what carries activity takes it from the sender; it stays its right until the call is over (A3)."""
     if worker.active:
         worker.give_away_activity()
+        if worker.core.seldom is not None:
+            tell_activity(worker, "sent")
     bring_activity(target)
     derive_scopes(worker.core)

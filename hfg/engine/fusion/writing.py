@@ -20,6 +20,7 @@ from types import CodeType, CoroutineType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hfg.engine.fusion.schedule import asks_who_hears
+from hfg.engine.fusion.telling import Passed, Telling, looks_of, together_of
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import make_room, release
@@ -47,11 +48,13 @@ class Wave(NamedTuple):
       step: runs a wave, or several; the step of the head.
       calls: which line calls which member.
       code: of the function in which the calls stand.
+      untold: what has passed before the call of each member, and who looks was not told yet.
     """
 
     step: Callable[[Worker], None]
     calls: dict[int, int]
     code: CodeType
+    untold: dict[int, list[Passed]]
 
 
 def write_wave(region: Region, writer: Writer, *, to: Any = None) -> Wave:
@@ -69,7 +72,7 @@ def write_wave(region: Region, writer: Writer, *, to: Any = None) -> Wave:
     names: dict[str, Any] = {}
     exec(_renamed(_compiled(text), name), names)
     bound = names["build"](to or region, _Names(region, measured), *_TOOLS)
-    return Wave(bound[0], writer.calls, bound[1].__code__)
+    return Wave(bound[0], writer.calls, bound[1].__code__, writer.telling.untold)
 
 
 class _Names:
@@ -91,7 +94,8 @@ class _Names:
         self.calls = [_code_of(worker) for worker in order]
         self.unset = [worker.unset for worker in order]
         self.edges = [[edge for edge, _, _ in out] for out in region.schedule.outs]
-        self.taps = [[edge.tap for edge, _, _ in out] for out in region.schedule.outs]
+        self.looks = looks_of(region.schedule.outs)
+        self.together = together_of(self.looks)
         self.listeners = [worker.listeners for worker in order]
         self.took = [worker.meter.took if measured else None for worker in order]
         self.splits = [worker.node._split for worker in order]
@@ -183,6 +187,7 @@ class Writer:
         self.called = region.schedule.called
         self.single = [self._is_single(worker) for worker in self.order]
         self.over_if_silent: set[int] = set()  # behind whose silence no code of the wave runs
+        self.telling = Telling(self.outs, self.say, real=self.real)
         self.lines: list[str] = []
         self.calls: dict[int, int] = {}
         self.indent = 0
@@ -240,6 +245,7 @@ class Writer:
                 say(f"pipelined{number} = (entry{number},)")
         for k in range(len(self.order)):
             self._bindings_of(k)
+        self.telling.bind()
         kinds = self._kinds()
         if kinds:
             say(" = ".join([*kinds, "None"]))  # the types of the last results
@@ -260,11 +266,9 @@ class Writer:
         for output in range(len(worker.out_edges)):
             if asks_who_hears(worker, output):
                 say(f"heard{k}_{output} = names.listeners[{k}][{output}]")
-        for number, (edge, output, to) in enumerate(self.outs[k]):
-            if (to is None or edge.tap is not None) and not asks_who_hears(worker, output):
+        for number, (_, output, to) in enumerate(self.outs[k]):
+            if to is None and not asks_who_hears(worker, output):
                 say(f"e{k}_{number} = names.edges[{k}][{number}]")
-            if to is not None and edge.tap is not None:
-                say(f"tap{k}_{number} = names.taps[{k}][{number}]")
 
     def _with_default(self, k: int) -> list[int]:
         """Which inputs of a member may be absent; a source that leads has none."""
@@ -347,6 +351,8 @@ class Writer:
 
     def _member(self, k: int) -> None:
         """One member: silent if what it needs is (F4), else a call."""
+        if k in self.called or self.order[k].is_async or self._speaks(self.order[k]):
+            self.telling.tell()  # its code may send something itself, or others may have a turn
         if k in self.called:
             self._slot_call(k)
             return
@@ -364,6 +370,7 @@ class Writer:
         if not silence:
             self._call(k, call)
             return
+        told = self.telling.branch()
         say(f"if {silence}:")
         self.indent += 1
         outputs = [f"v{k}_{output}" for output in range(max(1, len(worker.out_names)))]
@@ -371,6 +378,7 @@ class Writer:
         say(f"silent[{k}] += 1")
         self._put(k)
         self.indent -= 1
+        self.telling.other_branch(told)
         say("else:")
         self.indent += 1
         self._call(k, call, within=True)
@@ -409,12 +417,13 @@ class Writer:
             fed = self.order[t].slot_edges or [edge for edge in self.order[t].live_inputs if edge.mandatory]
             if any(self.position[edge.source] in silent for edge in fed):
                 silent.add(t)
-        seen = any(to is None or edge.tap is not None for out in self.outs[k:] for edge, _, to in out)
+        seen = self.telling.anybody_behind(k) or any(to is None for out in self.outs[k:] for _, _, to in out)
         return len(silent) == len(self.order) - k and not seen
 
     def _call(self, k: int, call: str, *, within: bool = False) -> None:
         """Call a member, look at what it gives back, and let that leave."""
         worker = self.order[k]
+        self.telling.before_call(k)
         if self._speaks(worker):
             self._announce(k)
         if self.measured:
@@ -458,11 +467,14 @@ class Writer:
             say("else:")
             self.indent += 1
             say(f"spread[{k}] += 1")
+            told = self.telling.branch()
             if self.loops:
                 self._end_of_wave()
                 say("continue")
             else:
+                self.telling.tell()
                 say("return region.over(1)")
+            self.telling.other_branch(told)
             self.indent -= 1
         self.indent -= 1
 
@@ -491,19 +503,21 @@ class Writer:
             if asks_who_hears(self.order[k], output):
                 if output not in heard:
                     heard.add(output)
+                    self.telling.tell()
                     self.say(f"put_heard(heard{k}_{output}, NO_MESSAGE if {value} is None else {value}, stamp)")
             elif to is None:
+                if edge.tap is not None:
+                    self.telling.tell()
                 self.say(f"put(e{k}_{number}, NO_MESSAGE if {value} is None else {value}, 0, stamp)")
-            elif edge.tap is not None:
-                sequence = f"e{k}_{number}.sent + region.waves + done + 1"
-                token = f"Token(NO_MESSAGE if {value} is None else {value}, 0, stamp, {sequence})"
-                self.say(f"tap{k}_{number}({token})")
+            else:
+                self.telling.passed(k, number, output)
         if self.is_async and (heard or any(to is None for _, _, to in self.outs[k])):
             self.say("if region.amid: region.sent_on()")
 
     def _end_of_wave(self) -> None:
         """Is there another wave at once? Only if nobody else waits for the group: waves are first in, first out."""
         say = self.say
+        self.telling.tell()
         say("done += 1")
         if not self.loops:
             return

@@ -772,6 +772,10 @@ class Worker(Vertex):
         """END follows as soon as the outputs are free; with this stamp (T5)."""
         self.end_stamp = stamp
         self.pending_end = True
+        for edges in self.out_edges:
+            for edge in edges:
+                if edge.target.region is not None:
+                    edge.target.region.expect_end()
 
     def send_end_now(self) -> None:
         """END is sent, as a sending of its own."""

@@ -21,6 +21,7 @@ from typing import Any, Final, Protocol
 
 from msgspec.structs import replace
 
+from hfg.engine.model.looks import Look, WaveLook
 from hfg.engine.model.worker import ENDED, RECORDED, Worker
 from hfg.engine.observing.consumers import Consumers, Listener
 from hfg.engine.observing.taps import Taps
@@ -34,9 +35,11 @@ __all__ = ["ITEM", "MOST_BYTES", "MOST_ITEMS", "Place", "Recorder", "RecordingTh
 
 _LOGGER = Log("hfg.engine")
 
-ITEM: Final = 3
+ITEM: Final = 5
 """What lies before the thread is one flat list, so that nothing is made for a token that Python's garbage collector
-would have to look at: where it passed (a `Place`; None: an event of the run itself), what, when on the run's clock."""
+would have to look at: where it passed (a `Place`; None: an event of the run itself), what, and when on the run's clock.
+What passes in a wave of a fused region is no token, but a value (None: NO_MESSAGE), and behind it stand its stamp and
+its number on its edge; behind a token or an event nothing is meant by these two. The time is the last of the five."""
 
 MOST_ITEMS: Final = 50_000
 """Tokens that may lie before the thread."""
@@ -171,7 +174,7 @@ class _Looker:
 
     def __init__(self, place: Place) -> None:
         self.place = place
-        self.put: Callable[[Token[Any]], None] = _no_token
+        self.put: Look = _no_token
         self.end = _nothing
         self.worker: Worker | None = None
         self.silent = 0
@@ -228,7 +231,8 @@ class Recorder(Listener):
             put = partial(self._signal, looker, put)
         elif getattr(getattr(what, "node", None), "_type", _NO_SOURCE).is_source:
             put = partial(self._output_of_source, looker, put)
-        looker.put = put
+        # (what leaves a fused region's source in a wave is as plain as what leaves the others: no circumstances)
+        looker.put = put if place.keep is not None else WaveLook.of(put, place, self._put_wave)
         self._lookers[looker] = self._taps.look(what, looker)
         self._find_sender(looker)
 
@@ -272,6 +276,16 @@ class Recorder(Listener):
         else:
             put(token)
 
+    def _put_wave(self, items: tuple[Any, ...]) -> None:
+        """What has passed in a wave of a fused region."""
+        if self._full:
+            for place in items[::ITEM]:
+                place.left_out += 1
+            return
+        self._items.extend(items)
+        if len(self._items) > self._mark:
+            self._crowded()
+
     def _look(self, place: Place) -> Callable[[Token[Any]], None]:
         extend, items, sizes = self._items.extend, self._items, self._thread.sizes
         now = self._engine.now
@@ -280,7 +294,7 @@ class Recorder(Listener):
         keep = place.keep
 
         def put(token: Token[Any]) -> None:
-            extend((place, token, monotonic() + epoch if real else now()))
+            extend((place, token, 0.0, 0, monotonic() + epoch if real else now()))
             if len(items) > self._mark:
                 self._crowded()
 
@@ -305,7 +319,7 @@ class Recorder(Listener):
                 token = replace(token, value=kept)
                 self._bytes_put += size
                 sizes.append(size)
-            extend((place, token, now()))
+            extend((place, token, 0.0, 0, now()))
             if len(items) > self._mark or self._bytes_put - self._thread.bytes_taken > MOST_BYTES:
                 self._crowded()
 
@@ -395,7 +409,7 @@ class Recorder(Listener):
     # --- what else is recorded, and the end ---------------------------------------------------------------------------
 
     def _seldom_event(self, event: TraceEvent) -> None:
-        self._items.extend((None, event, event.time))
+        self._items.extend((None, event, 0.0, 0, event.time))
         if type(event).__name__ == "StructureChanged":
             self._engine.soon(self._structure_changed)
 

@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any, Protocol, TypeAlias
 
 from hfg.engine.fusion.specialise import specialise
+from hfg.engine.model.looks import FirstLiveLook, Look
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.engine.rules.listening import find_listeners
 from hfg.engine.runtime import ports, relays
@@ -30,8 +31,6 @@ from hfg.token import Token
 __all__ = ["Looker", "Tap", "Taps", "make_tap"]
 
 _SIZE = 100
-
-Look = Callable[[Token[Any]], None]
 
 _Where: TypeAlias = Port | InnerSource[Any] | InnerTarget[Any] | DrawnEdge | Ends
 
@@ -109,8 +108,9 @@ class Tap:
 class Looker(Protocol):
     """Who looks at what passes."""
 
-    def put(self, token: Token[Any]) -> None:
-        """A token passes."""
+    @property
+    def put(self) -> Look:
+        """Called with each token that passes."""
 
     def end(self) -> None:
         """No more will pass."""
@@ -218,7 +218,9 @@ class Taps:
             self._attach(buffer, what, places)
 
     def _attach(self, buffer: Looker, what: Any, places: list[tuple[Any, list[Any]]]) -> None:
-        looks = [(place, _first_live(group, place, buffer.put) if group else buffer.put) for place, group in places]
+        looks = [
+            (place, FirstLiveLook.of(group, place, buffer.put) if group else buffer.put) for place, group in places
+        ]
         self._buffers[buffer] = (what, looks)
         for place, look in looks:
             self._looks.setdefault(place, []).append(look)
@@ -265,6 +267,10 @@ class Taps:
         event.tap = looks if looks or any(edge.tap is not None for edge in event.edges) else None
         if event.tap is not None and event.port is not None and event.port._observers is None:
             event.port._observe([])  # the fast path of `trigger` asks for no more
+        core = self._engine.core
+        if event.worker.slot_edges and core.started and not core.over:  # are its calls to be told apart?
+            for worker in (event.worker, *(edge.source for edge in event.worker.slot_edges)):
+                specialise(worker)
 
     # --- finding ----------------------------------------------------------------------------------------------------
 
@@ -340,16 +346,6 @@ def _with_same_tokens(edges: Iterable[Any]) -> list[tuple[Any, list[Any]]]:
 
 def _label(edge: Any) -> str:
     return f"{edge.source.path} -> {edge.target.path}" if isinstance(edge, Ends) else str(edge.label)
-
-
-def _first_live(group: list[Any], edge: Any, put: Look) -> Look:
-    """Fan-out carries the same token on each edge: look at the first that is live only."""
-
-    def look(token: Token[Any]) -> None:
-        if edge is next((one for one in group if one.live), None):
-            put(token)
-
-    return look
 
 
 def _all_of(looks: tuple[Look, ...], token: Token[Any]) -> None:

@@ -29,6 +29,7 @@ __all__ = [
     "receive",
     "report_error",
     "set_active",
+    "tell_activity",
     "touch",
 ]
 
@@ -53,10 +54,17 @@ def set_active(worker: Worker, active: bool, cause: ActivityCause) -> None:
     if node is not None and (worker.job is None or worker.job.held is None):
         node._active = active
     if core.seldom is not None:
-        core.seldom(ActivityChanged(core.now(), worker.path, active, cause))
+        tell_activity(worker, cause)
     if not worker.watched:
         return
     core.upstairs.activity_changed(worker, active)
+
+
+def tell_activity(worker: Worker, cause: ActivityCause) -> None:
+    """Somebody listens: it has become active, or is no longer (R7)."""
+    core = worker.core
+    if core.seldom is not None:
+        core.seldom(ActivityChanged(core.now(), worker.path, worker.active, cause))
 
 
 def touch(core: Core, scopes: Sequence[Scope]) -> None:

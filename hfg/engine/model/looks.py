@@ -1,0 +1,68 @@
+"""Who looks at what passes an edge (rule R7), and what a fused region may make of that.
+
+A look is called with each token. Where nodes are fused there are no tokens, so those that need not see one at once are
+told of a whole wave together, which costs a fraction. Stands on the edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, TypeAlias
+
+from hfg.ports.edges import AnyEdge
+from hfg.token import Token
+
+__all__ = ["FirstLiveLook", "Look", "WaveLook", "look_inside"]
+
+Look: TypeAlias = Callable[[Token[Any]], None]
+
+
+class WaveLook(partial[None]):
+    """A look that can be told of all that has passed in a wave at its end; else it is called with each token.
+
+    Attributes:
+      place: what it looks at, for its own use.
+      together: called with five entries for each token, in the order in which they have passed: the place, the value
+        (None: NO_MESSAGE), the stamp, the number on its edge, and when it passed, on the clock of the run. What passes
+        so has activity 0.
+    """
+
+    place: object
+    together: Callable[[tuple[Any, ...]], None]
+
+    @classmethod
+    def of(cls, look: Look, place: object, together: Callable[[tuple[Any, ...]], None]) -> WaveLook:
+        """Make one of what is called with each token."""
+        made = cls(look)
+        made.place, made.together = place, together
+        return made
+
+
+class FirstLiveLook(partial[None]):
+    """Fan-out carries the same token on each edge: this looks at the first that is live only."""
+
+    @classmethod
+    def of(cls, edges: Sequence[AnyEdge], edge: AnyEdge, look: Look) -> FirstLiveLook:
+        """Make what is called with each token of one of the edges."""
+        return cls(_if_first, edges, edge, look)
+
+    def now(self) -> Look | None:
+        """What it comes to as long as the same edges are live."""
+        edges, edge, look = self.args
+        return look if _is_first(edges, edge) else None
+
+
+def look_inside(edge: AnyEdge) -> Look | None:
+    """Who looks at an edge inside of a region, which lasts no longer than its edges are live."""
+    look: Look | None = edge.tap
+    return look.now() if isinstance(look, FirstLiveLook) else look
+
+
+def _if_first(edges: Sequence[AnyEdge], edge: AnyEdge, look: Look, token: Token[Any]) -> None:
+    if _is_first(edges, edge):
+        look(token)
+
+
+def _is_first(edges: Sequence[AnyEdge], edge: AnyEdge) -> bool:
+    return edge is next((one for one in edges if one.live), None)
