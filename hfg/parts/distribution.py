@@ -65,6 +65,7 @@ from hfg.parts.running.channels import Carrier, Channel, name_of
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import sweep_run, sweep_runs
 from hfg.parts.steering.asking import Asking
+from hfg.parts.steering.editing import Drawing
 from hfg.parts.steering.run import Counts, CutRun
 
 __all__ = ["Distribution", "distribute"]
@@ -89,6 +90,7 @@ class Distribution:
         options: Mapping[str, Any],
         launcher: Launcher,
         *,
+        write: Callable[[Graph], str],
         modules: Mapping[str, str] | None = None,
         name: str = "",
     ) -> None:
@@ -100,12 +102,13 @@ class Distribution:
           text: the graph, as a file would have it.
           options: of the run, for the other parts.
           launcher: begins these.
+          write: gives the text of the graph when it was edited.
           modules: that they will import, each with a place in the graph that needs it.
           name: what the run is called, if somebody has given it one.
         """
         self.flat: FlatGraph = cutting.parts[MAIN]
         self._cutting = cutting
-        self._text = text
+        self._drawing = Drawing(flat, cutting, text, write)
         self._options = dict(options)
         self._launcher = launcher
         self._modules = dict(modules or {})
@@ -140,7 +143,9 @@ class Distribution:
     def face(self, graph: Graph) -> Run:
         """Give what one can do with the whole."""
         composition = self._part.composition
-        self._run_of_all = CutRun(graph, composition, self._asking) if self._others else Run(graph, composition)
+        self._run_of_all = (
+            CutRun(graph, composition, self._asking, self._drawing) if self._others else Run(graph, composition)
+        )
         return self._run_of_all
 
     async def open(self) -> None:
@@ -211,7 +216,7 @@ class Distribution:
         ledger = self._ledgers.get(name)
         kept = None if ledger is None or ledger.entry is None else ledger.entry.data
         lives_of_all, known = dict(self._lives), _known_packages()
-        self._say(name, Open(self._text, self._options, lives_of_all, clock, known, shares, calls, kept))
+        self._say(name, Open(self._drawing.text, self._options, lives_of_all, clock, known, shares, calls, kept))
 
     def begin(self) -> None:
         """All are set up: let them go, behind which the main part goes."""
@@ -476,7 +481,11 @@ def distribute(
     else:
         launcher = ProcessLauncher()
     if len(cutting.parts) == 1:
-        return Distribution(flat, cutting, "", options, launcher, name=deployed_as.get() or "")
+        return Distribution(flat, cutting, "", options, launcher, write=str, name=deployed_as.get() or "")
+
+    def write(graph: Graph) -> str:
+        return text_of(describe(graph, same_program=True))
+
     document = describe(graph, same_program=True)
     return Distribution(
         flat,
@@ -484,6 +493,7 @@ def distribute(
         text_of(document),
         options,
         launcher,
+        write=write,
         modules=modules_of(document),
         name=deployed_as.get() or "",
     )

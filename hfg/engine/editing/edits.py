@@ -84,29 +84,34 @@ class _Following:
 
 
 class Edits:
-    """Edits the graph of one engine."""
+    """Edits the graph of one engine.
+
+    Attributes:
+      turns: whoever calls one of `edit_now`, `undo_now` and `redo_now` has a turn, and calls `leave` behind it.
+    """
 
     def __init__(self, engine: Engine, lifetime: Lifetime) -> None:
         self._engine = engine
         self._lifetime = lifetime
         self._graph: Graph = engine.graph
         self._index: PlanIndex | None = None  # from the first edit on
-        self._turns = Turns()
+        self.turns = Turns()
 
     async def edit(self, commands: Sequence[Command]) -> None:
         """See `Run.edit`."""
-        async with self._turns.one():
-            gone = await self._edit(commands)
-        await self._leave(gone)
+        async with self.turns.one():
+            gone = await self.edit_now(commands)
+        await self.leave(gone)
 
     async def reload(self, module: str | ModuleType) -> None:
         """See `Run.reload`."""
-        async with self._turns.one():
+        async with self.turns.one():
             with reloaded(self._graph, module) as commands:
-                gone = await self._edit(commands)
-        await self._leave(gone)
+                gone = await self.edit_now(commands)
+        await self.leave(gone)
 
-    async def _edit(self, commands: Sequence[Command]) -> list[Worker]:
+    async def edit_now(self, commands: Sequence[Command]) -> list[Worker]:
+        """Carry commands out; gives who is to be torn down behind the turn."""
         self._need_run()
         what = _told(commands)
         transaction = prepare(self._graph, commands, check=False)
@@ -115,23 +120,31 @@ class Edits:
 
     async def undo(self) -> None:
         """See `Run.undo`."""
-        async with self._turns.one():
-            self._need_run()
-            history = history_of(self._graph)
-            changes = undo_all(history.next_undo().changes)
-            gone = await self._follow(changes, "undo", history.undo_done, check=False)
-        await self._leave(gone)
+        async with self.turns.one():
+            gone = await self.undo_now()
+        await self.leave(gone)
+
+    async def undo_now(self) -> list[Worker]:
+        """Take the last edit back; gives who is to be torn down behind the turn."""
+        self._need_run()
+        history = history_of(self._graph)
+        changes = undo_all(history.next_undo().changes)
+        return await self._follow(changes, "undo", history.undo_done, check=False)
 
     async def redo(self) -> None:
         """See `Run.redo`."""
-        async with self._turns.one():
-            self._need_run()
-            history = history_of(self._graph)
-            transaction: Transaction = history.next_redo()
-            for change in transaction.changes:
-                change.do()
-            gone = await self._follow(transaction.changes, "redo", history.redo_done, check=False)
-        await self._leave(gone)
+        async with self.turns.one():
+            gone = await self.redo_now()
+        await self.leave(gone)
+
+    async def redo_now(self) -> list[Worker]:
+        """Carry out again what was undone last; gives who is to be torn down behind the turn."""
+        self._need_run()
+        history = history_of(self._graph)
+        transaction: Transaction = history.next_redo()
+        for change in transaction.changes:
+            change.do()
+        return await self._follow(transaction.changes, "redo", history.redo_done, check=False)
 
     def _need_run(self) -> None:
         if self._engine.core.over:
@@ -153,13 +166,13 @@ class Edits:
         try:
             self._find_out(edit, check=check)
             torn_down = [*(worker for worker, _, _ in edit.how.swapped), *self._to_start_afresh(edit.switched)]
-            self._turns.wait_for(torn_down, tasks_too=True)
+            self.turns.wait_for(torn_down, tasks_too=True)
             touched = self._touched(edit)
-            self._turns.wait_for(touched)
+            self.turns.wait_for(touched)
             await self._set_up(edit)
-            self._turns.wait_for(touched)
+            self.turns.wait_for(touched)
             async with Held(engine, touched) as held:
-                self._turns.wait_for(())
+                self.turns.wait_for(())
                 await self._exchange_nodes(edit.how)
                 fresh = await self._begin_afresh(edit)
                 self._need_run()
@@ -176,7 +189,7 @@ class Edits:
         except BaseException:
             if not edit.took_effect:
                 undo_all([change for change in changes if change not in edit.values])
-                self._turns.wait_for(edit.come)
+                self.turns.wait_for(edit.come)
                 await self._to_its_end(self._tear_down(edit.come))
             raise
         finally:
@@ -209,7 +222,7 @@ class Edits:
             value.do()
             edit.values.remove(value)
         for worker in fresh:
-            self._turns.wait_for((worker,))
+            self.turns.wait_for((worker,))
             await self._hook(worker, lifecycle.tear_down)
             await self._hook(worker, lifecycle.set_up)
         return fresh
@@ -248,7 +261,7 @@ class Edits:
             edit.come.append(worker)
             self._lifetime.carry(worker)
             worker.be_busy("setup")
-            self._turns.wait_for((worker,))
+            self.turns.wait_for((worker,))
             await self._hook(worker, lifecycle.set_up)
             self._lifetime.came(worker)
 
@@ -312,7 +325,7 @@ class Edits:
 
     async def _become(self, worker: Worker, node: Any) -> None:
         """Let a worker run another node: teardown, setup. A teardown that fails is told with the other errors (X3)."""
-        self._turns.wait_for((worker,))
+        self.turns.wait_for((worker,))
         try:
             await self._hook(worker, lifecycle.tear_down)
         except NodeError as error:
@@ -405,7 +418,7 @@ class Edits:
         if worker.options is not None:
             worker.set_options(msgspec.structs.replace(worker.options, enabled=enabled))
 
-    async def _leave(self, gone: list[Worker]) -> None:
+    async def leave(self, gone: list[Worker]) -> None:
         """Nodes that are gone are torn down, also if nobody waits for that any more."""
         if not gone:
             return

@@ -193,6 +193,7 @@ class Inlet:
         self._moved = moved
         self._inbox: deque[tuple[Any, int, float]] = deque()
         self._waits = False
+        self._held = False
         self._joins = self._edge.joins()
         self.speaking = True
         self.label: str = worker.port_name
@@ -234,6 +235,15 @@ class Inlet:
     def orphan(self) -> None:
         """The producer has died and left nobody who waits for what has come."""
         self._orphans = self.received
+
+    def hold(self, held: bool) -> None:
+        """Lay no more tokens on an edge of data until it is let go: what has come waits here."""
+        self._held = held
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether nothing that was laid is still in the part, nor what came of it."""
+        return not self._worker.outputs.missing and self.settled >= self.taken
 
     def skip(self, count: int) -> None:
         """So many have come that are not for this life: what belongs to them was done by a former one."""
@@ -288,7 +298,7 @@ class Inlet:
 
     def _lay_token(self) -> None:
         worker, inbox = self._worker, self._inbox
-        while inbox and not worker.outputs.missing:
+        while inbox and not worker.outputs.missing and not self._held:
             value, activity, stamp = inbox.popleft()
             put_outputs(worker, [(value, activity, stamp)])
             self._engine.kick()

@@ -37,6 +37,8 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
       window: the most tokens that may be under way, for what may lose nothing.
       hint: the declared type of what it carries.
       within_host: whether both ends are on one host.
+      number: among those of the cutting, by their labels: for as long as those are the same, so is this, whatever else is
+        edited.
     """
 
     label: str
@@ -47,6 +49,7 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
     window: int
     hint: Any
     within_host: bool = True
+    number: int = 0
 
 
 class Cutting(msgspec.Struct, frozen=True, eq=False):
@@ -107,7 +110,9 @@ class _Cutter:
                 )
                 continue
             made[by].add_gate(gate)
-        return Cutting({name: part.flat for name, part in made.items()}, self.edges, self.findings)
+        numbers = {label: number for number, label in enumerate(sorted(edge.label for edge in self.edges))}
+        edges = [msgspec.structs.replace(edge, number=numbers[edge.label]) for edge in self.edges]
+        return Cutting({name: part.flat for name, part in made.items()}, edges, self.findings)
 
     # --- who is where ---
 

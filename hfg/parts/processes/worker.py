@@ -169,7 +169,7 @@ class Worker:
             returns=self._life > message.incarnations[MAIN],
             keeper=keeper,
         )
-        self._serving = Serving(graph, flat, composition, partial(self._say, MAIN))
+        self._serving = Serving(graph, flat, composition, partial(self._say, MAIN), part.emptied)
         level_of(graph).whole.begin_run(self._serving.run)
         composition.consumers.leave_out(sieve(self._name, edges))
         part.engine.callbacks.finished.append(partial(self._ended, part))

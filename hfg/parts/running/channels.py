@@ -240,7 +240,7 @@ class _NearEnd:
         self.other = other
         self._part = world.part
         self._edge = edge
-        self._key = f"{world.run}/edge/{edge.edge.index}"
+        self._key = f"{world.run}/edge/{edge.number}"
         self._codec = _codec_of(edge)
         self._tell = partial(world.say, other)
 
@@ -410,7 +410,7 @@ class _Outgoing(_NearEnd):
         machine = sender.machine
         self._lending = Lending(
             world.run,
-            segment_of(world.run, world.lives[edge.source], edge.edge.index),
+            segment_of(world.run, world.lives[edge.source], edge.number),
             edge.label,
             edge.window,
             lambda: machine.unfinished,

@@ -7,17 +7,19 @@ processes. Stands on the engine and `agreement`.
 
 from __future__ import annotations
 
+import asyncio
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Final, Protocol
 
 from hfg.engine.face.composition import Composition
-from hfg.engine.model.worker import ENDED
+from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.rules import quiet
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
-from hfg.errors import EngineInternalError, HfgError
+from hfg.errors import EngineInternalError, HfgError, UsageError
 from hfg.graph.flat import CutEdge
 from hfg.parts.model.agreement import Account, Answer, Question, Rest
 from hfg.parts.model.inheriting import Alignment, Arrived, Where
@@ -116,11 +118,9 @@ class Part:
         self._leading = coming[0] if coming else ""
         self._origin = dict.fromkeys(self.inlets, 0)  # how many tokens came to former lives, or were skipped
         self._alignment = Alignment(coming if returns and keeper is None else [])
-        self._last = [  # who fires and sends nothing on; what stands for a subgraph never fires
-            worker
-            for worker in engine.core.by_path.values()
-            if worker.scope is None and not any(worker.all_out_edges())
-        ]
+        self._last = self._find_last()
+        self._before: dict[Any, int] = {}  # what the ends had done when the part was edited last
+        self._cleared: asyncio.Future[None] | None = None  # somebody waits until nothing is in it
         self._leaving = False
         engine.leave_quiet_to(self._nothing_moves)
         engine.callbacks.pumped.append(self._pumped)
@@ -129,6 +129,56 @@ class Part:
     def engine(self) -> Engine:
         """What runs it."""
         return self.composition.engine
+
+    def _look_whether_clear(self) -> None:
+        waiting = self._cleared is not None and not self._cleared.done()
+        if waiting and all(inlet.is_clear for inlet in self.inlets.values()):
+            self._cleared.set_result(None)  # type: ignore[union-attr]  # it waits
+
+    def _find_last(self) -> list[Worker]:
+        """Who fires and sends nothing on; what stands for a subgraph never fires."""
+        core = self.engine.core
+        return [w for w in core.by_path.values() if w.scope is None and not any(w.all_out_edges())]
+
+    @asynccontextmanager
+    async def emptied(self) -> AsyncIterator[None]:
+        """Inside the block nothing that came in is still in the part: its nodes and edges may be changed (R4).
+
+        A part whose tokens inherit positions knows what is done by counting; so it counts anew behind the block. Any
+        other needs none of this, and goes on meanwhile.
+
+        Raises:
+          UsageError: it is paused.
+        """
+        if not self.inherits:
+            yield
+            return
+        if self.engine.core.held:
+            raise UsageError(
+                f'group "{self.name}" is emptied of tokens before it is edited, so that none of them is lost when its '
+                "process dies; it is paused: run.resume() first"
+            )
+        self.engine.hold()
+        for inlet in self.inlets.values():
+            inlet.hold(True)
+        try:
+            while not all(inlet.is_clear for inlet in self.inlets.values()):
+                self._cleared = asyncio.get_running_loop().create_future()
+                self.engine.kick()
+                await self._cleared
+            yield
+            self._last = self._find_last()
+            self.engine.core.settle_counts()
+            self._before = {worker: worker.firings for worker in self._last}
+            self._before |= {outlet: outlet.finished for outlet in self.outlets.values()}
+            self._origin = {label: inlet.taken for label, inlet in self.inlets.items()}
+        finally:
+            self._cleared = None
+            for inlet in self.inlets.values():
+                inlet.hold(False)
+                inlet.lay()
+            self.engine.unhold()
+            self.engine.kick()
 
     def connect(self, outgoing: Mapping[str, Outgoing], incoming: Mapping[str, Incoming]) -> None:
         """Give the links at its ends, by label of the edge."""
@@ -297,11 +347,13 @@ class Part:
 
         Who has ended holds nobody up: whatever still comes to it is drained (F12).
         """
-        ends = [outlet.finished for outlet in self.outlets.values() if outlet.hearing == "open"]
+        before = self._before
+        outlets = [outlet for outlet in self.outlets.values() if outlet.hearing == "open"]
+        ends = [outlet.finished - before.get(outlet, 0) for outlet in outlets]
         if self._last:
             self.engine.core.settle_counts()
             ends += [
-                worker.firings - (worker.busy == "firing")
+                worker.firings - before.get(worker, 0) - (worker.busy == "firing")
                 for worker in self._last
                 if worker.busy or not worker.blocked & ENDED
             ]
@@ -333,6 +385,7 @@ class Part:
         self.send()
         if self.inherits:
             self._settle()
+            self._look_whether_clear()
         if self.keeper is not None:
             self.keeper.look()
 

@@ -34,6 +34,9 @@ _NOBODY: Final = 0  # the number of calls whose result nobody waits for
 _CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts")
 """What a part that begins anew is asked again: done twice it is as if done once."""
 
+_GONE_WITH_THE_PART: Final = ("edit", "undo", "redo")
+"""What nobody has heard of when the part dies before it has answered."""
+
 
 class Homes:
     """Where each node, port and edge of a graph that is cut lives."""
@@ -45,6 +48,10 @@ class Homes:
           flat: all of it.
           cutting: of the same.
         """
+        self.draw(flat, cutting)
+
+    def draw(self, flat: FlatGraph, cutting: Cutting) -> None:
+        """The graph is as it says here from now on."""
         self.order = [node.path for one in flat.walk() for node in one.nodes]
         self._flat = flat
         self._nodes = [node.node for node in flat.nodes]
@@ -155,6 +162,7 @@ class Asking:
         self._early: dict[str, list[Call]] = {}  # what was asked for before the part was there
         self._waiting: dict[int, tuple[str, Call, asyncio.Future[Any]]] = {}
         self._standing: dict[int, Standing] = {}
+        self._when_gone: list[Callable[[], None]] = []
 
     # --- asking -----------------------------------------------------------------------------------------------------
 
@@ -179,6 +187,21 @@ class Asking:
         self._kept[part, key] = call
         if part in self._open:
             self._say(part, call)
+
+    def tell_if_there(self, part: str, verb: str, **arguments: Any) -> None:
+        """The same, unless the part is still to begin: then it learns in another way what it is to know."""
+        if part in self._open:
+            self._say(part, Call(_NOBODY, verb, arguments))
+
+    def draw_again(self, flat: FlatGraph, cutting: Cutting) -> None:
+        """The graph was edited; what lies between the parts is the same as before."""
+        self.homes.draw(flat, cutting)
+        self.crossing.draw(flat)
+        self.cutting = cutting
+
+    def when_gone(self, then: Callable[[], None]) -> None:
+        """Have somebody called when a part has died."""
+        self._when_gone.append(then)
 
     def forget(self, part: str, key: str) -> None:
         """A part that begins anew is not told this any more."""
@@ -255,6 +278,8 @@ class Asking:
         """A part answers no more; whether it begins anew is for others to say."""
         was_open = part in self._open
         self._open.discard(part)
+        for then in self._when_gone:
+            then()
         for name, call, future in list(self._waiting.values()):
             if name != part or future.done():
                 continue
@@ -262,7 +287,10 @@ class Asking:
                 if was_open:
                     self._early.setdefault(part, []).append(call)
                 continue
-            future.set_exception(RunError(f"{error}; {_named(call)} may have been done or not: look, and ask again"))
+            what = f"{_named(call)} may have been done or not: look, and ask again"
+            if call.verb in _GONE_WITH_THE_PART:
+                what = f"the {call.verb} was not made, for the next one begins with the graph as it was"
+            future.set_exception(RunError(f"{error}; {what}"))
             future.exception()  # it may be that nobody waits for it any more
 
     def over(self, part: str) -> None:

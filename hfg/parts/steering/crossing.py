@@ -46,6 +46,10 @@ class Crossing:
     """
 
     def __init__(self, flat: FlatGraph) -> None:
+        self.draw(flat)
+
+    def draw(self, flat: FlatGraph) -> None:
+        """The graph is as it says here from now on."""
         self._graph: Graph = flat.graph
         self._ports: dict[str, Port] = {}
         for one in flat.walk():

@@ -34,6 +34,7 @@ from hfg.graph.structure.edge import Edge, PortEnd
 from hfg.nodetype import Node
 from hfg.parts.model.messages import Seen
 from hfg.parts.steering.asking import Asking, Standing
+from hfg.parts.steering.editing import CutEdits, Drawing
 from hfg.ports import EventPort, ParameterPort, Port
 from hfg.token import Token
 from hfg.trace import Consumer
@@ -69,8 +70,9 @@ class Counts(msgspec.Struct, frozen=True):
 class CutRun(Run):
     """A graph that runs in several processes."""
 
-    def __init__(self, graph: Graph, composition: Composition, asking: Asking) -> None:
+    def __init__(self, graph: Graph, composition: Composition, asking: Asking, drawing: Drawing) -> None:
         super().__init__(graph, composition)
+        self._cut_edits = CutEdits(graph, composition.edits, asking, drawing, self._answer)
         self._asking = asking
         self._homes = asking.homes
         self._counts: dict[str, Counts] = {}
@@ -431,22 +433,31 @@ class CutRun(Run):
     def _in_order(self, nodes: dict[str, T]) -> dict[str, T]:
         return {path: nodes[path] for path in self._homes.order if path in nodes} | nodes
 
-    # --- what only a graph in one process allows --------------------------------------------------------------------
+    # --- editing, and what only a graph in one process allows -------------------------------------------------------
 
     async def edit(self, *commands: Command) -> None:
-        """Refuse it: what has begun in several processes stays as it is."""
-        self._refuse("edited")
+        """See `Run.edit`. An edit is made in one process: it concerns nodes of one, and edges between them.
+
+        Where another process than the main one is concerned, who is cancelled meanwhile waits until that has answered.
+
+        Raises:
+          UsageError: also if it concerns nodes of several processes, or an edge from one to another.
+        """
+        self._need_running("edit the graph with graph.edit(...)")
+        await self._cut_edits.edit(commands)
 
     async def undo(self) -> None:
-        """See `edit`."""
-        self._refuse("edited")
+        """See `Run.undo`: an edit of this run that all its processes have seen."""
+        self._need_running("edit the graph with graph.edit(...)")
+        await self._cut_edits.undo()
 
     async def redo(self) -> None:
-        """See `edit`."""
-        self._refuse("edited")
+        """See `Run.redo`."""
+        self._need_running("edit the graph with graph.edit(...)")
+        await self._cut_edits.redo()
 
     async def reload(self, module: str | ModuleType) -> None:
-        """See `edit`."""
+        """Refuse it: code is changed in all processes at once, or in none."""
         self._refuse("given new code")
 
     def record(

@@ -9,7 +9,8 @@ from __future__ import annotations
 import asyncio
 import inspect
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
+from contextlib import AbstractAsyncContextManager
 from functools import partial
 from typing import Any, Final
 
@@ -19,10 +20,12 @@ from hfg.engine.face.run import Run
 from hfg.engine.observing.report import edge_reports, node_reports
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
-from hfg.graph.flat import FlatGraph
+from hfg.graph.editing.commands import decode
+from hfg.graph.flat import FlatGraph, flatten
 from hfg.parts.model.failing import as_failed
 from hfg.parts.model.messages import Call, Failed, Message, Parcel, Result, Seen, Sight
 from hfg.parts.steering.crossing import Crossing
+from hfg.parts.steering.editing import draw, draw_redo, draw_undo
 from hfg.token import Token
 from hfg.trace import RunEnded, RunPaused, RunResumed, RunStarted, TraceEvent
 
@@ -39,7 +42,14 @@ class Serving:
       run: what it does that with.
     """
 
-    def __init__(self, graph: Graph, flat: FlatGraph, composition: Composition, say: Callable[[Message], None]) -> None:
+    def __init__(
+        self,
+        graph: Graph,
+        flat: FlatGraph,
+        composition: Composition,
+        say: Callable[[Message], None],
+        emptied: Callable[[], AbstractAsyncContextManager[None]],
+    ) -> None:
         """Serve a part of which nothing is set up yet.
 
         Args:
@@ -47,7 +57,10 @@ class Serving:
           flat: the same.
           composition: of the part.
           say: answers.
+          emptied: around what changes the nodes of the part.
         """
+        self._graph = graph
+        self._emptied = emptied
         self.run = Run(graph, composition)
         self._crossing = Crossing(flat)
         self._composition = composition
@@ -74,6 +87,12 @@ class Serving:
             "tap": self._tap,
             "more": self._more,
             "leave": self._leave,
+            "edit": lambda commands: self._edit(self.run.edit(*decode(commands))),
+            "undo": lambda: self._edit(self.run.undo()),
+            "redo": lambda: self._edit(self.run.redo()),
+            "draw_edit": lambda commands: self._draw(partial(draw, graph, decode(commands))),
+            "draw_undo": lambda: self._draw(partial(draw_undo, graph)),
+            "draw_redo": lambda: self._draw(partial(draw_redo, graph)),
         }
 
     # --- calls ------------------------------------------------------------------------------------------------------
@@ -125,6 +144,21 @@ class Serving:
     def _set(self, path: str, parcel: Any) -> None:
         port: Any = self.run.graph[path]
         self.run.set(port, self._crossing.unpack(path, port.type, parcel).value)
+
+    # --- editing ----------------------------------------------------------------------------------------------------
+
+    async def _edit(self, editing: Coroutine[Any, Any, None]) -> None:
+        try:
+            async with self._emptied():
+                await editing
+        finally:
+            editing.close()  # if it has not begun
+        self._crossing.draw(flatten(self._graph))
+
+    def _draw(self, drawn: Callable[[], None]) -> None:
+        """What was edited in another part."""
+        drawn()
+        self._crossing.draw(flatten(self._graph))
 
     # --- waiting ----------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,122 @@
+"""Which parts of a cut graph an edit concerns, and what of it no run in several processes can follow (rules L1, R4).
+
+Each edit takes effect in one part, at one moment, as in a graph that is whole. What lies between parts stays as it is:
+both ends of a link would have to change at the same moment. Decides, never waits. Stands on graphs that are cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from hfg.errors import UsageError
+from hfg.graph.editing.changes import Change, ParameterChange
+from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatEdge, FlatGraph
+from hfg.parts.model.inheriting import inheriting, keeping
+
+__all__ = ["concerned"]
+
+
+def concerned(before: Cutting, after: Cutting, changes: tuple[Change, ...]) -> str:
+    """Give the part that an edit concerns; the main one for what only the drawing shows.
+
+    Args:
+      before: the graph as it runs.
+      after: the same with the changes.
+      changes: of the edit.
+
+    Raises:
+      UsageError: it concerns several, or what lies between them.
+    """
+    if after.findings:
+        raise UsageError(f"the edit is refused, for the graph could not be cut any more: {after.findings[0]}")
+    _need_same_parts(before, after)
+    _need_same_links(before, after)
+    parts = {name for name in before.parts if _shape(before.parts[name]) != _shape(after.parts[name])}
+    homes = {id(node.node): name for name, flat in after.parts.items() for node in flat.nodes}
+    homes |= {id(one.node): name for name, flat in after.parts.items() for one in _inside(flat)}
+    for change in changes:
+        if isinstance(change, ParameterChange):
+            parts.add(homes.get(id(change.node), MAIN))
+    if len(parts) > 1:
+        raise UsageError(
+            f"the edit concerns {_listed(parts)} at once, and there is no moment that several processes share: make "
+            "one edit for each"
+        )
+    part = parts.pop() if parts else MAIN
+    if part != MAIN and part in keeping(before):
+        raise UsageError(
+            f'group "{part}" has a ledger, in which nodes and edges have their places: its structure stays as it is '
+            "while the graph runs; end the run and change the graph before the next one"
+        )
+    _need_same_promises(before, after)
+    return part
+
+
+def _need_same_parts(before: Cutting, after: Cutting) -> None:
+    for name in before.parts.keys() - after.parts.keys():
+        raise UsageError(
+            f'group "{name}" would have no node left, and its process goes on as long as the run: leave one there, or '
+            "end the run"
+        )
+    for name in after.parts.keys() - before.parts.keys():
+        raise UsageError(
+            f'group "{name}" has no process in this run, for no node was in it when it began: put the node into '
+            "another group, or end the run and change the graph before the next one"
+        )
+
+
+def _need_same_links(before: Cutting, after: Cutting) -> None:
+    was, will_be = ({edge.label: _link(edge) for edge in one.edges} for one in (before, after))
+    for label in [*was, *will_be]:
+        if was.get(label) != will_be.get(label):
+            raise UsageError(
+                f'"{label}" leads from one process to another, and such edges stay as they are while the graph runs: '
+                "edit what lies within one process, or end the run and change the graph before the next one"
+            )
+
+
+def _need_same_promises(before: Cutting, after: Cutting) -> None:
+    """What is done when a part dies was agreed on when the run began, and hangs on its shape (rule L2)."""
+    for part in sorted(inheriting(before) ^ inheriting(after)):
+        raise UsageError(
+            f'the process of group "{part}" loses nothing when it dies as long as each token that comes in gives just '
+            "one on each edge that leaves, and by this edit that would be otherwise: keep to it, or end the run and "
+            "change the graph before the next one"
+        )
+
+
+def _listed(parts: set[str]) -> str:
+    named = [f'group "{name}"' for name in sorted(parts) if name != MAIN]
+    return " and ".join([*named, *(["the main part"] if MAIN in parts else [])])
+
+
+def _shape(flat: FlatGraph) -> tuple[Any, ...]:
+    """What an engine that runs it can tell."""
+    names = [node.path for node in flat.nodes]
+    scopes = [(one.path, one.options, [names[member] for member in one.members]) for one in flat.scopes if one.members]
+    gates = [(_name(flat, gate.target), _name(flat, gate.by), gate.idle_rate_hz) for gate in flat.gates]
+    nodes = [(id(node.node), node.path, node.options) for node in flat.nodes]
+    inner = [_shape(one) for node in flat.nodes if node.iteration is not None for one in [node.iteration]]
+    return nodes, [_edge(edge) for edge in flat.edges], scopes, sorted(gates, key=repr), inner
+
+
+def _name(flat: FlatGraph, end: int) -> str:
+    return flat.nodes[end].path if end >= 0 else f"subgraph {end}"
+
+
+def _edge(edge: FlatEdge) -> tuple[Any, ...]:
+    segments = tuple(map(id, edge.segments))
+    held = (edge.active, edge.capacity, edge.overflow, edge.capacity_limit, edge.buffer)
+    return edge.label, segments, held, tuple(map(id, edge.through)), tuple(map(id, edge.initial))
+
+
+def _link(edge: CutEdge) -> tuple[Any, ...]:
+    return edge.source, edge.target, edge.guarantee, edge.window, _edge(edge.edge)
+
+
+def _inside(flat: FlatGraph) -> Iterator[Any]:
+    """The nodes inside of those that iterate."""
+    for node in flat.nodes:
+        for inner in node.iteration.walk() if node.iteration is not None else ():
+            yield from inner.nodes

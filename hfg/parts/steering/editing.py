@@ -1,0 +1,198 @@
+"""Edits of a run whose graph is cut (rules L1, R4): each takes effect in the one part it concerns; then all draw it.
+
+Every part has the whole graph as a drawing, of which it runs its nodes. So an edit is done where it concerns something
+that runs, by that part's own engine, and if that went well the others carry it out on their drawings. A part that
+begins anew is sent the drawing as it is by then. Stands on `asking`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
+from typing import Any
+
+from hfg.engine.editing.edits import Edits
+from hfg.engine.model.worker import Worker
+from hfg.errors import FileError, UsageError
+from hfg.graph import Graph
+from hfg.graph.editing import Transaction, history_of, prepare
+from hfg.graph.editing.changes import Change, undo_all
+from hfg.graph.editing.commands import Command, encode
+from hfg.graph.flat import MAIN, Cutting, FlatGraph, cut, flatten
+from hfg.parts.model.redrawing import concerned
+from hfg.parts.steering.asking import Asking
+
+__all__ = ["CutEdits", "Drawing", "draw", "draw_redo", "draw_undo"]
+
+Answer = Callable[..., Awaitable[Any]]
+
+
+class Drawing:
+    """The whole graph as all parts know it by now.
+
+    Attributes:
+      flat: the graph.
+      cutting: of the same.
+      text: the same as a graph file; what a part that begins is sent.
+    """
+
+    def __init__(self, flat: FlatGraph, cutting: Cutting, text: str, write: Callable[[Graph], str]) -> None:
+        """Begin with what runs.
+
+        Args:
+          flat: the graph.
+          cutting: of the same.
+          text: of the same.
+          write: gives the text of a graph.
+        """
+        self.flat = flat
+        self.cutting = cutting
+        self.text = text
+        self.write = write
+
+    def again(self) -> None:
+        """The graph was edited."""
+        graph = self.flat.graph
+        self.flat = flatten(graph)
+        self.cutting = cut(self.flat)
+        self.text = self.write(graph)
+
+
+class CutEdits:
+    """Edits a graph that runs in several processes.
+
+    Args:
+      graph: the whole.
+      edits: of the main part.
+      asking: asks the others.
+      drawing: what is known of the whole.
+      answer: asks a part and waits for what it says, or for the end of the run.
+    """
+
+    def __init__(self, graph: Graph, edits: Edits, asking: Asking, drawing: Drawing, answer: Answer) -> None:
+        self._graph = graph
+        self._edits = edits
+        self._asking = asking
+        self._drawing = drawing
+        self._answer = answer
+        self._known: list[Transaction] = []  # which all parts have in their histories
+        asking.when_gone(self._known.clear)
+
+    async def edit(self, commands: Sequence[Command]) -> None:
+        """See `Run.edit`."""
+        async with self._edits.turns.one():
+            said = encode(commands)
+            home = self._home(prepare(self._graph, commands, check=False).changes)
+            now, drawn = partial(self._edits.edit_now, commands), partial(draw, self._graph, commands)
+            gone = await self._carry_out(home, "edit", now, drawn, commands=said)
+        await self._edits.leave(gone)
+
+    async def undo(self) -> None:
+        """See `Run.undo`."""
+        async with self._edits.turns.one():
+            home = self._home(undo_all(self._need_known("undo", history_of(self._graph).next_undo()).changes))
+            gone = await self._carry_out(home, "undo", self._edits.undo_now, partial(draw_undo, self._graph))
+        await self._edits.leave(gone)
+
+    async def redo(self) -> None:
+        """See `Run.redo`."""
+        async with self._edits.turns.one():
+            transaction = self._need_known("redo", history_of(self._graph).next_redo())
+            for change in transaction.changes:
+                change.do()
+            home = self._home(transaction.changes)
+            gone = await self._carry_out(home, "redo", self._edits.redo_now, partial(draw_redo, self._graph))
+        await self._edits.leave(gone)
+
+    def _need_known(self, verb: str, transaction: Transaction) -> Transaction:
+        if transaction not in self._known:
+            raise UsageError(
+                f"cannot {verb} this: it was edited before the run began, or before one of its processes did, which "
+                "therefore does not know it; edit the graph as you want it"
+            )
+        return transaction
+
+    def _home(self, changes: Sequence[Change]) -> str:
+        """Which part they concern; they were done to the drawing, to see that, and are taken back.
+
+        Raises:
+          HfgError: no run of several processes can follow them.
+        """
+        try:
+            after = flatten(self._graph)
+            home = concerned(self._drawing.cutting, cut(after), tuple(changes))
+            try:
+                self._drawing.write(self._graph)
+            except FileError as error:
+                raise UsageError(f"the edit cannot be told to the other processes of the run: {error}") from None
+        finally:
+            undo_all(changes)
+        return home
+
+    async def _carry_out(
+        self,
+        home: str,
+        verb: str,
+        now: Callable[[], Awaitable[list[Worker]]],
+        drawn: Callable[[], None],
+        **arguments: Any,
+    ) -> list[Worker]:
+        """Do it where it concerns something, then have all others draw it; give who is to be torn down here."""
+        history = history_of(self._graph)
+        before = history.done[-1:], history.undone[-1:]
+        try:
+            if home == MAIN:
+                return await now()
+            await self._there(home, verb, **arguments, drawn=drawn)
+            return []
+        finally:
+            if (
+                history.done[-1:],
+                history.undone[-1:],
+            ) != before:  # it took effect, also for who is cancelled behind it
+                if verb == "edit":
+                    self._known.append(history.done[-1])
+                self._drawing.again()
+                self._asking.draw_again(self._drawing.flat, self._drawing.cutting)
+                for part in self._asking.others:
+                    if part != home:  # one that begins just now is sent the whole as it is
+                        self._asking.tell_if_there(part, f"draw_{verb}", **arguments)
+
+    async def _there(self, part: str, verb: str, *, drawn: Callable[[], None], **arguments: Any) -> None:
+        """Have a part do it, and draw it here when that is done.
+
+        What another process does cannot be called off, so who is cancelled meanwhile waits for its end.
+        """
+        ended = "the run ended before the edit was made"
+        asked = asyncio.ensure_future(self._answer(part, ended, verb, **arguments))
+        cancelled: asyncio.CancelledError | None = None
+        while not asked.done():
+            try:
+                await asyncio.wait({asked})
+            except asyncio.CancelledError as error:
+                cancelled = error
+        asked.result()
+        drawn()
+        if cancelled is not None:
+            raise cancelled
+
+
+def draw(graph: Graph, commands: Sequence[Command]) -> None:
+    """Carry out on a drawing what was done to the nodes elsewhere."""
+    history_of(graph).note(prepare(graph, commands, check=False))
+
+
+def draw_undo(graph: Graph) -> None:
+    """Take back on a drawing what was taken back elsewhere."""
+    history = history_of(graph)
+    undo_all(history.next_undo().changes)
+    history.undo_done()
+
+
+def draw_redo(graph: Graph) -> None:
+    """Carry out again on a drawing what was carried out again elsewhere."""
+    history = history_of(graph)
+    for change in history.next_redo().changes:
+        change.do()
+    history.redo_done()
