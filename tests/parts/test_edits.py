@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,18 +25,6 @@ def more(value: int, *, by: int = 100) -> int:
     return value + by
 
 
-@hfg.node
-def twice_or_not(value: int) -> int | None:
-    """Silent for odd values: no answer to each."""
-    return value if value % 2 == 0 else None
-
-
-@hfg.node
-def count_up(*, count: int = 40) -> Iterator[int]:
-    """Count."""
-    yield from range(count)
-
-
 class Refuses(hfg.Node):
     """Cannot be set up."""
 
@@ -55,7 +42,7 @@ def line(*, ledger: bool = False) -> hfg.Graph:
     """Two nodes in the main part, three in another one, with edges from each to the next: 2 (v + 1 + 10) + 100."""
     graph = hfg.Graph("line")
     graph.group("far", process=True, ledger=ledger)
-    nodes = [
+    nodes: list[Any] = [
         graph.add(more(by=1), name="a"),
         graph.add(more(by=10), name="b"),
         graph.add(Scaler(), name="scaler", group="far"),
@@ -319,7 +306,7 @@ def test_an_edit_of_a_part_that_dies_was_made_or_not_and_nothing_is_lost(parts: 
             async with asyncio.timeout(10.0):
                 await editing
         except RunError as error:
-            assert "was not made" in str(error)
+            assert "the edit was not made" in str(error)  # noqa: PT017 - whether it is made hangs on the moment
             done = False
         assert ("extra" in run.graph.nodes) is done
         found = await reading

@@ -194,6 +194,64 @@ def test_a_process_whose_loop_stands_still_is_ended_and_begun_again(tmp_path: Pa
     nothing_is_left(tmp_path, pids)
 
 
+@pytest.mark.rule("R4", "L1", "L2")
+def test_a_real_process_is_edited_dies_and_is_as_it_was_edited(tmp_path: Path) -> None:
+    """Values go on all the time; from some value on each goes the new way, also through the next process."""
+    running = program(
+        tmp_path,
+        """
+    from hfg import commands as c
+
+    @hfg.node
+    def add(value: int, *, by: int = 0) -> int:
+        return value + by
+
+    @hfg.node
+    def whose(value: int) -> tuple[int, int]:
+        return value, os.getpid()
+
+    async def main() -> None:
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        one, two = graph.add(add(), name="one", group="far"), graph.add(whose(), name="two", group="far")
+        graph.connect(graph.input("in", int), one.value)
+        graph.connect(one.out, two.value)
+        graph.connect(two.out, graph.output("out", tuple[int, int]))
+        found = []
+        async with hfg.running(graph) as run:
+            async def read() -> None:
+                async for value in run.read("out"):
+                    found.append(value)
+                    if len(found) == 300:
+                        return
+
+            reading = asyncio.create_task(read())
+            async with run.feed("in", end=False) as feed:
+                for number in range(300):
+                    await feed.send(number)
+                    if number == 100:
+                        await run.edit(
+                            c.Disconnect("one.out", "two.value"),
+                            c.Add("__main__:add", "new", parameters={"by": 1000}, options={"group": "far"}),
+                            c.Connect("one.out", "new.value"),
+                            c.Connect("new.out", "two.value"),
+                        )
+                    if number == 200:
+                        os.kill(found[-1][1], signal.SIGKILL)
+                await reading
+        values = [value for value, _ in found]
+        switch = values.index(next(value for value in values if value >= 1000))
+        assert values == [*range(switch), *range(1000 + switch, 1300)], values
+        assert len({pid for _, pid in found}) == 2
+
+    if __name__ == "__main__":
+        asyncio.run(main())
+    """,
+    )
+    _, err = running.communicate(timeout=60)
+    assert running.returncode == 0, err
+
+
 @pytest.mark.rule("X3")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_however_the_main_process_ends_nothing_is_left(tmp_path: Path, how: signal.Signals) -> None:

@@ -301,8 +301,8 @@ def test_pictures_go_through_shared_memory_both_ways_and_arrive_to_the_bit() -> 
     assert [one["number"] for one in said] == list(range(20))
     assert all(one["right"] for one in said)
     run = run_of(said)
-    assert {one["there"] for one in said} - {""} == {f"{run}-1-edge_0"}
-    assert {one["here"] for one in said} - {""} == {f"{run}-1-edge_1"}
+    assert {one["there"] for one in said} - {""} == {f"{run}-1-edge_1"}
+    assert {one["here"] for one in said} - {""} == {f"{run}-1-edge_0"}
     assert left_behind(run) == []
 
 
@@ -329,8 +329,8 @@ def test_a_process_that_is_killed_begins_anew_with_a_ring_of_its_own_and_nothing
     assert all(one["right"] for one in said)
     run = run_of(said)
     after = said[16:]
-    assert f"{run}-1-edge_0" in {one["there"] for one in after}
-    assert f"{run}-2-edge_1" in {one["here"] for one in after}
+    assert f"{run}-1-edge_1" in {one["there"] for one in after}
+    assert f"{run}-2-edge_0" in {one["here"] for one in after}
     assert left_behind(run) == []
 
 

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from hfg.engine.model.looks import Look, WaveLook, look_inside
 
-__all__ = ["Passed", "Telling", "tell_rest"]
+__all__ = ["Outs", "Passed", "Telling", "looks_of", "tell_rest", "together_of"]
 
 Outs: TypeAlias = list[list[tuple[Any, int, "int | None"]]]
 Passed: TypeAlias = tuple[int, int, int]

@@ -37,8 +37,7 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
       window: the most tokens that may be under way, for what may lose nothing.
       hint: the declared type of what it carries.
       within_host: whether both ends are on one host.
-      number: among those of the cutting, by their labels: for as long as those are the same, so is this, whatever else is
-        edited.
+      number: among those of the cutting, by their labels: whatever else is edited, it stays the same as long as they do.
     """
 
     label: str
