@@ -37,7 +37,7 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
       window: the most tokens that may be under way, for what may lose nothing.
       hint: the declared type of what it carries.
       within_host: whether both ends are on one host.
-      number: among those of the cutting, by their labels: whatever else is edited, it stays the same as long as they do.
+      number: among those of the cutting, by their labels: it stays the same as long as they do.
     """
 
     label: str
