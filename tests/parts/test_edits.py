@@ -11,8 +11,10 @@ import pytest
 
 import hfg
 from hfg import commands as c
-from hfg.errors import HfgError, RunError, UsageError
+from hfg.errors import GraphError, HfgError, RunError, UsageError
 from hfg.parts.processes import launching
+from hfg.parts.steering.serving import Serving
+from hfg.testing.edits import drawn
 from hfg_transports.memory import Faults, Network
 from tests.parts.test_from_outside import Scaler, through, with_run
 
@@ -317,3 +319,65 @@ def test_an_edit_of_a_part_that_dies_was_made_or_not_and_nothing_is_lost(parts: 
     ways = [got - old for got, old in zip(found, plain, strict=True)]
     assert [way for way, _ in itertools.groupby(ways)] in ([[0, 1000], [1000]] if done else [[0]])
     assert ways[-1] == (1000 if done else 0)
+
+
+# --- more than two processes ---
+
+
+def row() -> hfg.Graph:
+    """Two processes in a row, each with two nodes."""
+    graph = hfg.Graph("row")
+    port: Any = graph.input("in", int)
+    for group in ("one", "two"):
+        graph.group(group, process=True)
+        for name in ("first", "last"):
+            node: Any = graph.add(more(by=1), name=f"{name}_{group}", group=group)
+            graph.connect(port, node.value)
+            port = node.out
+    graph.connect(port, graph.output("out", int))
+    return graph
+
+
+@pytest.mark.rule("R4", "L1")
+def test_each_of_several_processes_is_edited_and_all_draw_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    graphs: list[hfg.Graph] = []
+    init = Serving.__init__
+
+    def noted(self: Serving, graph: hfg.Graph, *rest: Any) -> None:
+        graphs.append(graph)
+        init(self, graph, *rest)
+
+    monkeypatch.setattr(Serving, "__init__", noted)
+
+    def alike(run: hfg.Run) -> bool:
+        told = drawn(run.graph, identity=False)
+        return [drawn(graph, identity=False) == told for graph in graphs] == [True, True]
+
+    async def body(run: hfg.Run) -> list[int]:
+        found = []
+        for group, by in (("one", 100), ("two", 1000)):
+            await run.edit(*between(f"first_{group}", f"last_{group}", f"mid_{group}", group, by))
+            found += await through(run, 0)
+            assert alike(run)
+        for again in (run.undo, run.undo, run.redo):
+            await again()
+            found += await through(run, 0)
+            assert alike(run)
+        return found
+
+    assert with_run(row(), body) == [104, 1104, 104, 4, 104]
+
+
+@pytest.mark.rule("R4", "L1")
+def test_an_edit_that_one_process_cannot_even_draw_is_refused_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def body(run: hfg.Run) -> list[int]:
+        def cannot(graph: hfg.Graph, commands: Any) -> None:
+            raise GraphError('node type "tests.parts.test_edits:more" is not installed here')
+
+        monkeypatch.setattr("hfg.parts.steering.serving.try_to_draw", cannot)
+        with pytest.raises(GraphError, match="is not installed here"):
+            await run.edit(*between("first_one", "last_one", "mid", "one", 100))
+        assert "mid" not in run.graph.nodes
+        return await through(run, 0)
+
+    assert with_run(row(), body) == [4]

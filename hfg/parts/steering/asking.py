@@ -31,7 +31,7 @@ __all__ = ["Asking", "Homes", "Standing"]
 
 _LOGGER = Log("hfg.parts")
 _NOBODY: Final = 0  # the number of calls whose result nobody waits for
-_CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts")
+_CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts", "try_edit")
 """What a part that begins anew is asked again: done twice it is as if done once."""
 
 _GONE_WITH_THE_PART: Final = ("edit", "undo", "redo")

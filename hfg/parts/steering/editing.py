@@ -8,9 +8,10 @@ begins anew is sent the drawing as it is by then. Stands on `asking`.
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 from hfg.engine.editing.edits import Edits
 from hfg.engine.model.worker import Worker
@@ -20,12 +21,15 @@ from hfg.graph.editing import Transaction, history_of, prepare
 from hfg.graph.editing.changes import Change, undo_all
 from hfg.graph.editing.commands import Command, encode
 from hfg.graph.flat import MAIN, Cutting, FlatGraph, cut, flatten
+from hfg.graph.structure.history import MOST_STEPS
 from hfg.parts.model.redrawing import concerned
 from hfg.parts.steering.asking import Asking
 
-__all__ = ["CutEdits", "Drawing", "draw", "draw_redo", "draw_undo"]
+__all__ = ["CutEdits", "Drawing", "draw", "draw_redo", "draw_undo", "try_to_draw"]
 
 Answer = Callable[..., Awaitable[Any]]
+
+_ENDED: Final = "the run ended before the edit was made"
 
 
 class Drawing:
@@ -76,7 +80,7 @@ class CutEdits:
         self._asking = asking
         self._drawing = drawing
         self._answer = answer
-        self._known: list[Transaction] = []  # which all parts have in their histories
+        self._known: deque[Transaction] = deque(maxlen=MOST_STEPS)  # which all parts have in their histories
         asking.when_gone(self._known.clear)
 
     async def edit(self, commands: Sequence[Command]) -> None:
@@ -84,6 +88,9 @@ class CutEdits:
         async with self._edits.turns.one():
             said = encode(commands)
             home = self._home(prepare(self._graph, commands, check=False).changes)
+            for part in self._asking.others:
+                if part != home:  # which does it, and says by that whether it can
+                    await self._answer(part, _ENDED, "try_edit", commands=said)
             now, drawn = partial(self._edits.edit_now, commands), partial(draw, self._graph, commands)
             gone = await self._carry_out(home, "edit", now, drawn, commands=said)
         await self._edits.leave(gone)
@@ -164,8 +171,7 @@ class CutEdits:
 
         What another process does cannot be called off, so who is cancelled meanwhile waits for its end.
         """
-        ended = "the run ended before the edit was made"
-        asked = asyncio.ensure_future(self._answer(part, ended, verb, **arguments))
+        asked = asyncio.ensure_future(self._answer(part, _ENDED, verb, **arguments))
         cancelled: asyncio.CancelledError | None = None
         while not asked.done():
             try:
@@ -181,6 +187,11 @@ class CutEdits:
 def draw(graph: Graph, commands: Sequence[Command]) -> None:
     """Carry out on a drawing what was done to the nodes elsewhere."""
     history_of(graph).note(prepare(graph, commands, check=False))
+
+
+def try_to_draw(graph: Graph, commands: Sequence[Command]) -> None:
+    """See whether commands can be carried out here, where other packages may be installed; changes nothing."""
+    undo_all(prepare(graph, commands, check=False).changes)
 
 
 def draw_undo(graph: Graph) -> None:

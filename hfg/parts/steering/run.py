@@ -2,7 +2,7 @@
 
 What concerns a node is done where it lives. What is read at once, such as statistics, is of now for the main part and
 of when they last said so for the others: asking makes them say it again, and `refresh` waits for that. Stands on
-`asking`.
+`asking` and `editing`.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from hfg.graph.flat import FlatGraph, flatten
 from hfg.parts.model.failing import as_failed
 from hfg.parts.model.messages import Call, Failed, Message, Parcel, Result, Seen, Sight
 from hfg.parts.steering.crossing import Crossing
-from hfg.parts.steering.editing import draw, draw_redo, draw_undo
+from hfg.parts.steering.editing import draw, draw_redo, draw_undo, try_to_draw
 from hfg.token import Token
 from hfg.trace import RunEnded, RunPaused, RunResumed, RunStarted, TraceEvent
 
@@ -90,6 +90,7 @@ class Serving:
             "edit": lambda commands: self._edit(self.run.edit(*decode(commands))),
             "undo": lambda: self._edit(self.run.undo()),
             "redo": lambda: self._edit(self.run.redo()),
+            "try_edit": lambda commands: try_to_draw(graph, decode(commands)),
             "draw_edit": lambda commands: self._draw(partial(draw, graph, decode(commands))),
             "draw_undo": lambda: self._draw(partial(draw_undo, graph)),
             "draw_redo": lambda: self._draw(partial(draw_redo, graph)),
