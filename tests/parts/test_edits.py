@@ -187,9 +187,10 @@ def test_the_structure_of_a_part_with_a_ledger_stays_and_its_parameters_do_not(t
         with pytest.raises(UsageError, match='group "far" has a ledger'):
             await run.edit(*FAR)
         await run.edit(*IN_MAIN)
+        await run.edit(c.SetParameter("mid.by", 5))
         return await through(run, 0)
 
-    assert with_run(graph, body) == [2122]
+    assert with_run(graph, body) == [2127]
 
 
 @pytest.mark.rule("R3", "R4", "L2")
@@ -200,8 +201,8 @@ def test_a_part_that_is_paused_cannot_be_emptied_for_an_edit() -> None:
         with pytest.raises(UsageError, match=r'group "far" is emptied of tokens .*run.resume\(\) first'):
             await run.edit(*FAR)
         await run.edit(*IN_MAIN)
-        run.resume()
         await run.edit(c.SetParameter("raised.by", 0))
+        run.resume()
         return await through(run, 0)
 
     assert with_run(line(), body) == [2022]

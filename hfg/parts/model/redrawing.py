@@ -6,19 +6,31 @@ both ends of a link would have to change at the same moment. Decides, never wait
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 from hfg.errors import UsageError
 from hfg.graph.editing.changes import Change, ParameterChange
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatEdge, FlatGraph
 from hfg.parts.model.inheriting import inheriting, keeping
 
-__all__ = ["concerned"]
+__all__ = ["Concern", "concerned"]
 
 
-def concerned(before: Cutting, after: Cutting, changes: tuple[Change, ...]) -> str:
-    """Give the part that an edit concerns; the main one for what only the drawing shows.
+class Concern(NamedTuple):
+    """What an edit concerns.
+
+    Attributes:
+      part: in which it takes effect; the main one for what only the drawing shows.
+      reshapes: whether it changes more there than values of parameters.
+    """
+
+    part: str
+    reshapes: bool
+
+
+def concerned(before: Cutting, after: Cutting, changes: Sequence[Change]) -> Concern:
+    """Find out what an edit concerns.
 
     Args:
       before: the graph as it runs.
@@ -32,7 +44,8 @@ def concerned(before: Cutting, after: Cutting, changes: tuple[Change, ...]) -> s
         raise UsageError(f"the edit is refused, for the graph could not be cut any more: {after.findings[0]}")
     _need_same_parts(before, after)
     _need_same_links(before, after)
-    parts = {name for name in before.parts if _shape(before.parts[name]) != _shape(after.parts[name])}
+    reshaped = {name for name in before.parts if _shape(before.parts[name]) != _shape(after.parts[name])}
+    parts = set(reshaped)
     homes = {id(node.node): name for name, flat in after.parts.items() for node in flat.nodes}
     homes |= {id(one.node): name for name, flat in after.parts.items() for one in _inside(flat)}
     for change in changes:
@@ -44,13 +57,13 @@ def concerned(before: Cutting, after: Cutting, changes: tuple[Change, ...]) -> s
             "one edit for each"
         )
     part = parts.pop() if parts else MAIN
-    if part != MAIN and part in keeping(before):
+    if part in reshaped and part in keeping(before):
         raise UsageError(
             f'group "{part}" has a ledger, in which nodes and edges have their places: its structure stays as it is '
             "while the graph runs; end the run and change the graph before the next one"
         )
     _need_same_promises(before, after)
-    return part
+    return Concern(part, part in reshaped)
 
 
 def _need_same_parts(before: Cutting, after: Cutting) -> None:

@@ -22,7 +22,7 @@ from hfg.graph.editing.changes import Change, undo_all
 from hfg.graph.editing.commands import Command, encode
 from hfg.graph.flat import MAIN, Cutting, FlatGraph, cut, flatten
 from hfg.graph.structure.history import MOST_STEPS
-from hfg.parts.model.redrawing import concerned
+from hfg.parts.model.redrawing import Concern, concerned
 from hfg.parts.steering.asking import Asking
 
 __all__ = ["CutEdits", "Drawing", "draw", "draw_redo", "draw_undo", "try_to_draw"]
@@ -87,19 +87,20 @@ class CutEdits:
         """See `Run.edit`."""
         async with self._edits.turns.one():
             said = encode(commands)
-            home = self._home(prepare(self._graph, commands, check=False).changes)
+            where = self._concern(prepare(self._graph, commands, check=False).changes)
             for part in self._asking.others:
-                if part != home:  # which does it, and says by that whether it can
+                if part != where.part:  # which does it, and says by that whether it can
                     await self._answer(part, _ENDED, "try_edit", commands=said)
             now, drawn = partial(self._edits.edit_now, commands), partial(draw, self._graph, commands)
-            gone = await self._carry_out(home, "edit", now, drawn, commands=said)
+            gone = await self._carry_out(where, "edit", now, drawn, commands=said)
         await self._edits.leave(gone)
 
     async def undo(self) -> None:
         """See `Run.undo`."""
         async with self._edits.turns.one():
-            home = self._home(undo_all(self._need_known("undo", history_of(self._graph).next_undo()).changes))
-            gone = await self._carry_out(home, "undo", self._edits.undo_now, partial(draw_undo, self._graph))
+            transaction = self._need_known("undo", history_of(self._graph).next_undo())
+            where = self._concern(undo_all(transaction.changes))
+            gone = await self._carry_out(where, "undo", self._edits.undo_now, partial(draw_undo, self._graph))
         await self._edits.leave(gone)
 
     async def redo(self) -> None:
@@ -108,8 +109,8 @@ class CutEdits:
             transaction = self._need_known("redo", history_of(self._graph).next_redo())
             for change in transaction.changes:
                 change.do()
-            home = self._home(transaction.changes)
-            gone = await self._carry_out(home, "redo", self._edits.redo_now, partial(draw_redo, self._graph))
+            where = self._concern(transaction.changes)
+            gone = await self._carry_out(where, "redo", self._edits.redo_now, partial(draw_redo, self._graph))
         await self._edits.leave(gone)
 
     def _need_known(self, verb: str, transaction: Transaction) -> Transaction:
@@ -120,26 +121,25 @@ class CutEdits:
             )
         return transaction
 
-    def _home(self, changes: Sequence[Change]) -> str:
+    def _concern(self, changes: Sequence[Change]) -> Concern:
         """Which part they concern; they were done to the drawing, to see that, and are taken back.
 
         Raises:
           HfgError: no run of several processes can follow them.
         """
         try:
-            after = flatten(self._graph)
-            home = concerned(self._drawing.cutting, cut(after), tuple(changes))
+            found = concerned(self._drawing.cutting, cut(flatten(self._graph)), changes)
             try:
                 self._drawing.write(self._graph)
             except FileError as error:
                 raise UsageError(f"the edit cannot be told to the other processes of the run: {error}") from None
         finally:
             undo_all(changes)
-        return home
+        return found
 
     async def _carry_out(
         self,
-        home: str,
+        where: Concern,
         verb: str,
         now: Callable[[], Awaitable[list[Worker]]],
         drawn: Callable[[], None],
@@ -149,21 +149,19 @@ class CutEdits:
         history = history_of(self._graph)
         before = history.done[-1:], history.undone[-1:]
         try:
-            if home == MAIN:
+            if where.part == MAIN:
                 return await now()
-            await self._there(home, verb, **arguments, drawn=drawn)
+            await self._there(where.part, verb, **arguments, empties=where.reshapes, drawn=drawn)
             return []
         finally:
-            if (
-                history.done[-1:],
-                history.undone[-1:],
-            ) != before:  # it took effect, also for who is cancelled behind it
+            took_effect = (history.done[-1:], history.undone[-1:]) != before
+            if took_effect:  # also if this is cancelled, or fails, behind it
                 if verb == "edit":
                     self._known.append(history.done[-1])
                 self._drawing.again()
                 self._asking.draw_again(self._drawing.flat, self._drawing.cutting)
                 for part in self._asking.others:
-                    if part != home:  # one that begins just now is sent the whole as it is
+                    if part != where.part:  # one that begins just now is sent the whole as it is
                         self._asking.tell_if_there(part, f"draw_{verb}", **arguments)
 
     async def _there(self, part: str, verb: str, *, drawn: Callable[[], None], **arguments: Any) -> None:

@@ -10,7 +10,7 @@ import asyncio
 import inspect
 from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine
-from contextlib import AbstractAsyncContextManager
+from contextlib import AbstractAsyncContextManager, nullcontext
 from functools import partial
 from typing import Any, Final
 
@@ -87,9 +87,9 @@ class Serving:
             "tap": self._tap,
             "more": self._more,
             "leave": self._leave,
-            "edit": lambda commands: self._edit(self.run.edit(*decode(commands))),
-            "undo": lambda: self._edit(self.run.undo()),
-            "redo": lambda: self._edit(self.run.redo()),
+            "edit": lambda commands, empties: self._edit(self.run.edit(*decode(commands)), empties),
+            "undo": lambda empties: self._edit(self.run.undo(), empties),
+            "redo": lambda empties: self._edit(self.run.redo(), empties),
             "try_edit": lambda commands: try_to_draw(graph, decode(commands)),
             "draw_edit": lambda commands: self._draw(partial(draw, graph, decode(commands))),
             "draw_undo": lambda: self._draw(partial(draw_undo, graph)),
@@ -148,9 +148,9 @@ class Serving:
 
     # --- editing ----------------------------------------------------------------------------------------------------
 
-    async def _edit(self, editing: Coroutine[Any, Any, None]) -> None:
+    async def _edit(self, editing: Coroutine[Any, Any, None], empties: bool) -> None:
         try:
-            async with self._emptied():
+            async with self._emptied() if empties else nullcontext():
                 await editing
         finally:
             editing.close()  # if it has not begun
