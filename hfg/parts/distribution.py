@@ -318,6 +318,8 @@ class Distribution:
             self._asking.over(other.name)
             return
         pause_s = other.died()
+        if not self._is_open:
+            return
         if pause_s is None:
             often = f"it died {LIMIT + 1} times within {WITHIN_S:g} s and is not begun again"
             self._part.finish(

@@ -15,6 +15,7 @@ from hfg.errors import GraphError, HfgError, RunError, UsageError
 from hfg.parts.processes import launching
 from hfg.parts.steering.serving import Serving
 from hfg.testing.edits import drawn
+from hfg.trace import TokenSent
 from hfg_transports.memory import Faults, Network
 from tests.parts.test_from_outside import Scaler, through, with_run
 
@@ -94,18 +95,19 @@ def test_edits_of_several_parts_are_one_history() -> None:
         await run.edit(*FAR)
         await run.edit(c.SetParameter("extra.by", 2000))
         await run.edit(c.SetParameter("a.by", 0))
-        await run.edit(c.Rename("extra", "other"))
+        await run.edit(c.Rename("a", "other"))
         found += await through(run, 0)
         for _ in range(4):
             await run.undo()
             found += await through(run, 0)
         for _ in range(4):
             await run.redo()
-        run.set("other.by", 3000)
+        run.set("extra.by", 3000)
+        run.set("other.by", 1)
         found += await through(run, 0)
         return found
 
-    assert with_run(line(), body) == [2120, 2120, 2122, 1122, 122, 3120]
+    assert with_run(line(), body) == [2120, 2120, 2122, 1122, 122, 3122]
 
 
 @pytest.mark.rule("R4", "L1", "L2")
@@ -164,6 +166,10 @@ def test_tokens_under_way_are_neither_lost_nor_doubled_nor_out_of_order_when_a_p
         ([c.Replace("mid", f"{HERE}:Refuses")], "no device"),
         ([c.Replace("raised", f"{HERE}:more")], "leads from one process to another"),
         ([c.Remove("nobody")], "nobody"),
+        ([c.Enclose(("mid",), "box")], 'subgraph "box" is known to all processes'),
+        ([c.Enclose(("a",), "box")], 'subgraph "box" is known to all processes'),
+        ([c.Rename("mid", "middle")], '"mid" is known to other processes by its path'),
+        ([c.Copy("mid", "mid2")], '"mid" may be at work in another process with values that are not drawn here'),
     ],
 )
 def test_what_no_run_in_several_processes_can_follow_is_refused_and_changes_nothing(commands: Any, said: str) -> None:
@@ -320,6 +326,89 @@ def test_an_edit_of_a_part_that_dies_was_made_or_not_and_nothing_is_lost(parts: 
     ways = [got - old for got, old in zip(found, plain, strict=True)]
     assert [way for way, _ in itertools.groupby(ways)] in ([[0, 1000], [1000]] if done else [[0]])
     assert ways[-1] == (1000 if done else 0)
+
+
+@pytest.mark.rule("R4", "P8", "L2")
+def test_what_was_set_before_an_edit_does_not_come_back_with_the_next_life(parts: dict[str, Any]) -> None:
+    async def body(run: hfg.Run) -> list[int]:
+        run.set("mid.by", 5)
+        run.set("raised.by", 0)
+        await run.edit(c.SetParameter("mid.by", 7))
+        found = await through(run, 0)
+        parts["far"].kill()
+        found += await through(run, 0)
+        run.set("mid.by", 9)
+        parts["far"].kill()
+        return found + await through(run, 0)
+
+    assert with_run(line(), body) == [29, 29, 31]
+
+
+class Said(hfg.Node):
+    """Is told something."""
+
+    @hfg.slot
+    def hear(self) -> None:
+        """Hear it."""
+
+
+class Slow(hfg.Node):
+    """Takes its time to be torn down, and does not answer each value."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    told = hfg.Event(int)
+
+    def process(self, value: int) -> int:
+        self.told.trigger(value)
+        return value
+
+    async def teardown(self) -> None:
+        await asyncio.sleep(5.0)
+
+
+@pytest.mark.rule("R4", "R7", "X3")
+def test_an_edit_is_over_when_it_holds_and_the_trace_is_whole(caplog: pytest.LogCaptureFixture) -> None:
+    """Nodes that are gone are torn down behind it; of what has come nothing is seen that nobody can read."""
+    graph = hfg.Graph()
+    graph.group("far", process=True)
+    first: Any = graph.add(more(by=0), name="first", group="far")
+    slow: Any = graph.add(Slow(), name="slow", group="far", on_error="skip")
+    last: Any = graph.add(more(by=0), name="last", group="far")
+    graph.connect(graph.input("in", int), first.value)
+    graph.connect(first.out, slow.value)
+    graph.connect(slow.out, last.value)
+    graph.connect(last.out, graph.output("out", int))
+    seen: list[Any] = []
+
+    async def body(run: hfg.Run) -> None:
+        run.trace(lambda event: seen.append(event))
+        await through(run, 1)
+        before = run.elapsed()
+        await run.edit(
+            c.Remove("slow"),
+            c.Add(f"{HERE}:more", "new", options={"group": "far", "on_error": "skip"}),
+            c.Connect("first.out", "new.value"),
+            c.Connect("new.out", "last.value"),
+        )
+        assert run.elapsed() - before < 1.0
+        await through(run, 2)
+        await asyncio.sleep(6.0)
+
+    with_run(graph, body)
+    sent = [one for one in seen if isinstance(one, TokenSent) and one.edge == "new.out -> last.value"]
+    assert [one.token.value for one in sent] == [102]
+    assert "callback" not in caplog.text
+
+
+@pytest.mark.rule("G1", "L1")
+def test_a_part_without_nodes_is_none_also_if_an_edge_leads_to_an_empty_subgraph_in_its_group() -> None:
+    graph = hfg.Graph()
+    graph.group("far", process=True)
+    graph.edit(c.AddSubgraph("box", options={"group": "far"}))
+    box: Any = graph["box"]
+    graph.connect(box.activated, graph.add(Said(), name="said").hear)
+    assert hfg.run(graph, clock="virtual").outcome == "done"
 
 
 # --- more than two processes ---

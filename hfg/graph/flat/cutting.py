@@ -134,7 +134,8 @@ class _Cutter:
         if len(homes) == 1:
             return homes.pop()
         if not homes:
-            return _part_of(self.flat.groups.get(scope.options.group or "loop"))
+            home = _part_of(self.flat.groups.get(scope.options.group or "loop"))
+            return home if home in self.home else MAIN  # where no node runs there is no part
         if scope.options.active_for_s is not None:
             self._wrong_scope(scope, "it has active_for_s")
         return None

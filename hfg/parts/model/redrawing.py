@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from hfg.errors import UsageError
 from hfg.graph.editing.changes import Change, ParameterChange
-from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatEdge, FlatGraph
+from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatEdge, FlatGraph, FlatNode
 from hfg.parts.model.inheriting import inheriting, keeping
 
 __all__ = ["Concern", "concerned"]
@@ -43,6 +43,8 @@ def concerned(before: Cutting, after: Cutting, changes: Sequence[Change]) -> Con
     if after.findings:
         raise UsageError(f"the edit is refused, for the graph could not be cut any more: {after.findings[0]}")
     _need_same_parts(before, after)
+    _need_same_subgraphs(before, after)
+    _need_same_names(before, after)
     _need_same_links(before, after)
     reshaped = {name for name in before.parts if _shape(before.parts[name]) != _shape(after.parts[name])}
     parts = set(reshaped)
@@ -77,6 +79,34 @@ def _need_same_parts(before: Cutting, after: Cutting) -> None:
             f'group "{name}" has no process in this run, for no node was in it when it began: put the node into '
             "another group, or end the run and change the graph before the next one"
         )
+
+
+def _need_same_subgraphs(before: Cutting, after: Cutting) -> None:
+    """All parts have the subgraphs, for each derives of its own nodes what they are (G2)."""
+    was, will_be = (
+        {one.path: (id(one.subgraph), one.options) for one in cutting.parts[MAIN].scopes} for cutting in (before, after)
+    )
+    for path in [*was, *will_be]:
+        if was.get(path) != will_be.get(path):
+            raise UsageError(
+                f'subgraph "{path}" is known to all processes, so it can neither come, go nor be another while the '
+                "graph runs: edit what is inside of it, or end the run and change the graph before the next one"
+            )
+
+
+def _need_same_names(before: Cutting, after: Cutting) -> None:
+    """Who looks at a node of another process, or has set a parameter there, knows it by its path."""
+    for part, flat in before.parts.items():
+        if part == MAIN:
+            continue
+        paths = {id(node.node): node.path for node in (*flat.nodes, *_inside(flat))}
+        for node in (*after.parts[part].nodes, *_inside(after.parts[part])):
+            path = paths.get(id(node.node), node.path)
+            if path != node.path:
+                raise UsageError(
+                    f'"{path}" is known to other processes by its path, which stays as it is while the graph runs, so '
+                    f'it cannot become "{node.path}": end the run and change the graph before the next one'
+                )
 
 
 def _need_same_links(before: Cutting, after: Cutting) -> None:
@@ -128,7 +158,7 @@ def _link(edge: CutEdge) -> tuple[Any, ...]:
     return edge.source, edge.target, edge.guarantee, edge.window, _edge(edge.edge)
 
 
-def _inside(flat: FlatGraph) -> Iterator[Any]:
+def _inside(flat: FlatGraph) -> Iterator[FlatNode]:
     """The nodes inside of those that iterate."""
     for node in flat.nodes:
         for inner in node.iteration.walk() if node.iteration is not None else ():

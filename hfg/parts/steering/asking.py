@@ -24,7 +24,7 @@ from hfg.graph.structure.edge import Edge as DrawnEdge
 from hfg.logs import Log
 from hfg.nodetype import Node
 from hfg.parts.model.failing import as_error
-from hfg.parts.model.messages import Call, Failed, Result, Seen
+from hfg.parts.model.messages import Call, Failed, Parcel, Result, Seen
 from hfg.parts.steering.crossing import Crossing
 
 __all__ = ["Asking", "Homes", "Standing"]
@@ -33,6 +33,8 @@ _LOGGER = Log("hfg.parts")
 _NOBODY: Final = 0  # the number of calls whose result nobody waits for
 _CHANGES_NOTHING: Final = ("wait_for", "wait_inputs", "wait_outputs", "wait_paused", "counts", "try_edit")
 """What a part that begins anew is asked again: done twice it is as if done once."""
+
+_PARAMETER: Final = "parameter "  # the keys of what was set begin so
 
 _GONE_WITH_THE_PART: Final = ("edit", "undo", "redo")
 """What nobody has heard of when the part dies before it has answered."""
@@ -206,6 +208,15 @@ class Asking:
     def forget(self, part: str, key: str) -> None:
         """A part that begins anew is not told this any more."""
         self._kept.pop((part, key), None)
+
+    def forget_parameters(self) -> None:
+        """A part that begins anew is sent the graph, and that has them."""
+        for part, key in [one for one in self._kept if one[1].startswith(_PARAMETER)]:
+            del self._kept[part, key]
+
+    def keep_parameter(self, part: str, path: str, parcel: Parcel) -> None:
+        """Have a parameter set in a part, also in its next life."""
+        self.keep(part, f"{_PARAMETER}{path}", "set", path=path, parcel=parcel)
 
     def stand(
         self,

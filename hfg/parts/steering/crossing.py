@@ -33,6 +33,7 @@ from hfg.trace import (
 __all__ = ["Crossing"]
 
 _NOTHING: Final = TokenCodec[Any](None)  # for markers, and where a text takes the place of the value
+_NO_VALUE: Final = _NOTHING.encode(Token(None))[1]
 _MOST_SHOWN: Final = 2**24  # bytes: of what is larger the text is shown
 _AT_EDGES: Final = {"sent": TokenSent, "taken": TokenTaken, "drained": TokenDrained}
 _KIND: Final[dict[type, Any]] = {kind: name for name, kind in _AT_EDGES.items()}
@@ -108,10 +109,18 @@ class Crossing:
 
     def see(self, place: str, parcel: Parcel) -> Token[Any]:
         """Give the token back, or one with the text of its value."""
-        if parcel.shown is None:
-            return (self._codec_at(place) or _NOTHING).decode(parcel.metadata, parcel.value)
-        bare = _NOTHING.decode(parcel.metadata, parcel.value)
-        return Token(parcel.shown, bare.activity, bare.stamp, bare.sequence)
+        shown, value = parcel.shown, parcel.value
+        if shown is None:
+            codec = self._codec_at(place)
+            try:
+                if codec is not None or not value:
+                    return (codec or _NOTHING).decode(parcel.metadata, value)
+            except EncodingError:
+                pass
+            # an edit has changed what passes there, and one of the two sides has not drawn it yet
+            shown, value = f"({len(value)} bytes)", _NO_VALUE
+        bare = _NOTHING.decode(parcel.metadata, value)
+        return Token(shown, bare.activity, bare.stamp, bare.sequence)
 
     def show_event(self, event: TraceEvent) -> Sight:
         """Encode an event of the trace."""

@@ -19,7 +19,7 @@ from hfg.errors import FileError, UsageError
 from hfg.graph import Graph
 from hfg.graph.editing import Transaction, history_of, prepare
 from hfg.graph.editing.changes import Change, undo_all
-from hfg.graph.editing.commands import Command, encode
+from hfg.graph.editing.commands import Command, Copy, encode
 from hfg.graph.flat import MAIN, Cutting, FlatGraph, cut, flatten
 from hfg.graph.structure.history import MOST_STEPS
 from hfg.parts.model.redrawing import Concern, concerned
@@ -85,6 +85,7 @@ class CutEdits:
 
     async def edit(self, commands: Sequence[Command]) -> None:
         """See `Run.edit`."""
+        _refuse_copies(commands)
         async with self._edits.turns.one():
             said = encode(commands)
             where = self._concern(prepare(self._graph, commands, check=False).changes)
@@ -158,6 +159,7 @@ class CutEdits:
             if took_effect:  # also if this is cancelled, or fails, behind it
                 if verb == "edit":
                     self._known.append(history.done[-1])
+                self._asking.forget_parameters()  # the drawing has them, as they are by now
                 self._drawing.again()
                 self._asking.draw_again(self._drawing.flat, self._drawing.cutting)
                 for part in self._asking.others:
@@ -180,6 +182,16 @@ class CutEdits:
         drawn()
         if cancelled is not None:
             raise cancelled
+
+
+def _refuse_copies(commands: Sequence[Command]) -> None:
+    """A copy has the values that parameters have at work, which may be others than those drawn here (P8)."""
+    for command in commands:
+        if isinstance(command, Copy):
+            raise UsageError(
+                f'"{command.path}" may be at work in another process with values that are not drawn here, so it cannot '
+                "be copied while the graph runs in several: Add a node of the same type"
+            )
 
 
 def draw(graph: Graph, commands: Sequence[Command]) -> None:

@@ -137,7 +137,7 @@ class CutRun(Run):
                 super()._set(one, value)
         for one, home in far.items():
             one.node._parameters[one.name] = own_copy(value)
-            self._asking.keep(home, f"parameter {one.path}", "set", path=one.path, parcel=parcels[one])
+            self._asking.keep_parameter(home, one.path, parcels[one])
 
     def wake(self, node: Node | str) -> None:
         """See `Run.wake`."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import inspect
 from collections import deque
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from contextlib import AbstractAsyncContextManager, nullcontext
 from functools import partial
 from typing import Any, Final
@@ -17,6 +17,7 @@ from typing import Any, Final
 from hfg.engine.editing.pausing import Breakpoint
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
+from hfg.engine.model.worker import Worker
 from hfg.engine.observing.report import edge_reports, node_reports
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
@@ -61,11 +62,12 @@ class Serving:
         """
         self._graph = graph
         self._emptied = emptied
+        edits = composition.edits
         self.run = Run(graph, composition)
         self._crossing = Crossing(flat)
         self._composition = composition
         self._say = say
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: set[asyncio.Future[None]] = set()
         self._watching: dict[int, _Watching] = {}
         composition.pausing.when_hit(self._hit)
         self._hits: dict[Breakpoint, int] = {}
@@ -87,9 +89,9 @@ class Serving:
             "tap": self._tap,
             "more": self._more,
             "leave": self._leave,
-            "edit": lambda commands, empties: self._edit(self.run.edit(*decode(commands)), empties),
-            "undo": lambda empties: self._edit(self.run.undo(), empties),
-            "redo": lambda empties: self._edit(self.run.redo(), empties),
+            "edit": lambda commands, empties: self._edit(partial(edits.edit_now, decode(commands)), empties),
+            "undo": lambda empties: self._edit(edits.undo_now, empties),
+            "redo": lambda empties: self._edit(edits.redo_now, empties),
             "try_edit": lambda commands: try_to_draw(graph, decode(commands)),
             "draw_edit": lambda commands: self._draw(partial(draw, graph, decode(commands))),
             "draw_undo": lambda: self._draw(partial(draw_undo, graph)),
@@ -148,13 +150,15 @@ class Serving:
 
     # --- editing ----------------------------------------------------------------------------------------------------
 
-    async def _edit(self, editing: Coroutine[Any, Any, None], empties: bool) -> None:
-        try:
-            async with self._emptied() if empties else nullcontext():
-                await editing
-        finally:
-            editing.close()  # if it has not begun
-        self._crossing.draw(flatten(self._graph))
+    async def _edit(self, now: Callable[[], Awaitable[list[Worker]]], empties: bool) -> None:
+        """Do it, and answer as soon as it holds: those who are gone are torn down behind that."""
+        edits = self._composition.edits
+        async with edits.turns.one(), self._emptied() if empties else nullcontext():
+            gone = await now()
+            self._crossing.draw(flatten(self._graph))
+        leaving = asyncio.ensure_future(edits.leave(gone))
+        self._tasks.add(leaving)
+        leaving.add_done_callback(self._tasks.discard)
 
     def _draw(self, drawn: Callable[[], None]) -> None:
         """What was edited in another part."""
