@@ -107,7 +107,6 @@ class Distribution:
           name: what the run is called, if somebody has given it one.
         """
         self.flat: FlatGraph = cutting.parts[MAIN]
-        self._cutting = cutting
         self._drawing = Drawing(flat, cutting, text, write)
         self._options = dict(options)
         self._launcher = launcher
@@ -136,8 +135,8 @@ class Distribution:
     def take(self, composition: Composition) -> None:
         """Here is the engine of the main part."""
         self._loop = asyncio.get_running_loop()
-        self._part = Part(MAIN, composition, self._cutting.edges_of(MAIN), rests=self._rests)
-        composition.consumers.leave_out(sieve(MAIN, self._cutting.edges))
+        self._part = Part(MAIN, composition, self._drawing.cutting.edges_of(MAIN), rests=self._rests)
+        composition.consumers.leave_out(sieve(MAIN, self._drawing.cutting.edges))
         composition.engine.callbacks.finished.append(self._ended_here)
 
     def face(self, graph: Graph) -> Run:
@@ -160,7 +159,7 @@ class Distribution:
         await self._launcher.prepare({name: self._host(name) for name in self._others}, self._modules)
         if self._launcher.is_in_realm:
             self._standing = Standing(session, self._run, self._run_of_all, self._parts, self._restart)
-        edges = list(self._cutting.edges_of(MAIN))
+        edges = list(self._drawing.cutting.edges_of(MAIN))
         if self._launcher.shares_memory:
             sweep_runs()
         for other in self._others.values():
@@ -172,7 +171,7 @@ class Distribution:
             self._lives,
             edges,
             self._say,
-            remembering(self._cutting),
+            remembering(self._drawing.cutting),
             shares_memory=self._launcher.shares_memory,
             admits=False,
         )
@@ -184,11 +183,11 @@ class Distribution:
             await other.opened
 
     def _host(self, part: str) -> str:
-        return self._cutting.parts[part].groups[part].host
+        return self._drawing.cutting.parts[part].groups[part].host
 
     def _open_ledgers(self) -> None:
         """A part of which something is kept is younger than all who begin anew: those tell it where they stand."""
-        for name, where in keeping(self._cutting).items():
+        for name, where in keeping(self._drawing.cutting).items():
             self._ledgers[name] = ledger_of(where, name)
         kept = [name for name, ledger in self._ledgers.items() if ledger.entry is not None]
         if kept:
@@ -436,9 +435,9 @@ class Distribution:
             lost += found.lost_activity
             if found.clock_within_s:
                 clocks[other.name] = found.clock_within_s
-        for edge in self._cutting.edges:
+        for edge in self._drawing.cutting.edges:
             edges[edge.label] = _joined(edge, halves)
-        order = [node.path for node in _all_nodes(self._cutting)]
+        order = [node.path for node in _all_nodes(self._drawing.cutting)]
         return msgspec.structs.replace(
             report,
             firings=sum(node.firings for node in nodes.values()),

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO, Final, NamedTuple
 
 import msgspec
 import numpy as np
@@ -40,6 +40,16 @@ _NUMBERS: Final = frozenset({int, float, bool})
 _PLAIN: Final = {Token}
 _MARKED_SCHEMA: Final = b'{"title":"hfg marker","type":"object"}'
 _EVENT_SCHEMA: Final = b'{"title":"hfg event","type":"object"}'
+
+
+class _Batch(NamedTuple):
+    """Columns of what was handed over; see `ITEM`."""
+
+    places: Sequence[Any]
+    passed: Sequence[Any]
+    stamps: Sequence[float]
+    sequences: Sequence[int]
+    whens: Sequence[float]
 
 
 class RecordingWriter:
@@ -142,17 +152,16 @@ class RecordingWriter:
                 self._file.finish()
                 return
 
-    def _write(self, batch: list[Any]) -> None:
+    def _write(self, items: list[Any]) -> None:
         """Encode what was handed over, all together, and put it into the chunk."""
         self._declare_places()
         if not self._file.chunk_messages:
             self._chunk_since = time.monotonic()
-        places, passed, stamps, sequences, whens = (batch[at::ITEM] for at in range(ITEM))
-        columns = self._plain_columns(places, passed, stamps, sequences, whens)
-        bodies, channels, sequences, stamps = columns or self._columns(places, passed, stamps, sequences, whens)
+        columns = _Batch(*(items[at::ITEM] for at in range(ITEM)))
+        bodies, channels, sequences, stamps = self._plain_columns(columns) or self._columns(columns)
         lines = self._encode.encode_lines(bodies).split(b"\n")
         lines.pop()  # behind the last line
-        times = np.maximum.accumulate(np.maximum(_nanoseconds(whens), self._last_ns))
+        times = np.maximum.accumulate(np.maximum(_nanoseconds(columns.whens), self._last_ns))
         self._last_ns = times[-1]
         self._file.add_messages(channels, sequences, times, _nanoseconds(stamps), lines)
         if self._file.chunk_bytes > _CHUNK_BYTES or self._file.chunk_messages > _CHUNK_MESSAGES:
@@ -165,47 +174,29 @@ class RecordingWriter:
             place.channel = self._file.add_channel(place.path, schema, "json", place.metadata)
             self._declared += 1
 
-    def _plain_columns(
-        self,
-        places: Sequence[Any],
-        passed: Sequence[Any],
-        stamps: Sequence[float],
-        sequences: Sequence[int],
-        whens: Sequence[float],
-    ) -> Any:
+    def _plain_columns(self, batch: _Batch) -> Any:
         """Where all are finite numbers, they need not be looked at one by one; None: there is something else."""
+        places, bodies, stamps, sequences, whens = batch
         counts = Counter(places)
         if None in counts or any(place.keep is not None for place in counts):
             return None
-        values, bodies = passed, passed
-        if {*map(type, passed)} == _PLAIN:
-            values = [token.value for token in passed]
-            stamps, sequences = [token.stamp for token in passed], [token.sequence for token in passed]
+        values = bodies
+        if {*map(type, bodies)} == _PLAIN:
+            values = [token.value for token in bodies]
+            stamps, sequences = [token.stamp for token in bodies], [token.sequence for token in bodies]
         else:
-            bodies = [*map(PlainToken, passed, itertools.repeat(0), stamps, sequences)]
-        if not _NUMBERS.issuperset(map(type, values)):
-            return None
-        try:
-            if not isfinite(sum(values)) or (self._exact and stamps != whens):
-                return None
-        except OverflowError:
+            bodies = [*map(PlainToken, bodies, itertools.repeat(0), stamps, sequences)]
+        if not _are_finite(values) or (self._exact and stamps != whens):
             return None
         channels = [place.channel for place in places]
         for place, count in counts.items():
             place.values += count
         return bodies, channels, sequences, stamps
 
-    def _columns(
-        self,
-        places: Sequence[Any],
-        passed: Sequence[Any],
-        stamps: Sequence[float],
-        sequences: Sequence[int],
-        whens: Sequence[float],
-    ) -> Any:
+    def _columns(self, batch: _Batch) -> Any:
         bodies: list[Any] = []
         rest: list[tuple[int, int, float]] = []
-        for place, token, stamp, sequence, when in zip(places, passed, stamps, sequences, whens, strict=True):
+        for place, token, stamp, sequence, when in zip(*batch, strict=True):
             if place is None:
                 bodies.append(token)
                 rest.append((self._own_channel(EVENTS), 0, when))
@@ -256,6 +247,14 @@ def open_new(path: Path, *, force: bool) -> BinaryIO:
         ) from None
     except OSError as error:
         raise UsageError(f"the recording cannot be written to {path}: {error.strerror}") from None
+
+
+def _are_finite(values: Sequence[Any]) -> bool:
+    """Whether all are numbers that JSON has."""
+    try:
+        return _NUMBERS.issuperset(map(type, values)) and isfinite(sum(values))
+    except OverflowError:
+        return False
 
 
 def _nanoseconds(seconds: Sequence[float]) -> npt.NDArray[np.uint64]:

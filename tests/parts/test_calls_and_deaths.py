@@ -10,8 +10,7 @@ import pytest
 
 import hfg
 from hfg.errors import RunError
-from hfg.parts.processes import launching
-from hfg_transports.memory import Faults, Network
+from tests.parts.mortal import mortal_parts
 from tests.parts.test_from_outside import fed, through
 from tests.semantics.nodes import drive
 
@@ -20,19 +19,8 @@ SOON_S = 5.0
 
 @pytest.fixture
 def parts(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """The parts of the next run, by name; their network loses and delays datagrams."""
-    parts: dict[str, Any] = {}
-
-    class Made(launching.LoopLauncher):
-        def __init__(self) -> None:
-            super().__init__(network=Network(Faults(loss=0.2, repetition=0.1, delay_s=(0.001, 0.003)), seed=3))
-
-        async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-            parts[part] = await super().launch(run, part, host, lives)
-            return parts[part]
-
-    monkeypatch.setattr(launching, "LoopLauncher", Made)
-    return parts
+    """The parts of the next run, by name."""
+    return mortal_parts(monkeypatch)
 
 
 def asked(parts: dict[str, Any], call: Callable[[hfg.Run], Coroutine[Any, Any, Any]], dies_s: float) -> Any:

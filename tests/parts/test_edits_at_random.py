@@ -14,9 +14,7 @@ import pytest
 import hfg
 from hfg import commands as c
 from hfg.errors import RunError, UsageError
-from hfg.parts.processes import launching
-from hfg.parts.processes.launching import LoopLauncher
-from hfg_transports.memory import Faults, Network
+from tests.parts.mortal import mortal_parts
 from tests.parts.test_edits import HERE, more
 from tests.parts.test_from_outside import through, with_run
 
@@ -32,24 +30,6 @@ def quiet() -> Iterator[None]:
     logging.disable(logging.CRITICAL)
     yield
     logging.disable(logging.NOTSET)
-
-
-class Kills:
-    """The parts of the runs of one seed, over a network that loses datagrams."""
-
-    def __init__(self, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.parts: dict[str, Any] = {}
-        parts = self.parts
-
-        class Made(LoopLauncher):
-            def __init__(self) -> None:
-                super().__init__(network=Network(Faults(loss=0.2, repetition=0.1, delay_s=(0.001, 0.003)), seed=seed))
-
-            async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
-                parts[part] = await super().launch(run, part, host, lives)
-                return parts[part]
-
-        monkeypatch.setattr(launching, "LoopLauncher", Made)
 
 
 def row(processes: int) -> hfg.Graph:
@@ -108,11 +88,11 @@ async def edit_and_kill(run: hfg.Run, choose: random.Random, processes: int, par
 def check(seed: int, monkeypatch: pytest.MonkeyPatch) -> int:
     choose = random.Random(seed)
     processes = choose.randint(1, 3)
-    kills = Kills(seed, monkeypatch)
+    parts = mortal_parts(monkeypatch, seed)
 
     async def body(run: hfg.Run) -> int:
         reading = asyncio.create_task(through(run, *range(VALUES)))
-        made = await edit_and_kill(run, choose, processes, kills.parts)
+        made = await edit_and_kill(run, choose, processes, parts)
         async with asyncio.timeout(SOON_S):
             found = await reading
         assert [value % APART for value in found] == [value + 3 * processes for value in range(VALUES)], seed

@@ -247,3 +247,34 @@ def test_an_end_that_its_own_firing_frees_does_not_let_a_node_pass_those_who_wai
     assert fast == interpreted
     ended = [json.loads(data)["node"] for _, _, data in fast if b"NodeEnded" in data]
     assert ended == ["source", "c", "beside", "behind"]
+
+
+@pytest.mark.rule("R7", "R4")
+def test_who_stops_looking_amid_a_wave_is_told_of_what_has_passed_before(tmp_path: Path, waves: list[int]) -> None:
+    recordings: list[Any] = []
+
+    @hfg.node
+    def stops(value: int) -> int:
+        if value == 6:
+            recordings[0].stop()
+        return value
+
+    def begin(run: hfg.Run) -> None:
+        recordings.append(record(run, tmp_path / "a.mcap"))
+
+    graph = hfg.Graph()
+    source = graph.add(nodes.script(values=(1, 2, 3, 4, 5)), name="source")
+    twice, stopping, end = graph.add(nodes.double(), name="twice"), graph.add(stops()), graph.add(nodes.Tally())
+    graph.connect(source.out, twice.value)
+    graph.connect(twice.out, stopping.ports.inputs["value"])
+    graph.connect(stopping.ports.outputs["out"], end.value)
+    hfg.run(graph, clock="virtual", begin=begin)
+    assert end.count == 5
+    assert waves
+    recordings[0]._writer.join()
+    found: dict[str, list[int]] = {}
+    with (tmp_path / "a.mcap").open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            found.setdefault(channel.topic, []).append(json.loads(message.data).get("value"))
+    assert found["stops.out"] == [2, 4]
+    assert found["twice.out"][:2] == [2, 4]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Collection, Coroutine, Iterable, Sequence, Set
+from collections.abc import Awaitable, Callable, Collection, Coroutine, Iterable, Sequence, Set
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -99,15 +99,20 @@ class Edits:
 
     async def edit(self, commands: Sequence[Command]) -> None:
         """See `Run.edit`."""
-        async with self.turns.one():
-            gone = await self.edit_now(commands)
-        await self.leave(gone)
+        await self._in_turn(partial(self.edit_now, commands))
 
     async def reload(self, module: str | ModuleType) -> None:
         """See `Run.reload`."""
+        await self._in_turn(partial(self._reload_now, module))
+
+    async def _reload_now(self, module: str | ModuleType) -> list[Worker]:
+        with reloaded(self._graph, module) as commands:
+            return await self.edit_now(commands)
+
+    async def _in_turn(self, now: Callable[[], Awaitable[list[Worker]]]) -> None:
+        """One edit after the other; those who are gone are torn down behind the turn."""
         async with self.turns.one():
-            with reloaded(self._graph, module) as commands:
-                gone = await self.edit_now(commands)
+            gone = await now()
         await self.leave(gone)
 
     async def edit_now(self, commands: Sequence[Command]) -> list[Worker]:
@@ -120,9 +125,7 @@ class Edits:
 
     async def undo(self) -> None:
         """See `Run.undo`."""
-        async with self.turns.one():
-            gone = await self.undo_now()
-        await self.leave(gone)
+        await self._in_turn(self.undo_now)
 
     async def undo_now(self) -> list[Worker]:
         """Take the last edit back; gives who is to be torn down behind the turn."""
@@ -133,9 +136,7 @@ class Edits:
 
     async def redo(self) -> None:
         """See `Run.redo`."""
-        async with self.turns.one():
-            gone = await self.redo_now()
-        await self.leave(gone)
+        await self._in_turn(self.redo_now)
 
     async def redo_now(self) -> list[Worker]:
         """Carry out again what was undone last; gives who is to be torn down behind the turn."""

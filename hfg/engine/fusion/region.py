@@ -255,15 +255,7 @@ class Region:
         if head.outputs.missing:
             head.hold(self.held_entries)
         elif self.held_entries:
-            if len(self.order) > 1:  # then those behind it free its outputs, and by that it lets go of what it took
-                agenda.consider(head)
-                release(self.held_entries)
-            elif self.ending:  # the END that may come of it finds the head amid its firing, and enables it by its end
-                head.be_in_wave()
-                release(self.held_entries)
-                agenda.idle_again(head)
-            else:
-                release(self.held_entries)
+            self._let_go(head)
         if self.doomed:
             self.dissolve()
         elif self._wave is self._measured and all(worker.meter.left <= 0 for worker in self.order):
@@ -275,6 +267,18 @@ class Region:
             self._go_on(called_off)
         else:
             agenda.consider(head)
+
+    def _let_go(self, head: Worker) -> None:
+        """Nothing the head has sent is waited for, so what it took is processed (F5)."""
+        if len(self.order) > 1:  # those behind it freed its outputs, when its own firing was over
+            agenda.consider(head)
+            release(self.held_entries)
+        elif self.ending:  # the END that may come of it finds the head amid its firing, and enables it by its end (F1)
+            head.be_in_wave()
+            release(self.held_entries)
+            agenda.idle_again(head)
+        else:
+            release(self.held_entries)
 
     def measure_on(self) -> None:
         """What was measured has been read: measure the next waves."""
@@ -364,7 +368,7 @@ class Region:
         """Members before k have fired and k is amid its firing: let the interpreted way see it so."""
         self.waves += found["done"]
         self.settle_counts()
-        tell_rest(self.schedule.outs, self._wave.untold.get(k, []), found, self.core.now)
+        tell_rest(self._wave.untold.get(k, ()), found, self.core.now)
         self.armed = self.running = False
         stamp = found["stamp"]
         silent_calls: set[SyncEdge] = set()

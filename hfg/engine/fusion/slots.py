@@ -16,7 +16,7 @@ from hfg.engine.model.worker import CALLS_BLOCKED, RunningEvent, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
 from hfg.engine.rules.calls import await_call
-from hfg.engine.rules.modifiers import derive_scopes, set_active, tell_activity
+from hfg.engine.rules.modifiers import derive_scopes, tell_activity
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import bring_activity, trigger
 from hfg.ports.edges import EventEdge, SyncEdge
@@ -53,7 +53,7 @@ def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
     queue = edge.queue if type(edge) is EventEdge else None
     if handler is None or (edge.while_active and queue is not None):
         return firing.step
-    core, node, general = worker.core, worker.node, firing.step
+    core, general = worker.core, firing.step
     calls: Any = worker.calls
     lies: Any = edge  # a synchronous one, where there is no queue
     held = (edge,) if queue is None and lies.sequential else ()
@@ -76,10 +76,7 @@ def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
             if lies.full:
                 freed(lies)
         if token.activity:
-            if core.seldom is None:
-                worker.active = node._active = token.activity > 0
-            else:
-                set_active(worker, token.activity > 0, "token")
+            _take_activity(worker, token.activity > 0)
         if not while_active or worker.active:  # T4: it was when the token came
             core.speaker = worker
             worker.stamp = token.stamp
@@ -191,11 +188,17 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
     return emit
 
 
+def _take_activity(worker: Worker, active: bool) -> None:
+    """A6: what the call brings acts before it; nothing depends on the activity of such a node but itself."""
+    if worker.active != active:
+        worker.active = worker.node._active = active
+        tell_activity(worker, "token")
+
+
 def _give_activity(worker: Worker, target: Worker) -> None:
     """A5: what carries activity takes it from the sender; it stays its right until the call is over (A3)."""
     if worker.active:
         worker.give_away_activity()
-        if worker.core.seldom is not None:
-            tell_activity(worker, "sent")
+        tell_activity(worker, "sent")
     bring_activity(target)
     derive_scopes(worker.core)

@@ -8,18 +8,35 @@ and at a side exit. Stands on the model.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from typing import Any, TypeAlias
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 from hfg.engine.model.looks import Look, WaveLook, look_inside
 
-__all__ = ["Outs", "Passed", "Telling", "looks_of", "tell_rest", "together_of"]
+__all__ = ["Outs", "Passed", "Telling", "tell_rest"]
 
 Outs: TypeAlias = list[list[tuple[Any, int, "int | None"]]]
-Passed: TypeAlias = tuple[int, int, int]
-"""A token that has passed: the member that has sent it, which of its live edges, which of its outputs."""
+Together: TypeAlias = Callable[[tuple[Any, ...]], None]
 
 _Say: TypeAlias = Callable[[str], None]
+
+
+class Passed(NamedTuple):
+    """A token that has passed from member to member, of which somebody is to be told.
+
+    Attributes:
+      k: the member that has sent it.
+      number: of the edge among those of the member.
+      output: of the member.
+      edge: over which it has passed.
+      look: who is to be told; also if he looks no more by the time.
+    """
+
+    k: int
+    number: int
+    output: int
+    edge: Any
+    look: WaveLook
 
 
 class Telling:
@@ -27,6 +44,7 @@ class Telling:
 
     Attributes:
       looks: who looks at the edges that lead from member to member; by member and edge, as in `Schedule.outs`.
+      together: who is told of a wave together, in the order of their numbers in the text.
       untold: what has passed before the call of each member, and nobody has been told.
     """
 
@@ -34,8 +52,11 @@ class Telling:
         self._outs = outs
         self._say = say
         self._real = real
-        self.looks = looks_of(outs)
-        self._together = _together(self.looks)
+        self.looks: list[list[Look | None]] = [
+            [None if to is None else look_inside(edge) for edge, _, to in out] for out in outs
+        ]
+        told = [look.together for look in itertools.chain(*self.looks) if isinstance(look, WaveLook)]
+        self.together: list[Together] = list(dict.fromkeys(told))
         self._waiting: list[Passed] = []
         self.untold: dict[int, list[Passed]] = {}
 
@@ -46,13 +67,13 @@ class Telling:
     def bind(self) -> None:
         """Who looks, and what they are told of, is found once."""
         say = self._say
-        for number in range(len(self._together)):
+        for number in range(len(self.together)):
             say(f"together{number} = names.together[{number}]")
         for k, looks in enumerate(self.looks):
             for number, look in enumerate(looks):
                 if look is not None:
                     say(f"e{k}_{number} = names.edges[{k}][{number}]")
-                if type(look) is WaveLook:
+                if isinstance(look, WaveLook):
                     say(f"p{k}_{number} = names.looks[{k}][{number}].place")
                 elif look is not None:
                     say(f"look{k}_{number} = names.looks[{k}][{number}]")
@@ -60,10 +81,10 @@ class Telling:
     def passed(self, k: int, number: int, output: int) -> None:
         """A token is sent from member to member."""
         look = self.looks[k][number]
-        if type(look) is WaveLook:
-            if self._real and not any(one == k for one, _, _ in self._waiting):
+        if isinstance(look, WaveLook):
+            if self._real and not any(one.k == k for one in self._waiting):
                 self._say(f"at{k} = monotonic() + epoch")
-            self._waiting.append((k, number, output))
+            self._waiting.append(Passed(k, number, output, self._outs[k][number][0], look))
         elif look is not None:
             self.tell()
             value = f"NO_MESSAGE if v{k}_{output} is None else v{k}_{output}"
@@ -76,15 +97,15 @@ class Telling:
         self._say("nth = region.waves + done + 1")
         if not self._real:
             self._say("at = now()")
-        for together, who in self._together.items():
-            told = [
-                f"p{k}_{number}, v{k}_{output}, stamp, e{k}_{number}.sent + nth, {f'at{k}' if self._real else 'at'}"
-                for k, number, output in self._waiting
-                if self.looks[k][number].together == together  # type: ignore[union-attr]  # only these wait
-            ]
+        for who, together in enumerate(self.together):
+            told = [self._entries(one) for one in self._waiting if one.look.together == together]
             if told:
-                self._say(f"{who}(({', '.join(told)}))")
+                self._say(f"together{who}(({', '.join(told)}))")
         self._waiting.clear()
+
+    def _entries(self, one: Passed) -> str:
+        place, at = f"{one.k}_{one.number}", f"at{one.k}" if self._real else "at"
+        return f"p{place}, v{one.k}_{one.output}, stamp, e{place}.sent + nth, {at}"
 
     def before_call(self, k: int) -> None:
         """Member k is called: a side exit from here has to tell the rest."""
@@ -99,26 +120,8 @@ class Telling:
         self._waiting = waiting
 
 
-def looks_of(outs: Outs) -> list[list[Look | None]]:
-    """Who looks at the edges that lead from member to member."""
-    return [[None if to is None else look_inside(edge) for edge, _, to in out] for out in outs]
-
-
-def _together(looks: list[list[Look | None]]) -> dict[Callable[[tuple[Any, ...]], None], str]:
-    """Those who are told of a wave together, each with its name in the text."""
-    found = dict.fromkeys(look.together for look in itertools.chain(*looks) if type(look) is WaveLook)
-    return {together: f"together{number}" for number, together in enumerate(found)}
-
-
-def together_of(looks: list[list[Look | None]]) -> list[Callable[[tuple[Any, ...]], None]]:
-    """The same, in the order of their names."""
-    return list(_together(looks))
-
-
-def tell_rest(outs: Outs, untold: list[Passed], found: dict[str, Any], now: Callable[[], float]) -> None:
+def tell_rest(untold: Sequence[Passed], found: dict[str, Any], now: Callable[[], float]) -> None:
     """The wave has come to a side exit: tell what its locals hold. The counts of the edges are settled up to it."""
-    for k, number, output in untold:
-        edge = outs[k][number][0]
-        look: Any = look_inside(edge)
+    for k, _, output, edge, look in untold:
         when = found[f"at{k}"] if f"at{k}" in found else now()
         look.together((look.place, found[f"v{k}_{output}"], found["stamp"], edge.sent + 1, when))

@@ -20,7 +20,7 @@ from types import CodeType, CoroutineType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hfg.engine.fusion.schedule import asks_who_hears
-from hfg.engine.fusion.telling import Passed, Telling, looks_of, together_of
+from hfg.engine.fusion.telling import Passed, Telling
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import make_room, release
@@ -71,14 +71,14 @@ def write_wave(region: Region, writer: Writer, *, to: Any = None) -> Wave:
     _show(name, text, writer.calls, [worker.path for worker in region.order])
     names: dict[str, Any] = {}
     exec(_renamed(_compiled(text), name), names)
-    bound = names["build"](to or region, _Names(region, measured), *_TOOLS)
+    bound = names["build"](to or region, _Names(region, measured, writer.telling), *_TOOLS)
     return Wave(bound[0], writer.calls, bound[1].__code__, writer.telling.untold)
 
 
 class _Names:
     """What the text of a wave takes from its region, by the number of the member."""
 
-    def __init__(self, region: Region, measured: bool) -> None:
+    def __init__(self, region: Region, measured: bool, telling: Telling) -> None:
         core = region.core
         host: Any = core.host
         order = region.order
@@ -94,8 +94,8 @@ class _Names:
         self.calls = [_code_of(worker) for worker in order]
         self.unset = [worker.unset for worker in order]
         self.edges = [[edge for edge, _, _ in out] for out in region.schedule.outs]
-        self.looks = looks_of(region.schedule.outs)
-        self.together = together_of(self.looks)
+        self.looks = telling.looks
+        self.together = telling.together
         self.listeners = [worker.listeners for worker in order]
         self.took = [worker.meter.took if measured else None for worker in order]
         self.splits = [worker.node._split for worker in order]

@@ -53,15 +53,14 @@ def set_active(worker: Worker, active: bool, cause: ActivityCause) -> None:
     # under the virtual clock code in a thread sees what was when it began, or chance would say what it sees (R6)
     if node is not None and (worker.job is None or worker.job.held is None):
         node._active = active
-    if core.seldom is not None:
-        tell_activity(worker, cause)
+    tell_activity(worker, cause)
     if not worker.watched:
         return
     core.upstairs.activity_changed(worker, active)
 
 
 def tell_activity(worker: Worker, cause: ActivityCause) -> None:
-    """Somebody listens: it has become active, or is no longer (R7)."""
+    """It has become active, or is no longer: tell who listens, if somebody does (R7)."""
     core = worker.core
     if core.seldom is not None:
         core.seldom(ActivityChanged(core.now(), worker.path, worker.active, cause))

@@ -109,9 +109,11 @@ class _Cutter:
                 )
                 continue
             made[by].add_gate(gate)
+        return Cutting({name: part.flat for name, part in made.items()}, self._numbered(), self.findings)
+
+    def _numbered(self) -> list[CutEdge]:
         numbers = {label: number for number, label in enumerate(sorted(edge.label for edge in self.edges))}
-        edges = [msgspec.structs.replace(edge, number=numbers[edge.label]) for edge in self.edges]
-        return Cutting({name: part.flat for name, part in made.items()}, edges, self.findings)
+        return [msgspec.structs.replace(edge, number=numbers[edge.label]) for edge in self.edges]
 
     # --- who is where ---
 

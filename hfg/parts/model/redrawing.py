@@ -6,7 +6,7 @@ both ends of a link would have to change at the same moment. Decides, never wait
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from hfg.errors import UsageError
@@ -47,12 +47,9 @@ def concerned(before: Cutting, after: Cutting, changes: Sequence[Change]) -> Con
     _need_same_names(before, after)
     _need_same_links(before, after)
     reshaped = {name for name in before.parts if _shape(before.parts[name]) != _shape(after.parts[name])}
-    parts = set(reshaped)
-    homes = {id(node.node): name for name, flat in after.parts.items() for node in flat.nodes}
-    homes |= {id(one.node): name for name, flat in after.parts.items() for one in _inside(flat)}
-    for change in changes:
-        if isinstance(change, ParameterChange):
-            parts.add(homes.get(id(change.node), MAIN))
+    homes = {id(node.node): name for name, flat in after.parts.items() for node in _all_nodes(flat)}
+    valued = {homes.get(id(change.node), MAIN) for change in changes if isinstance(change, ParameterChange)}
+    parts = reshaped | valued
     if len(parts) > 1:
         raise UsageError(
             f"the edit concerns {_listed(parts)} at once, and there is no moment that several processes share: make "
@@ -86,12 +83,11 @@ def _need_same_subgraphs(before: Cutting, after: Cutting) -> None:
     was, will_be = (
         {one.path: (id(one.subgraph), one.options) for one in cutting.parts[MAIN].scopes} for cutting in (before, after)
     )
-    for path in [*was, *will_be]:
-        if was.get(path) != will_be.get(path):
-            raise UsageError(
-                f'subgraph "{path}" is known to all processes, so it can neither come, go nor be another while the '
-                "graph runs: edit what is inside of it, or end the run and change the graph before the next one"
-            )
+    for path in _others(was, will_be):
+        raise UsageError(
+            f'subgraph "{path}" is known to all processes, so it can neither come, go nor be another while the '
+            "graph runs: edit what is inside of it, or end the run and change the graph before the next one"
+        )
 
 
 def _need_same_names(before: Cutting, after: Cutting) -> None:
@@ -99,8 +95,8 @@ def _need_same_names(before: Cutting, after: Cutting) -> None:
     for part, flat in before.parts.items():
         if part == MAIN:
             continue
-        paths = {id(node.node): node.path for node in (*flat.nodes, *_inside(flat))}
-        for node in (*after.parts[part].nodes, *_inside(after.parts[part])):
+        paths = {id(node.node): node.path for node in _all_nodes(flat)}
+        for node in _all_nodes(after.parts[part]):
             path = paths.get(id(node.node), node.path)
             if path != node.path:
                 raise UsageError(
@@ -111,12 +107,11 @@ def _need_same_names(before: Cutting, after: Cutting) -> None:
 
 def _need_same_links(before: Cutting, after: Cutting) -> None:
     was, will_be = ({edge.label: _link(edge) for edge in one.edges} for one in (before, after))
-    for label in [*was, *will_be]:
-        if was.get(label) != will_be.get(label):
-            raise UsageError(
-                f'"{label}" leads from one process to another, and such edges stay as they are while the graph runs: '
-                "edit what lies within one process, or end the run and change the graph before the next one"
-            )
+    for label in _others(was, will_be):
+        raise UsageError(
+            f'"{label}" leads from one process to another, and such edges stay as they are while the graph runs: '
+            "edit what lies within one process, or end the run and change the graph before the next one"
+        )
 
 
 def _need_same_promises(before: Cutting, after: Cutting) -> None:
@@ -127,6 +122,11 @@ def _need_same_promises(before: Cutting, after: Cutting) -> None:
             "one on each edge that leaves, and by this edit that would be otherwise: keep to it, or end the run and "
             "change the graph before the next one"
         )
+
+
+def _others(was: Mapping[str, Any], will_be: Mapping[str, Any]) -> list[str]:
+    """What comes, goes, or is another."""
+    return [name for name in {**was, **will_be} if was.get(name) != will_be.get(name)]
 
 
 def _listed(parts: set[str]) -> str:
@@ -140,7 +140,7 @@ def _shape(flat: FlatGraph) -> tuple[Any, ...]:
     scopes = [(one.path, one.options, [names[member] for member in one.members]) for one in flat.scopes if one.members]
     gates = [(_name(flat, gate.target), _name(flat, gate.by), gate.idle_rate_hz) for gate in flat.gates]
     nodes = [(id(node.node), node.path, node.options) for node in flat.nodes]
-    inner = [_shape(one) for node in flat.nodes if node.iteration is not None for one in [node.iteration]]
+    inner = [_shape(node.iteration) for node in flat.nodes if node.iteration is not None]
     return nodes, [_edge(edge) for edge in flat.edges], scopes, sorted(gates, key=repr), inner
 
 
@@ -158,8 +158,9 @@ def _link(edge: CutEdge) -> tuple[Any, ...]:
     return edge.source, edge.target, edge.guarantee, edge.window, _edge(edge.edge)
 
 
-def _inside(flat: FlatGraph) -> Iterator[FlatNode]:
-    """The nodes inside of those that iterate."""
+def _all_nodes(flat: FlatGraph) -> Iterator[FlatNode]:
+    """Also those inside of nodes that iterate."""
     for node in flat.nodes:
+        yield node
         for inner in node.iteration.walk() if node.iteration is not None else ():
             yield from inner.nodes

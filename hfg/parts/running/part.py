@@ -131,9 +131,12 @@ class Part:
         return self.composition.engine
 
     def _look_whether_clear(self) -> None:
-        waiting = self._cleared is not None and not self._cleared.done()
-        if waiting and all(inlet.is_clear for inlet in self.inlets.values()):
-            self._cleared.set_result(None)  # type: ignore[union-attr]  # it waits
+        cleared = self._cleared
+        if cleared is not None and not cleared.done() and self._is_clear():
+            cleared.set_result(None)
+
+    def _is_clear(self) -> bool:
+        return all(inlet.is_clear for inlet in self.inlets.values())
 
     def _find_last(self) -> list[Worker]:
         """Who fires and sends nothing on; what stands for a subgraph never fires."""
@@ -162,7 +165,7 @@ class Part:
         for inlet in self.inlets.values():
             inlet.hold(True)
         try:
-            while not all(inlet.is_clear for inlet in self.inlets.values()):
+            while not self._is_clear():
                 self._cleared = asyncio.get_running_loop().create_future()
                 self.engine.kick()
                 await self._cleared
