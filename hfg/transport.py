@@ -29,6 +29,7 @@ __all__ = [
     "Answer",
     "Buffer",
     "Closing",
+    "Datagrams",
     "Delivery",
     "EncodedToken",
     "Guarantee",
@@ -126,23 +127,12 @@ class Publisher(Protocol):
 
 
 @runtime_checkable
-class Session(Protocol):
-    """One program's end of a transport, on one event loop.
-
-    Its methods are called on that loop, and that is where it calls back. All of it is bounded in memory and time.
-    """
-
-    @property
-    def host(self) -> str:
-        """What this computer is called there; the agent of a host has the same name."""
+class Datagrams(Protocol):
+    """What carries datagrams, on one event loop: all that a link needs of a transport."""
 
     @property
     def largest_message(self) -> int:
         """The most bytes of header and payload together."""
-
-    @property
-    def failed(self) -> int:
-        """How many callbacks have raised."""
 
     def publisher(self, key: str, traffic: Traffic) -> Publisher:
         """Make what puts datagrams on a key.
@@ -153,6 +143,22 @@ class Session(Protocol):
 
     def subscribe(self, key: str, receive: Receive) -> Closing:
         """Have all datagrams of one key that are put from about now on, also by this session itself."""
+
+
+@runtime_checkable
+class Session(Datagrams, Protocol):
+    """One program's end of a transport, on one event loop.
+
+    Its methods are called on that loop, and that is where it calls back. All of it is bounded in memory and time.
+    """
+
+    @property
+    def host(self) -> str:
+        """What this computer is called there; the agent of a host has the same name."""
+
+    @property
+    def failed(self) -> int:
+        """How many callbacks have raised."""
 
     def announce(self, name: str, metadata: bytes = b"") -> Closing:
         """Say that somebody is here, until it is closed, the session is, or the program ends in whatever way.

@@ -48,6 +48,7 @@ FLOORS = {
     "hfg.links": 4,
     "hfg.links.running": 5,
     "hfg.links.meeting": 5,
+    "hfg.links.local": 5,
     "hfg.timeline": 4,
     "hfg.engine": 5,
     "hfg.nodes": 6,

@@ -5,10 +5,12 @@ producer  <- peer     the exact link's sending end: numbers, windows, evidence, 
 consumer              the exact link's receiving end: order, repetitions, credits, fencing
 bounded               both ends of the link that may lose some and counts them
 running               the ends at work: over a session of a transport, on an event loop
+local                 straight from one process to another of the same host, beside a session
 offers                what programs that meet by a name say of themselves, and who fits whom
 meeting               these programs: the publishing and the subscribing end
 
-All but `running` and `meeting` are plain state machines: frames, tokens and the time go in, frames and tokens come out.
+All but `running`, `local` and `meeting` are plain state machines: frames, tokens and the time go in, frames and tokens
+come out.
 """
 
 from hfg.links.bounded import BoundedConsumer, BoundedProducer

@@ -1,7 +1,7 @@
 """The ends of links at work: over a session of a transport, on the event loop that is running.
 
-What is sent in one turn of the loop leaves in one datagram at its end, and so do the words on what is done; a quarter
-of a window leaves at once, for there is work for the other end. Nothing here decides: that is done by the machines
+What is sent in one turn of the loop leaves in one datagram at its end, and so do the words on what is done; what is sent
+while nothing is under way, and a quarter of a window, leaves at once, for there is work for the other end. Nothing here decides: that is done by the machines
 beside this module, asked after each burst, at the end of each turn in which something was sent or done, and at the time
 when one has something to say by itself.
 """
@@ -20,7 +20,7 @@ from hfg.links.bounded import BoundedConsumer, BoundedProducer
 from hfg.links.consumer import ExactConsumer
 from hfg.links.frames import Outgoing
 from hfg.links.producer import ExactProducer
-from hfg.transport import Buffer, Closing, Delivery, EncodedToken, Message, Position, Publisher, Session, Traffic
+from hfg.transport import Buffer, Closing, Datagrams, Delivery, EncodedToken, Message, Position, Publisher, Traffic
 
 __all__ = ["BoundedReceiver", "BoundedSender", "LinkReceiver", "LinkSender"]
 
@@ -114,7 +114,7 @@ class LinkSender:
     """The sending end of an exact link at work.
 
     Args:
-      session: of the transport, on the running loop.
+      session: of the transport, or what else carries datagrams, on the running loop.
       name: of the link, as a key; both ends use the same.
       epoch: which life of the producer this is.
       released: called when more tokens are released than before.
@@ -125,7 +125,7 @@ class LinkSender:
     """
 
     def __init__(
-        self, session: Session, name: str, *, epoch: int, released: Callable[[], None] | None = None, **options: Any
+        self, session: Datagrams, name: str, *, epoch: int, released: Callable[[], None] | None = None, **options: Any
     ) -> None:
         room = session.largest_message - _HEADROOM
         options = {"largest_token": room, "largest_batch": min(60_000, room)} | options
@@ -160,8 +160,9 @@ class LinkSender:
             raise TransportError(f'link "{self.name}" is closed')
         machine = self.machine
         number = machine.send(token, position)
-        if not machine.free or machine.unsent >= self._portion:
-            self._flush()  # nothing can join it, or it is enough
+        unsent = machine.unsent
+        if unsent == machine.unfinished or unsent >= self._portion or not machine.free:
+            self._flush()  # nobody works on what was sent before, or it is enough, or nothing can join it
         elif not self._batch.asked:
             self._batch.ask()
         return number
@@ -293,7 +294,7 @@ class _Receiver:
 
     machine: ExactConsumer | BoundedConsumer
 
-    def __init__(self, session: Session, name: str, arrived: Callable[[], None] | None) -> None:
+    def __init__(self, session: Datagrams, name: str, arrived: Callable[[], None] | None) -> None:
         self.name = name
         self._loop = asyncio.get_running_loop()
         self._session = session
@@ -364,7 +365,7 @@ class LinkReceiver(_Receiver):
     """The receiving end of an exact link at work.
 
     Args:
-      session: of the transport, on the running loop.
+      session: of the transport, or what else carries datagrams, on the running loop.
       name: of the link, as a key; both ends use the same.
       consumer: by which name the producer has admitted this end.
       incarnation: which life of the consumer this is.
@@ -379,7 +380,7 @@ class LinkReceiver(_Receiver):
 
     def __init__(
         self,
-        session: Session,
+        session: Datagrams,
         name: str,
         *,
         consumer: str,
@@ -428,12 +429,12 @@ class BoundedSender:
     """The sending end of a link that may lose tokens, at work; it never waits.
 
     Args:
-      session: of the transport, on the running loop.
+      session: of the transport, or what else carries datagrams, on the running loop.
       name: of the link, as a key; both ends use the same.
       epoch: which life of the producer this is.
     """
 
-    def __init__(self, session: Session, name: str, *, epoch: int) -> None:
+    def __init__(self, session: Datagrams, name: str, *, epoch: int) -> None:
         room = session.largest_message - _HEADROOM
         self.machine = BoundedProducer(epoch, largest_token=room, largest_batch=min(60_000, room))
         self.name = name
@@ -472,7 +473,7 @@ class BoundedReceiver(_Receiver):
     """The receiving end of a link that may lose tokens, at work.
 
     Args:
-      session: of the transport, on the running loop.
+      session: of the transport, or what else carries datagrams, on the running loop.
       name: of the link, as a key; both ends use the same.
       arrived: called when tokens have come.
       **options: of `BoundedConsumer`.
@@ -481,7 +482,7 @@ class BoundedReceiver(_Receiver):
     machine: BoundedConsumer
 
     def __init__(
-        self, session: Session, name: str, *, arrived: Callable[[], None] | None = None, **options: Any
+        self, session: Datagrams, name: str, *, arrived: Callable[[], None] | None = None, **options: Any
     ) -> None:
         self.machine = BoundedConsumer(**options)
         super().__init__(session, name, arrived)

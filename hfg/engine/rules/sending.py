@@ -35,6 +35,7 @@ __all__ = [
     "enqueue",
     "flush_automatic",
     "put",
+    "put_arrived",
     "put_outputs",
     "put_value",
     "send_end",
@@ -91,6 +92,23 @@ def put_value(worker: Worker, value: object) -> None:
     for edge in shape.outgoing:
         put(edge, value, 0, stamp)
     if worker.outputs.missing and (worker.placed or worker.rate_timer is not None):
+        worker.unplace()
+    if len(core.followers) > since:
+        let_follow(core, since)
+    if core.returned or core.drained or core.dirty_scopes:
+        _sent(core)
+
+
+def put_arrived(worker: Worker, value: object, modifier: int, stamp: float) -> None:
+    """The same for a token that has come from another part of the graph: `worker` stands for that, and has one edge."""
+    if worker.listeners:
+        put_outputs(worker, [(value, modifier, stamp)])
+        return
+    core = worker.core
+    since = len(core.followers)
+    edge = worker.out_edges[0][0]
+    put(edge, value, leaving(False, edge.active, modifier, value is NO_MESSAGE), stamp)
+    if worker.outputs.missing and worker.placed:
         worker.unplace()
     if len(core.followers) > since:
         let_follow(core, since)

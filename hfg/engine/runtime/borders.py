@@ -9,7 +9,7 @@ whoever owns the part moves the tokens. Stands on `engine` and `rules`.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import islice
 from typing import Any, Literal, TypeAlias
 
@@ -18,7 +18,7 @@ from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.lifecycle import disable_around, enable_around
 from hfg.engine.rules.quiet import node_ended
 from hfg.engine.rules.releasing import take_from_reader
-from hfg.engine.rules.sending import enqueue, put_outputs
+from hfg.engine.rules.sending import enqueue, put_arrived
 from hfg.engine.rules.wiring import reaches
 from hfg.engine.runtime.engine import Engine
 from hfg.ports.edges import EventEdge, SyncEdge
@@ -257,10 +257,10 @@ class Inlet:
         for _ in range(count):
             self._edge.count_dropped()
 
-    def arrive(self, value: object, activity: int, stamp: float) -> None:
-        """A token has come over the link."""
-        self.received += 1
-        self._inbox.append((value, activity, stamp))
+    def arrive(self, tokens: Sequence[tuple[Any, int, float]]) -> None:
+        """Tokens have come over the link: value, modifier and stamp of each."""
+        self.received += len(tokens)
+        self._inbox.extend(tokens)
 
     def speak(self, speaking: bool) -> None:
         """The producer was disabled or enabled; what came before counts for signals alone (F10)."""
@@ -297,16 +297,16 @@ class Inlet:
         self._count(self.received - edge.untaken)
 
     def _lay_token(self) -> None:
-        worker, inbox = self._worker, self._inbox
-        while inbox and not worker.outputs.missing and not self._held:
-            value, activity, stamp = inbox.popleft()
-            put_outputs(worker, [(value, activity, stamp)])
+        worker, inbox, outputs = self._worker, self._inbox, self._worker.outputs
+        if inbox and not outputs.missing and not self._held:
+            while inbox and not outputs.missing:
+                value, activity, stamp = inbox.popleft()
+                put_arrived(worker, value, activity, stamp)
             self._engine.kick()
-        lies = len(inbox) + (1 if worker.outputs.missing else 0)
-        self._count(self.received - lies)
-        if worker.outputs.missing and not self._waits:
+        self._count(self.received - len(inbox) - (1 if outputs.missing else 0))
+        if outputs.missing and not self._waits:
             self._waits = True
-            worker.outputs.when_complete(self._free)
+            outputs.when_complete(self._free)
 
     def _free(self) -> None:
         """Amid a step of the engine: what follows is laid when that is over, in turn with what else can move."""

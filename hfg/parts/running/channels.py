@@ -20,7 +20,9 @@ from hfg.errors import EncodingError, RunError, TransportError
 from hfg.graph.flat import CutEdge
 from hfg.links import Outbox
 from hfg.links.consumer import ExactConsumer
+from hfg.links.local import LocalEndpoint, LocalRoute
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
+from hfg.logs import log
 from hfg.parts.model.failing import codec_of
 from hfg.parts.model.inheriting import Arrived, Where
 from hfg.parts.model.messages import Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, pack, unpack
@@ -28,7 +30,7 @@ from hfg.parts.running.part import Part
 from hfg.parts.running.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
 from hfg.token import Token
-from hfg.transport import Delivery, EncodedToken, Position, Session
+from hfg.transport import Datagrams, Delivery, EncodedToken, Position, Session
 
 __all__ = ["Carrier", "Channel", "name_of"]
 
@@ -163,14 +165,17 @@ class Carrier:
           edges: those between it and others.
           say: brings a message to another part.
           remembering: the parts that know in each life what they have sent in others.
-          shares_memory: large arrays may go through shared memory.
+          shares_memory: parts of one host may reach each other by its means: large arrays go through shared memory, all
+            else over local sockets.
           admits: parts of younger lives are there, and hear what they are told.
         """
         self._part = part
         self._links: dict[str, _Outgoing | _Incoming] = {}
         outgoing: dict[str, _Outgoing] = {}
         incoming: dict[str, _Incoming] = {}
-        world = _World(part, session, run, lives, say)
+        beside = {edge.source if edge.target == part.name else edge.target for edge in edges if edge.within_host}
+        self._ways = _Ways(session, run, part.name, lives, beside if shares_memory else set())
+        world = _World(part, self._ways, run, lives, say)
         for edge in edges:
             if edge.source == part.name:
                 self._links[edge.label] = outgoing[edge.label] = _Outgoing(world, edge)
@@ -190,6 +195,7 @@ class Carrier:
 
     def admit(self, other: str, life: int) -> None:
         """Another part has died and begins anew, as that life."""
+        self._ways.admit(other, life)
         for link in self._links.values():
             if link.other == other:
                 link.admit(life)
@@ -217,13 +223,62 @@ class Carrier:
         """End all links."""
         for link in self._links.values():
             await link.close()
+        self._ways.close()
+
+
+class _Ways:
+    """How a part reaches others: over the session, or on the same host straight."""
+
+    def __init__(self, session: Session, run: str, here: str, lives: dict[str, int], beside: set[str]) -> None:
+        """Listen to those on the same host, if there are any.
+
+        Args:
+          session: of the transport.
+          run: by which name all parts of the run know it.
+          here: the name of this part.
+          lives: which life of each part this is for.
+          beside: the parts on the same host that it has edges to or from.
+        """
+        self._session = session
+        self._run = run
+        self._routes: dict[str, LocalRoute] = {}
+        self._endpoint: LocalEndpoint | None = None
+        if not beside:
+            return
+        try:
+            self._endpoint = endpoint = LocalEndpoint(self._name(here, lives[here]), session.largest_message)
+        except TransportError as error:
+            log().debug("%s goes over the network alone: %s", name_of(here), error)
+        else:
+            self._routes = {
+                other: LocalRoute(endpoint, session, self._name(other, lives[other])) for other in sorted(beside)
+            }
+
+    def _name(self, part: str, life: int) -> str:
+        return f"{self._run}/{name_of(part)}/{life}"
+
+    def to(self, other: str) -> Datagrams:
+        """Give the way to another part."""
+        return self._routes.get(other, self._session)
+
+    def admit(self, other: str, life: int) -> None:
+        """Another part has died and begins anew, as that life."""
+        if other in self._routes:
+            self._routes[other].lead_to(self._name(other, life))
+
+    def close(self) -> None:
+        """End those that this has made."""
+        for route in self._routes.values():
+            route.close()
+        if self._endpoint is not None:
+            self._endpoint.close()
 
 
 class _World(NamedTuple):
     """What all near ends of a part know alike; see `Carrier`."""
 
     part: Part
-    session: Session
+    ways: _Ways
     run: str
     lives: dict[str, int]
     say: Callable[[str, Message], None]
@@ -259,9 +314,10 @@ class _Outgoing(_NearEnd):
         self._held: deque[EncodedToken] = deque()  # what is not kept yet, and may not leave before it is
         self._sender: LinkSender | BoundedSender
         outbox = None if part.keeper is None else part.keeper.outbox(edge.label)
+        way = world.ways.to(edge.target)
         if edge.guarantee == "exact":
             self._sender = sender = LinkSender(
-                world.session,
+                way,
                 self._key,
                 epoch=lives[part.name],
                 window=self._most,
@@ -273,7 +329,7 @@ class _Outgoing(_NearEnd):
             sender.admit(name_of(edge.target), lives[edge.target], after=after)
             part.outlets[edge.label].owe(sender.machine.unfinished)
         else:
-            self._sender = BoundedSender(world.session, self._key, epoch=lives[part.name])
+            self._sender = BoundedSender(way, self._key, epoch=lives[part.name])
 
     def room(self) -> int:
         """See `Outgoing`."""
@@ -446,9 +502,10 @@ class _Incoming(_NearEnd):
         self._waits_to_join = lives[edge.source] < lives[part.name]
         self._before = 0  # tokens of former lives of the producer; of a lossy edge, where numbers tell what is lost
         self._receiver: LinkReceiver | BoundedReceiver
+        way = world.ways.to(edge.source)
         if edge.guarantee == "exact":
             self._receiver = LinkReceiver(
-                world.session,
+                way,
                 self._key,
                 consumer=name_of(part.name),
                 incarnation=lives[part.name],
@@ -460,7 +517,7 @@ class _Incoming(_NearEnd):
         else:
             # What comes is laid on the edge at once, and that drops by the edge's own policy.
             self._receiver = BoundedReceiver(
-                world.session, self._key, arrived=self._arrived, capacity=_UNBOUNDED, producer=lives[edge.source]
+                way, self._key, arrived=self._arrived, capacity=_UNBOUNDED, producer=lives[edge.source]
             )
 
     def _arrived(self) -> None:
@@ -472,16 +529,16 @@ class _Incoming(_NearEnd):
         if is_lossy and self._waits_to_join:
             return  # what their numbers mean is not known yet
         tokens: list[Arrived] = []
+        decode = self._codec.decode
         borrowing = self._borrowing
         view = None if borrowing is None else borrowing.view
         while self._undecoded:
             delivery = self._undecoded[0]
-            if is_lossy and not self._is_new(delivery.position.sequence, len(tokens)):
+            if is_lossy and not self._is_new(delivery.sequence, len(tokens)):
                 self._undecoded.popleft()  # it is late, and was counted as lost
                 continue
-            metadata, value = delivery.token
             try:
-                token = self._codec.decode(metadata, value, view=view)
+                token = decode(delivery.metadata, delivery.value, view=view)
             except EncodingError as error:
                 if borrowing is not None and borrowing.is_awaited:
                     break  # sent to a former life, and this one has not heard of the memory yet
@@ -490,8 +547,7 @@ class _Incoming(_NearEnd):
                 self._part.finish("failed", problem)
                 return
             self._undecoded.popleft()
-            where = (delivery.position.stream, delivery.position.sequence)
-            tokens.append(((token.value, token.activity, token.stamp), where))
+            tokens.append(((token.value, token.activity, token.stamp), (delivery.stream, delivery.sequence)))
         if tokens:
             self._part.receive(self._edge.label, tokens)
 

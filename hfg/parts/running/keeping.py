@@ -234,7 +234,7 @@ class Keeper:
             sum(worker.firings + worker.call_number for worker in workers),
             [worker.path for worker in workers if worker.blocked & ENDED],
             [worker.path for worker in workers if worker.pending_end],
-            [outlet.sent for outlet in self._outlets.values()],
+            [outlet.left for outlet in self._outlets.values()],  # not `sent`, which may go back when a neighbour joins
             [inlet.received - inlet.waiting for inlet in self._inlets.values()],
         )
 

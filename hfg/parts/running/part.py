@@ -108,6 +108,7 @@ class Part:
         }
         self._outgoing: dict[str, Outgoing] = {}
         self._incoming: dict[str, Incoming] = {}
+        self._portions = {edge.label: max(edge.window // 4, 1) for edge in edges}
         self._lossy = frozenset(label for label, kept in keeps.items() if not kept)
         self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
         self._speaking = dict.fromkeys(self.outlets, True)
@@ -222,8 +223,7 @@ class Part:
             if skipped:
                 inlet.skip(skipped)
                 self._origin[one] += skipped
-            for (value, activity, stamp), _ in later:
-                inlet.arrive(value, activity, stamp)
+            inlet.arrive([token for token, _ in later])
             if self.keeper is not None:
                 self.keeper.came(one, [where for _, where in later])
             if self.inherits and one == self._leading:
@@ -339,10 +339,17 @@ class Part:
                     link.send(tokens)
 
     def _moved(self, inlet: Inlet) -> None:
+        """Tokens were taken: amid the pump that is told for several at once, and what is left at the end of it."""
         if self.keeper is not None:
             self._settle_kept()
-        elif not self.inherits:
-            inlet.settle(inlet.taken)
+        elif not self.inherits and (
+            not self.engine.core.pumping or inlet.taken - inlet.settled >= self._portions[inlet.label]
+        ):
+            self._tell_taken(inlet)
+
+    def _tell_taken(self, inlet: Inlet) -> None:
+        """Each token that was taken is done."""
+        if inlet.settle(inlet.taken):
             self._incoming[inlet.label].taken(inlet.taken)
 
     def _settle(self) -> None:
@@ -385,6 +392,8 @@ class Part:
                 self._hearing[label] = hearing
                 self._incoming[label].hears(hearing, inlet.taken)
             inlet.lay()
+            if self.keeper is None and not self.inherits:
+                self._tell_taken(inlet)
         self.send()
         if self.inherits:
             self._settle()
