@@ -1,9 +1,9 @@
 """The ends of links at work: over a session of a transport, on the event loop that is running.
 
-What is sent in one turn of the loop leaves in one datagram at its end, and so do the words on what is done; what is sent
-while nothing is under way, and a quarter of a window, leaves at once, for there is work for the other end. Nothing here decides: that is done by the machines
-beside this module, asked after each burst, at the end of each turn in which something was sent or done, and at the time
-when one has something to say by itself.
+What is sent in one turn of the loop leaves in one datagram at its end, and so do the words on what is done. What is
+sent while nothing is under way, and a quarter of a window, leaves at once, for there is work for the other end. Nothing
+here decides: that is done by the machines beside this module, asked after each burst, at the end of each turn in which
+something was sent or done, and at the time when one has something to say by itself.
 """
 
 from __future__ import annotations
