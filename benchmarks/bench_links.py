@@ -41,8 +41,10 @@ def rows() -> None:
     for window, letters, pictures in ((1, 2_000, 300), (8, 10_000, 500), (64, 40_000, 500)):
         row(f"hfg edge, window {window}", partial(crossing.edge, window), letters, pictures)
     for window, letters in ((1, 2_000), (8, 10_000), (64, 60_000)):
-        row(f"hfg link, window {window}", partial(crossing.link, window, False), letters, 150 if window == 8 else 0)
-    row("hfg link, window 8, Zenoh's shared memory", partial(crossing.link, 8, True), 0, 500)
+        row(f"hfg link, window {window}", partial(crossing.link, window, "straight"), letters, 150 * (window == 8))
+    for window, letters in ((1, 2_000), (64, 40_000)):
+        row(f"hfg link, window {window}, over Zenoh", partial(crossing.link, window, "zenoh"), letters, 0)
+    row("hfg link, window 8, Zenoh's shared memory", partial(crossing.link, 8, "shared"), 0, 500)
     row("hfg publish and subscribe, window 8", partial(crossing.meeting, 8), 8_000, 150)
 
     zenoh = peer("zenoh_links", "puts")
@@ -59,7 +61,7 @@ def rows() -> None:
 def leaky_rows() -> None:
     """Those who can do without waiting for anybody."""
     row("hfg edge, latest", partial(crossing.edge, 8), 400_000, 200_000, leaky=True)
-    row("hfg link, bounded", partial(crossing.link, 1, False), 20_000, 150, leaky=True)
+    row("hfg link, bounded", partial(crossing.link, 1, "straight"), 20_000, 150, leaky=True)
     row("hfg publish and subscribe, latest", partial(crossing.meeting, 1), 20_000, 150, leaky=True)
     zenoh = peer("zenoh_links", "puts")
     row("Zenoh, puts that drop", zenoh, 40_000, 0, leaky=True, needs="zenoh")

@@ -14,7 +14,7 @@ import time
 from collections.abc import Awaitable, Callable, Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,8 +22,9 @@ import hfg
 from benchmarks.measure import ROOT
 from benchmarks.meters import Laps
 from benchmarks.parcels import SHAPE, Job, Picture, Post, letter, opened, picture, picture_bytes
+from hfg.links.local import LocalEndpoint, LocalRoute
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
-from hfg.transport import Traffic
+from hfg.transport import Datagrams, Traffic
 
 __all__ = ["activity", "edge", "link", "meeting", "pipeline"]
 
@@ -104,11 +105,31 @@ async def open_session(folder: str, shared: bool) -> Any:
     return await ZenohTransport().open(realm=Path(folder).name, meet=meet, shared_memory=POOL if shared else 0)
 
 
-async def link_sender(job: Job, folder: str, window: int, shared: bool) -> None:
+class Way:
+    """A session, and the way of links on one host beside it."""
+
+    def __init__(self, session: Any, folder: str, here: str, there: str, way: str) -> None:
+        """Open this end; `way` is "straight", or over the session alone."""
+        self._session = session
+        self._endpoint = LocalEndpoint(f"{folder}/{here}", session.largest_message) if way == "straight" else None
+        self._route = LocalRoute(self._endpoint, session, f"{folder}/{there}") if self._endpoint else None
+        self.datagrams: Datagrams = self._route or session
+
+    async def close(self) -> None:
+        """Close all of it."""
+        if self._route is not None and self._endpoint is not None:
+            self._route.close()
+            self._endpoint.close()
+        await self._session.close()
+
+
+async def link_sender(job: Job, folder: str, window: int, way: str) -> None:
     """Send over a link: the other process."""
-    session = await open_session(folder, shared)
-    exact = None if job.leaky else LinkSender(session, "link", epoch=1, window=window)
-    loose = BoundedSender(session, "link", epoch=1) if job.leaky else None
+    session = await open_session(folder, way == "shared")
+    opened_way = Way(session, folder, "sender", "receiver", way)
+    datagrams = opened_way.datagrams
+    exact = None if job.leaky else LinkSender(datagrams, "link", epoch=1, window=window)
+    loose = BoundedSender(datagrams, "link", epoch=1) if job.leaky else None
     if exact is not None:
         exact.admit("here", 1)
     publisher = session.publisher("link/tokens", Traffic.BULK)
@@ -129,12 +150,14 @@ async def link_sender(job: Job, folder: str, window: int, shared: bool) -> None:
         await exact.close(over=True)
     elif loose is not None:
         await loose.close()
-    await session.close()
+    await opened_way.close()
 
 
-async def link_receiver(post: Post, folder: str, window: int, shared: bool) -> None:
+async def link_receiver(post: Post, folder: str, window: int, way: str) -> None:
     """Receive: this process."""
-    session = await open_session(folder, shared)
+    session = await open_session(folder, way == "shared")
+    opened_way = Way(session, folder, "receiver", "sender", way)
+    datagrams = opened_way.datagrams
     is_picture = post.job.what == "picture"
     over = asyncio.Event()
     receiver: LinkReceiver | BoundedReceiver
@@ -153,23 +176,23 @@ async def link_receiver(post: Post, folder: str, window: int, shared: bool) -> N
             over.set()
 
     if post.job.leaky:
-        receiver = BoundedReceiver(session, "link", arrived=arrived, producer=1)
+        receiver = BoundedReceiver(datagrams, "link", arrived=arrived, producer=1)
     else:
         receiver = LinkReceiver(
-            session, "link", consumer="here", incarnation=1, producer=1, capacity=window, arrived=arrived
+            datagrams, "link", consumer="here", incarnation=1, producer=1, capacity=window, arrived=arrived
         )
     job = post.job._asdict()
-    process = begin("link", {"job": job, "folder": folder, "window": window, "shared": shared})
+    process = begin("link", {"job": job, "folder": folder, "window": window, "way": way})
     await until_over(process, over)
     await receiver.close()
-    await session.close()
+    await opened_way.close()
 
 
-def link(window: int, shared: bool, job: Job) -> dict[str, float]:
-    """A link without a graph."""
+def link(window: int, way: Literal["straight", "zenoh", "shared"], job: Job) -> dict[str, float]:
+    """A link without a graph: straight, over Zenoh, or over Zenoh with its shared memory."""
     post = Post(job)
     with tempfile.TemporaryDirectory(prefix="hfg-") as folder:
-        asyncio.run(link_receiver(post, folder, window, shared))
+        asyncio.run(link_receiver(post, folder, window, way))
     return post.figures()
 
 

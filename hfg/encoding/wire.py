@@ -94,6 +94,11 @@ class TokenCodec(Generic[T]):
         self._decode = msgspec.msgpack.Decoder(codec.wire).decode
         self._readers: dict[int, tuple[Codec, Callable[[Any], Any]]] = {}
 
+    @property
+    def holds_arrays(self) -> bool:
+        """Whether a value of the type may have arrays in it, as far as the type says."""
+        return not self._exact
+
     def encode(self, token: Token[T], *, place: Place | None = None) -> tuple[bytes, bytes]:
         """Give metadata and value, as links take them.
 

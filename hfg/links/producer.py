@@ -175,10 +175,10 @@ class ExactProducer:
         """What another life would need to carry on from here."""
         return Outbox(self._stream, self._next - len(self._kept), tuple(self._kept))
 
-    @property
-    def unsent(self) -> int:
-        """How many tokens have not been sent to anybody yet."""
-        return self._next - 1 - self._put
+    def is_pressing(self, portion: int) -> bool:
+        """Whether what was not sent should leave now: it is enough, or nothing is under way, or nothing can join it."""
+        unsent = self._next - 1 - self._put
+        return unsent >= portion or unsent == len(self._kept) or self._next > self._limit
 
     def takes(self, position: Position | None = None) -> bool:
         """Whether a token of that position can be sent now: `free`, and where numbers jump all before is done."""

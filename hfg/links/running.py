@@ -160,9 +160,8 @@ class LinkSender:
             raise TransportError(f'link "{self.name}" is closed')
         machine = self.machine
         number = machine.send(token, position)
-        unsent = machine.unsent
-        if unsent == machine.unfinished or unsent >= self._portion or not machine.free:
-            self._flush()  # nobody works on what was sent before, or it is enough, or nothing can join it
+        if machine.is_pressing(self._portion):
+            self._flush()
         elif not self._batch.asked:
             self._batch.ask()
         return number

@@ -460,8 +460,10 @@ class _Outgoing(_NearEnd):
         return len(self._held) + (number - message.number if known else self._sender.machine.unfinished)
 
     def share(self, world: _World) -> None:
-        """Put large arrays into shared memory from now on, if the consumer can open it."""
+        """Put large arrays into shared memory from now on, if there are any and the consumer can open it."""
         edge, sender = self._edge, self._sender
+        if not self._codec.holds_arrays:
+            return
         assert isinstance(sender, LinkSender)
         machine = sender.machine
         self._lending = Lending(
@@ -597,7 +599,8 @@ class _Incoming(_NearEnd):
 
     def share(self, world: _World) -> None:
         """Look at large arrays in shared memory, when the producer offers it."""
-        self._borrowing = Borrowing(world.run, self._tell)
+        if self._codec.holds_arrays:
+            self._borrowing = Borrowing(world.run, self._tell)
 
     def borrow(self, message: Shares) -> None:
         """The producer offers it."""
