@@ -373,8 +373,8 @@ class Part:
                 self._incoming[label].taken(done)
 
     def _wake(self) -> None:
-        """Something lies before an outlet: it leaves when the engine is done with what it does now."""
-        if not self._leaving:
+        """Something lies before an outlet: it leaves when the engine is done with what it does now, see `_pumped`."""
+        if not self._leaving and not self.engine.core.pumping:
             self._leaving = True
             self.engine.soon(self._leave)
 
