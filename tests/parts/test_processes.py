@@ -122,6 +122,38 @@ def test_a_process_that_dies_is_begun_again_and_nothing_is_lost(tmp_path: Path, 
 
 
 @pytest.mark.rule("L2")
+@pytest.mark.skipif(sys.platform != "linux", reason="the sockets are Linux's")
+def test_tokens_go_straight_to_a_process_of_this_host_and_also_to_its_next_life(tmp_path: Path) -> None:
+    running = program(
+        tmp_path,
+        f"""
+    from hfg.links.local import LocalRoute
+
+    if __name__ == "__main__":
+        straight, put = [], LocalRoute.put
+
+        def noted(route, key, header, payload):
+            went = put(route, key, header, payload)
+            straight.append((route._neighbour, went))
+            return went
+
+        LocalRoute.put = noted
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        far = graph.add(deadly(pids={str(tmp_path / "pids")!r}, how="SIGKILL"), group="far")
+        graph.connect(graph.add(numbers()).out, far.value)
+        graph.connect(far.out, graph.output("out", int))
+        assert hfg.run(graph).outputs == {{"out": list(range(200))}}
+        for life in 1, 2:
+            print(life, sum(went for neighbour, went in straight if neighbour.endswith(f"part far/{{life}}")) > 10)
+    """,
+    )
+    out, err = running.communicate(timeout=60)
+    assert running.returncode == 0, err
+    assert out == "1 True\n2 True\n"
+
+
+@pytest.mark.rule("L2")
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system does not tell the children of a process")
 def test_a_process_that_waits_already_takes_the_place_of_one_that_dies(tmp_path: Path) -> None:
     running = program(
