@@ -32,7 +32,7 @@ from hfg.parts.hosts.standing import Standing
 from hfg.parts.model.agreement import Agreement, Question, Rest
 from hfg.parts.model.clocks import RunClock, machine
 from hfg.parts.model.failing import as_error
-from hfg.parts.model.inheriting import keeping, remembering
+from hfg.parts.model.inheriting import inheriting, keeping, remembering
 from hfg.parts.model.ledgers import Entry, Ledger, ledger_of
 from hfg.parts.model.lives import LIMIT, WITHIN_S
 from hfg.parts.model.messages import (
@@ -135,7 +135,8 @@ class Distribution:
     def take(self, composition: Composition) -> None:
         """Here is the engine of the main part."""
         self._loop = asyncio.get_running_loop()
-        self._part = Part(MAIN, composition, self._drawing.cutting.edges_of(MAIN), rests=self._rests)
+        cutting = self._drawing.cutting
+        self._part = Part(MAIN, composition, cutting.edges_of(MAIN), rests=self._rests, inheriting=inheriting(cutting))
         composition.consumers.leave_out(sieve(MAIN, self._drawing.cutting.edges))
         composition.engine.callbacks.finished.append(self._ended_here)
 

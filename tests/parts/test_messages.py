@@ -18,6 +18,7 @@ from hfg.parts.model.messages import (
     Ask,
     Begin,
     Call,
+    GoesOn,
     Hears,
     Joins,
     Message,
@@ -58,6 +59,7 @@ TO_RELAY, FROM_RELAY = "numbers.out -> relay0.value", "relay0.out -> out"
         Result(7, value={"nodes": [1, 2.5, None, "x", b"y"]}),
         Seen(2, tokens=[Parcel(b"", b"\x01")], events=[Passed(0.5, "set", "a", Parcel(b"", b""), "b")], count=9),
         Joins("a -> b", 3, 1, 2, "deaf"),
+        GoesOn("a -> b", 1, 2),
         Sees("a -> b", "segment", 1, "it is on another host"),
     ],
     ids=lambda message: type(message).__name__,
@@ -119,6 +121,7 @@ def test_a_channel_counts_what_is_no_message_and_hears_what_comes_behind() -> No
         Sees("no -> where", "segment", 1),
         Speaks(TO_RELAY, False, 1),  # which leaves, so its producer is here
         Hears(FROM_RELAY, "over", 1),  # which comes in, so its consumer is
+        GoesOn(TO_RELAY, 1, 1),
         Shares(TO_RELAY, "segment", 1),
         Sees(FROM_RELAY, "segment", 1),
     ],

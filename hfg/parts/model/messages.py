@@ -2,7 +2,7 @@
 
     Whole -> part     Open, TellTime, Begin, Question, Reborn, Kept, Finish, Call, Close
     Part  -> whole    AskTime, Opened, Rest, Answer, Keep, Ended, Result, Seen, Logged, Closed
-    Part  -> part     Speaks, Hears, Joins, Shares, Sees
+    Part  -> part     Speaks, Hears, Joins, GoesOn, Shares, Sees
 
 All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
 """
@@ -48,6 +48,7 @@ __all__ = [
     "Ended",
     "Failed",
     "Finish",
+    "GoesOn",
     "Hears",
     "Joins",
     "Keep",
@@ -338,7 +339,7 @@ class Joins(msgspec.Struct, frozen=True, tag=True):
     Attributes:
       label: of the edge.
       total: how many tokens are done, said by the producer; how many have come, said by the consumer.
-      stream, number: the position of the last of them.
+      stream, number: the position of the last of them; or `UNKNOWN`.
       hearing: what the consumer does with tokens.
     """
 
@@ -347,6 +348,19 @@ class Joins(msgspec.Struct, frozen=True, tag=True):
     stream: int
     number: int
     hearing: str = "open"
+
+
+class GoesOn(msgspec.Struct, frozen=True, tag=True):
+    """Behind which position a producer goes on that has begun anew, once it knows that.
+
+    Attributes:
+      label: of the edge.
+      stream, number: the position of the last token that was done.
+    """
+
+    label: str
+    stream: int
+    number: int
 
 
 class Logged(msgspec.Struct, frozen=True, tag=True):
@@ -399,7 +413,7 @@ class Sees(msgspec.Struct, frozen=True, tag=True):
     refused: str = ""
 
 
-OfAnEdge: TypeAlias = Speaks | Hears | Joins | Shares | Sees
+OfAnEdge: TypeAlias = Speaks | Hears | Joins | GoesOn | Shares | Sees
 """What the two ends of an edge between parts tell each other."""
 
 Message: TypeAlias = (
@@ -425,6 +439,7 @@ Message: TypeAlias = (
     | Speaks
     | Hears
     | Joins
+    | GoesOn
     | Shares
     | Sees
 )

@@ -206,7 +206,9 @@ class Other:
             await asyncio.wait({self._keeping})
 
     def come_back(self, returning: Coroutine[Any, Any, None]) -> None:
-        """Begin its next life by that."""
+        """Begin its next life by that; one that died while it was set up is waited for no longer."""
+        if self._returning is not None:
+            self._returning.cancel()
         self._returning = asyncio.get_running_loop().create_task(returning, name=f"hfg return of {self.name}")
 
     async def stay_away(self) -> None:

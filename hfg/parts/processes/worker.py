@@ -165,7 +165,7 @@ class Worker:
             composition,
             edges,
             rests=self._rests,
-            inherits=self._name in inheriting(cutting),
+            inheriting=inheriting(cutting),
             returns=self._life > message.incarnations[MAIN],
             keeper=keeper,
         )

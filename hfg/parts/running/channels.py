@@ -23,7 +23,7 @@ from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
 from hfg.parts.model.failing import codec_of
 from hfg.parts.model.inheriting import Arrived, Where
-from hfg.parts.model.messages import Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, pack, unpack
+from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, pack, unpack
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
@@ -199,7 +199,7 @@ class Carrier:
         label = message.label
         if label not in (self._outgoing if isinstance(message, Hears | Sees) else self._links):
             return
-        if isinstance(message, Speaks | Shares) and label not in self._incoming:
+        if isinstance(message, Speaks | Shares | GoesOn) and label not in self._incoming:
             return
         match message:
             case Speaks():
@@ -208,6 +208,8 @@ class Carrier:
                 self._part.hear(label, message.hearing, message.total)  # type: ignore[arg-type]  # checked there
             case Joins():
                 self._links[label].join(message)
+            case GoesOn():
+                self._part.goes_on(label, (message.stream, message.number))
             case Shares():
                 self._incoming[label].borrow(message)
             case Sees():
@@ -364,6 +366,10 @@ class _Outgoing(_NearEnd):
         """See `Outgoing`."""
         self._tell(Speaks(self._edge.label, speaking, total))
 
+    def goes_on(self, last: Where) -> None:
+        """See `Outgoing`."""
+        self._tell(GoesOn(self._edge.label, *last))
+
     def _released(self) -> None:
         if self._lending is not None:
             self._lending.settle()
@@ -377,6 +383,9 @@ class _Outgoing(_NearEnd):
             sender.admit(name_of(self._edge.target), life)
         stream, number = sender.machine.position
         number -= self._unfinished - len(self._held)
+        if not stream:
+            stream, number = self._part.behind
+        self._known = (0, 0)  # it has nothing
         if self._lending is not None:
             self._lending.admit()
         done = self._part.outlets[label].sent - self._unfinished
@@ -385,7 +394,10 @@ class _Outgoing(_NearEnd):
         self._part.consumer_returns(label)
 
     def join(self, message: Joins) -> None:
-        """The consumer says what it has of former lives."""
+        """The consumer says what it has of former lives; it may wait to be told where this one goes on."""
+        if isinstance(self._sender, LinkSender) and not self._part.inherits:
+            stream, number = self._sender.machine.position
+            self.goes_on((stream, number))
         self._known = (message.stream, message.number)
         self._waits_to_join = False
         total = message.total
@@ -516,16 +528,18 @@ class _Incoming(_NearEnd):
         """The producer begins anew: what it has sent until now is told to it."""
         label, machine = self._edge.label, self._receiver.machine
         machine.believe(life)
+        if self._waits_to_join and self._undecoded:  # who would have told is gone: counting begins with what came
+            self._before = 1 - self._undecoded[0].position.sequence
+        self._waits_to_join = False
         if self._undecoded:  # they lie in the memory of a life that died before it could say so to this one
             self._borrowing = None
             self._decode()
         stream = number = 0
         if isinstance(machine, ExactConsumer):
             stream, number = machine.accepted
-        inlet = self._part.inlets[label]
-        self._before = inlet.received
+        self._before = came = self._part.came(label)
         self._part.producer_returns(label, remembers=self._remembers)
-        self._tell(Joins(label, inlet.received, stream, number, inlet.hearing))
+        self._tell(Joins(label, came, stream, number, self._part.inlets[label].hearing))
 
     def join(self, message: Joins) -> None:
         """The producer says what former lives have done."""
