@@ -20,6 +20,7 @@ from hfg.graph.flat import cut, flatten
 from hfg.parts.model.inheriting import inheriting, keeping
 from hfg.parts.model.lives import LIMIT
 from hfg.parts.processes import launching
+from hfg.parts.running.channels import Channel
 from hfg_transports.memory import Faults, Network
 
 SEEDS = int(os.environ.get("HFG_SOAK_DEATHS", "5000"))
@@ -226,12 +227,15 @@ def check(seed: int, monkeypatch: pytest.MonkeyPatch, *, is_uneven: bool = False
         made.append(Reaper(seed, mortal))
         return made[-1]
 
+    refused: list[str] = []
     monkeypatch.setattr(launching, "LoopLauncher", make)
+    monkeypatch.setattr(Channel, "refuse", lambda _, why: refused.append(why))
     found = values_of(graph)
     monkeypatch.undo()
     assert found[0] == "done", f"seed {seed}"
     assert found[1] == wanted, f"seed {seed}"
     assert set(found[2]) == set(effects), f"seed {seed}"
+    assert not refused, f"seed {seed}: {refused}"  # for all that was said is so (L4)
     return sum(made[0].deaths.values())
 
 

@@ -268,14 +268,12 @@ class Inlet:
     def skip(self, count: int) -> None:
         """So many have come that are not for this life: what belongs to them was done by a former one."""
         self.received += count
-        for _ in range(count):
-            self._edge.count_dropped()
+        self._edge.count_dropped(count)
 
     def lose(self, count: int) -> None:
         """So many have left and will never come: the edge may lose some, and counts them."""
         self.received += count
-        for _ in range(count):
-            self._edge.count_dropped()
+        self._edge.count_dropped(count)
 
     def arrive(self, value: object, activity: int, stamp: float) -> None:
         """A token has come over the link."""

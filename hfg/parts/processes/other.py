@@ -143,6 +143,16 @@ class Other:
         return self._launched is not None and not self._gone
 
     @property
+    def is_leaving(self) -> bool:
+        """Whether it was told to go."""
+        return self._leaves
+
+    @property
+    def is_keeping(self) -> bool:
+        """Whether what it said last is still being written into its ledger."""
+        return self._keeping is not None and not self._keeping.done()
+
+    @property
     def process(self) -> int:
         """The id of its process; 0 if it has none."""
         return 0 if self._launched is None else self._launched.process

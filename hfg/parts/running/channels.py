@@ -21,9 +21,10 @@ from hfg.graph.flat import CutEdge
 from hfg.links import Outbox
 from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
+from hfg.logs import Log
 from hfg.parts.model.failing import codec_of
 from hfg.parts.model.inheriting import Arrived, Where
-from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, pack, unpack
+from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, Untrue, pack, unpack
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
@@ -31,6 +32,8 @@ from hfg.token import Token
 from hfg.transport import Delivery, EncodedToken, Position, Session
 
 __all__ = ["Carrier", "Channel", "name_of"]
+
+_LOGGER = Log("hfg.parts")
 
 _WINDOW: Final = 64  # messages on their way
 _MAIN: Final = "main"  # what the part without a name is called in keys
@@ -62,7 +65,7 @@ class Channel:
     What cannot leave at once waits in memory: there is little of it, and whoever says something goes on.
 
     Attributes:
-      refused: how much has come that is no message (L4).
+      refused: how much has come that is no message, or says what cannot be so (L4).
     """
 
     def __init__(
@@ -82,8 +85,9 @@ class Channel:
           here: the name of this part.
           there: that of the other.
           lives: which life of each this is.
-          receive: called with each message.
+          receive: called with each message; it may raise `Untrue`.
         """
+        self._there = there
         one, other = name_of(here), name_of(there)
         self.refused = 0
         self._receive = receive
@@ -116,9 +120,18 @@ class Channel:
             message = unpack(delivery.token[1])
             self._in.done()
             if message is None:
-                self.refused += 1  # from nobody of this run
-            else:
+                self.refuse("it has sent what is no message")
+                continue
+            try:
                 self._receive(message)
+            except Untrue as problem:
+                self.refuse(f'it has said "{type(message).__name__}", {problem}')
+
+    def refuse(self, why: str) -> None:
+        """What has come changes nothing; it is counted, and logged the first time."""
+        self.refused += 1
+        if self.refused == 1:
+            _LOGGER.warning("%s is not believed: %s; more of the kind is counted", name_of(self._there), why)
 
     async def flush(self, within_s: float) -> None:
         """Wait until the other has all that was said, or for so long."""
@@ -194,20 +207,30 @@ class Carrier:
             if link.other == other:
                 link.admit(life)
 
-    def hear(self, message: OfAnEdge) -> None:
-        """The other end of an edge has said something; what is said of no edge that comes in, or leaves, is nothing."""
+    def hear(self, other: str, message: OfAnEdge) -> None:
+        """A part has said something of an edge.
+
+        Raises:
+          Untrue: it has no such end of an edge to this one, or that end cannot be so.
+        """
         label = message.label
-        if label not in (self._outgoing if isinstance(message, Hears | Sees) else self._links):
-            return
-        if isinstance(message, Speaks | Shares | GoesOn) and label not in self._incoming:
-            return
+        link = self._links.get(label)
+        says_producer = isinstance(message, Speaks | Shares | GoesOn)
+        says_consumer = isinstance(message, Hears | Sees)
+        if (
+            link is None
+            or link.other != other
+            or (says_producer and label not in self._incoming)
+            or (says_consumer and label not in self._outgoing)
+        ):
+            raise Untrue(f'of an edge "{label:.200}", which does not lead so from it to {name_of(self._part.name)}')
         match message:
             case Speaks():
                 self._part.speak(label, message.speaking, message.total)
             case Hears():
-                self._part.hear(label, message.hearing, message.total)  # type: ignore[arg-type]  # checked there
+                self._part.hear(label, message.hearing, message.total)
             case Joins():
-                self._links[label].join(message)
+                link.join(message)
             case GoesOn():
                 self._part.goes_on(label, (message.stream, message.number))
             case Shares():
@@ -246,6 +269,10 @@ class _NearEnd:
         self._codec = _codec_of(edge)
         self._tell = partial(world.say, other)
 
+    def _need_to_join(self, *, waits: bool) -> None:
+        if not waits:
+            raise Untrue(f'of edge "{self._edge.label}", which this life of {name_of(self._part.name)} knows already')
+
 
 class _Outgoing(_NearEnd):
     """The near end of the link of an edge that leaves."""
@@ -261,6 +288,7 @@ class _Outgoing(_NearEnd):
         self._held: deque[EncodedToken] = deque()  # what is not kept yet, and may not leave before it is
         self._sender: LinkSender | BoundedSender
         outbox = None if part.keeper is None else part.keeper.outbox(edge.label)
+        self._kept_from = 1 if outbox is None else outbox.first
         if edge.guarantee == "exact":
             self._sender = sender = LinkSender(
                 world.session,
@@ -394,7 +422,12 @@ class _Outgoing(_NearEnd):
         self._part.consumer_returns(label)
 
     def join(self, message: Joins) -> None:
-        """The consumer says what it has of former lives; it may wait to be told where this one goes on."""
+        """The consumer says what it has of former lives; it may wait to be told where this one goes on.
+
+        Raises:
+          Untrue: nobody waits to be told.
+        """
+        self._need_to_join(waits=self._waits_to_join)
         if isinstance(self._sender, LinkSender) and not self._part.inherits:
             stream, number = self._sender.machine.position
             self.goes_on((stream, number))
@@ -403,7 +436,7 @@ class _Outgoing(_NearEnd):
         total = message.total
         if self._part.keeper is not None:
             total += self._ahead_of(message) - self._part.outlets[self._edge.label].sent
-        self._part.precede(self._edge.label, total, message.hearing)  # type: ignore[arg-type]  # checked there
+        self._part.precede(self._edge.label, total, message.hearing)
         if self._part.keeper is not None:
             self._released()
 
@@ -412,8 +445,8 @@ class _Outgoing(_NearEnd):
         if not isinstance(self._sender, LinkSender):
             return 0
         stream, number = self._sender.machine.position
-        known = stream == message.stream
-        return len(self._held) + (number - message.number if known else self._sender.machine.unfinished)
+        known = message.number if stream == message.stream else self._kept_from - 1  # it had nothing: all that was kept
+        return len(self._held) + number - known
 
     def share(self, world: _World) -> None:
         """Put large arrays into shared memory from now on, if the consumer can open it."""
@@ -456,6 +489,8 @@ class _Incoming(_NearEnd):
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
         self._waits_to_join = lives[edge.source] < lives[part.name]
+        self._segment = partial(segment_of, world.run, edge=edge.number)
+        self._lent_by = lives[edge.source]
         self._before = 0  # tokens of former lives of the producer; of a lossy edge, where numbers tell what is lost
         self._receiver: LinkReceiver | BoundedReceiver
         if edge.guarantee == "exact":
@@ -528,6 +563,7 @@ class _Incoming(_NearEnd):
         """The producer begins anew: what it has sent until now is told to it."""
         label, machine = self._edge.label, self._receiver.machine
         machine.believe(life)
+        self._lent_by = life
         if self._waits_to_join and self._undecoded:  # who would have told is gone: counting begins with what came
             self._before = 1 - self._undecoded[0].position.sequence
         self._waits_to_join = False
@@ -542,7 +578,12 @@ class _Incoming(_NearEnd):
         self._tell(Joins(label, came, stream, number, self._part.inlets[label].hearing))
 
     def join(self, message: Joins) -> None:
-        """The producer says what former lives have done."""
+        """The producer says what former lives have done.
+
+        Raises:
+          Untrue: nobody waits to be told.
+        """
+        self._need_to_join(waits=self._waits_to_join)
         total = message.total
         ledger = None if self._part.keeper is None else self._part.keeper.position(self._edge.label)
         if ledger is not None and ledger.stream == message.stream:
@@ -558,7 +599,13 @@ class _Incoming(_NearEnd):
         self._borrowing = Borrowing(world.run, self._tell)
 
     def borrow(self, message: Shares) -> None:
-        """The producer offers it."""
+        """The producer offers it.
+
+        Raises:
+          Untrue: it is not of this life and edge.
+        """
+        if message.segment != self._segment(life=self._lent_by):
+            raise Untrue(f'of shared memory "{message.segment:.200}", which is not that of edge "{self._edge.label}"')
         if self._borrowing is not None:
             self._borrowing.open(message)
             self._decode()

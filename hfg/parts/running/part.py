@@ -19,16 +19,18 @@ from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.rules import quiet
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
-from hfg.errors import EngineInternalError, HfgError, UsageError
+from hfg.errors import HfgError, UsageError
 from hfg.graph.flat import CutEdge
 from hfg.parts.model.agreement import Account, Answer, Question, Rest
 from hfg.parts.model.inheriting import UNKNOWN, Alignment, Arrived, Inheritance, Where
+from hfg.parts.model.messages import Untrue
 from hfg.parts.running.keeping import Keeper
 from hfg.ports.edges import EventEdge
 from hfg.token import END, Token
 
 __all__ = ["Incoming", "Outgoing", "Part"]
 
+_MOST_SAID: Final = 1000  # words that wait for tokens which were sent before them
 _REST_S: Final = 0.002  # how long nothing has moved before that is said to others; in virtual time it is said at once
 
 
@@ -271,7 +273,13 @@ class Part:
         self.send()
 
     def speak(self, label: str, speaking: bool, total: int) -> None:
-        """The producer of an edge that comes in was disabled or enabled, behind so many tokens."""
+        """The producer of an edge that comes in was disabled or enabled, behind so many tokens.
+
+        Raises:
+          Untrue: it says so of more and more tokens that do not come.
+        """
+        if sum(one == label for one, _, _ in self._said) >= _MOST_SAID:
+            raise Untrue(f'of edge "{label}" for the {_MOST_SAID}th time, behind tokens that do not come')
         self._is_at_rest = False
         self._said.append((label, speaking, total))
         self._listen()
@@ -288,7 +296,13 @@ class Part:
         self._said = waiting
 
     def hear(self, label: str, hearing: Hearing, total: int) -> None:
-        """The consumer of an edge that leaves does otherwise with tokens, from when it has taken so many."""
+        """The consumer of an edge that leaves does otherwise with tokens, from when it has taken so many.
+
+        Raises:
+          Untrue: so many have not left.
+        """
+        if total > self.outlets[label].sent:
+            raise Untrue(f'that {total} tokens were taken from edge "{label}", by which fewer have left')
         self._is_at_rest = False
         if not self.inherits:  # else it is taken when all that came of it is done
             self.outlets[label].be_taken(total)
@@ -516,7 +530,7 @@ class Part:
             if edge.label == label and isinstance(edge, EventEdge):
                 quiet.grow_queue(self.engine.core, edge)
                 return
-        raise EngineInternalError(f'queue "{label}" is to grow and is not full')
+        raise Untrue(f'that queue "{label}" is to grow, which is none here')
 
     def _finish(self, reasons: list[str]) -> None:
         stalled = quiet.stalled(reasons) if reasons else None
