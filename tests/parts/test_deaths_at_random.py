@@ -245,6 +245,15 @@ def test_parts_that_die_one_after_another_lose_and_double_nothing(block: int, mo
     assert sum(check(seed, monkeypatch) for seed in range(15 * block, 15 * block + 15)) > 20
 
 
+@pytest.mark.rule("L2")
+@pytest.mark.parametrize("seed", [20298, 20779, 21091])
+def test_a_ledger_counts_what_had_left_when_its_neighbour_says_that_it_has_nothing(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The neighbour takes some of it before its word arrives, and those count as well."""
+    assert check(seed, monkeypatch) > 2
+
+
 @pytest.mark.rule("L1", "F12")
 def test_parts_whose_sources_end_at_different_times_carry_what_the_whole_does(monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(40):
