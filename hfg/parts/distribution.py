@@ -13,7 +13,7 @@ import os
 import sys
 import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from hfg.parts.hosts.standing import Standing
 from hfg.parts.model.agreement import Agreement, Question, Rest
 from hfg.parts.model.clocks import RunClock, machine
 from hfg.parts.model.failing import as_error
-from hfg.parts.model.inheriting import keeping, remembering
+from hfg.parts.model.inheriting import inheriting, keeping, remembering
 from hfg.parts.model.ledgers import Entry, Ledger, ledger_of
 from hfg.parts.model.lives import LIMIT, WITHIN_S
 from hfg.parts.model.messages import (
@@ -57,6 +57,7 @@ from hfg.parts.model.messages import (
     Seen,
     TellTime,
     Told,
+    Untrue,
 )
 from hfg.parts.model.sieve import sieve
 from hfg.parts.processes.other import Launcher, Other
@@ -72,6 +73,7 @@ __all__ = ["Distribution", "distribute"]
 
 _LOGGER = Log("hfg.parts")
 _PATIENCE_S = 1.0  # how long a signal that may be lost may be on its way, while nothing else moves
+_MOST_LOGGERS = 1000  # that other parts may use here
 _LEAVING_S = 7.0  # how long the others may take to tear down; one node may take five (X3)
 
 
@@ -128,6 +130,14 @@ class Distribution:
         self._is_open = False
         self._has_begun = False
         self._ledgers: dict[str, Ledger] = {}
+        self._loggers: set[str] = set()
+        self._labels = {
+            name: (
+                {edge.label for edge in cutting.edges if edge.source == name},
+                {edge.label for edge in cutting.edges if edge.target == name},
+            )
+            for name in cutting.parts
+        }
         self._newest = FIRST_LIFE  # of all parts together: so a stream that begins later is higher on any link
 
     # --- the beginning ----------------------------------------------------------------------------------------------
@@ -135,7 +145,8 @@ class Distribution:
     def take(self, composition: Composition) -> None:
         """Here is the engine of the main part."""
         self._loop = asyncio.get_running_loop()
-        self._part = Part(MAIN, composition, self._drawing.cutting.edges_of(MAIN), rests=self._rests)
+        cutting = self._drawing.cutting
+        self._part = Part(MAIN, composition, cutting.edges_of(MAIN), rests=self._rests, inheriting=inheriting(cutting))
         composition.consumers.leave_out(sieve(MAIN, self._drawing.cutting.edges))
         composition.engine.callbacks.finished.append(self._ended_here)
 
@@ -235,8 +246,9 @@ class Distribution:
     def _hear(self, other: Other, message: Message) -> None:
         if isinstance(message, OfAnEdge):
             assert self._carrier is not None
-            self._carrier.hear(message)
+            self._carrier.hear(other.name, message)
             return
+        self._need_own(other, message)
         match message:
             case Opened():
                 other.answer(None if message.failed is None else self._error(message.failed, other))
@@ -245,19 +257,47 @@ class Distribution:
             case Rests():
                 self._agreement.rest(message.rest)
             case Told():
-                self._agreement.hear(message.answer)
+                try:
+                    self._agreement.hear(message.answer)
+                except msgspec.ValidationError as error:
+                    raise Untrue(f"which is no answer to that question: {error}") from error
             case Keep():
+                if other.name not in self._ledgers or other.is_keeping:
+                    raise Untrue("and has no ledger, or has not heard yet that what it said before is kept")
                 other.keep(partial(self._keep, other.name, message.number, message.data))
             case Ended():
                 self._ended_there(other, message)
             case Logged():
-                _log(other.name, message)
+                _log(other.name, message, self._loggers)
             case Result() | Seen():
                 self._asking.hear(other.name, message)
             case Closed():
                 other.close(message)
             case _:
-                _LOGGER.warning('%s has said "%s", which is not for here', name_of(other.name), type(message).__name__)
+                raise Untrue("which is not for the main part")
+
+    def _need_own(self, other: Other, message: Message) -> None:
+        """A part speaks for itself, of what it has.
+
+        Raises:
+          Untrue: it does not.
+        """
+        name = other.name
+        match message:
+            case Opened() | Ended() | Closed():
+                speaker = message.part
+            case Rests():
+                speaker = message.rest.part
+                if (set(message.rest.leaving), set(message.rest.coming)) != self._labels[name]:
+                    raise Untrue("of other edges than it has")
+            case Told():
+                speaker = message.answer.part
+            case _:
+                return
+        if speaker != name:
+            raise Untrue(f"for {name_of(speaker):.200}")
+        if isinstance(message, Closed) and not other.is_leaving:
+            raise Untrue("and nobody has told it to go")
 
     async def _keep(self, part: str, number: int, data: bytes, say: Callable[[Message], None]) -> None:
         """Keep what a part has done, and tell it."""
@@ -413,6 +453,7 @@ class Distribution:
         lost = report.lost_activity
         clocks: dict[str, float] = {}
         halves: dict[str, dict[str, EdgeReport]] = {MAIN: report.edges}
+        homes = {place: name for name, flat in self._drawing.cutting.parts.items() for place in _places(flat)}
         goes_on = report.outcome == "running"
         said: Mapping[str, Counts] = {}
         if goes_on and isinstance(self._run_of_all, CutRun):
@@ -428,8 +469,8 @@ class Distribution:
                     f'the process of group "{other.name}" was begun again {other.deaths.count} times; what it counted '
                     "before is not in the report"
                 )
-            nodes |= found.nodes
-            edges |= found.edges
+            nodes |= {path: one for path, one in found.nodes.items() if homes.get(path, other.name) == other.name}
+            edges |= {label: one for label, one in found.edges.items() if homes.get(label, other.name) == other.name}
             halves[other.name] = found.edges
             errors += found.errors
             lost += found.lost_activity
@@ -500,9 +541,11 @@ def distribute(
     )
 
 
-def _log(part: str, logged: Logged) -> None:
-    """Hand a record of another part to the loggers here, as if its node were."""
-    logger = logging.getLogger(logged.logger)
+def _log(part: str, logged: Logged, loggers: set[str]) -> None:
+    """Hand a record of another part to the loggers here, as if its node were; loggers are never forgotten."""
+    if len(loggers) < _MOST_LOGGERS:
+        loggers.add(logged.logger)
+    logger = logging.getLogger(logged.logger if logged.logger in loggers else "hfg.parts")
     if not logger.isEnabledFor(logged.level):
         return
     extra = {"group": part} | ({"path": logged.path} if logged.path else {})
@@ -521,6 +564,13 @@ def _known_packages() -> list[str]:
 
 def _all_nodes(cutting: Cutting) -> list[Any]:
     return [node for flat in cutting.parts.values() for node in flat.nodes]
+
+
+def _places(flat: FlatGraph) -> Iterator[str]:
+    """Of what a part may report: its nodes, by path, and its edges, by label."""
+    for one in flat.walk():
+        yield from (node.path for node in one.nodes)
+        yield from (edge.label for edge in one.edges)
 
 
 def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeReport]]) -> EdgeReport:

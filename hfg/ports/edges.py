@@ -151,9 +151,9 @@ class Edge:
         self.sent += 1
         return self.sent
 
-    def count_dropped(self) -> None:
-        """A token of it went nowhere."""
-        self.dropped += 1
+    def count_dropped(self, count: int = 1) -> None:
+        """So many tokens of it went nowhere."""
+        self.dropped += count
 
     def count_drained(self) -> None:
         """A token of it was processed without a firing (F12)."""

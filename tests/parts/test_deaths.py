@@ -11,12 +11,13 @@ import pytest
 
 import hfg
 from hfg.graph.flat import cut, flatten
-from hfg.parts.model.inheriting import Alignment, inheriting
+from hfg.parts.model.inheriting import UNKNOWN, Alignment, Inheritance, inheriting, keeping
 from hfg.parts.model.lives import Deaths
 from hfg.parts.processes import launching
 from hfg_transports.memory import Faults, Network
 
 LEDGER: dict[str, list[int]] = {}
+LONG_S = 30.0  # of virtual time: the run has not ended by itself
 
 
 @hfg.node
@@ -113,6 +114,19 @@ def at(seconds: float, *names: str) -> Callable[[Killer], Any]:
     return plan
 
 
+def in_turn(*deaths: tuple[float, str]) -> Callable[[Killer], Any]:
+    """Kill them one after the other, each so long after the run has begun; at first one is back after 0.1 s."""
+
+    async def plan(killer: Killer) -> None:
+        passed = 0.0
+        for moment, name in deaths:
+            await asyncio.sleep(moment - passed)
+            passed = moment
+            killer.parts[name].kill()
+
+    return plan
+
+
 def at_random(seed: int, names: list[str], times: int) -> Callable[[Killer], Any]:
     """Kill one of them now and then; seldom enough to be forgiven."""
 
@@ -164,21 +178,71 @@ def test_two_neighbours_that_die_at_one_moment_lose_and_double_nothing(killed: A
     assert report.outputs == {"out": [3000 + number for number in range(30)]}
 
 
+def relays(*takes_s: float, count: int) -> hfg.Graph:
+    """Relays in a row that take so long each."""
+    graph = chain(relays=len(takes_s), count=count)
+    for number, seconds in enumerate(takes_s):
+        graph[f"relay{number}"].takes_s = seconds
+    return graph
+
+
+@pytest.mark.rule("L2", "F12")
+def test_what_came_before_the_end_is_not_done_because_the_consumer_has_ended(killed: Any) -> None:
+    """The first two have seen the end, and the value before it is still on its way, when all of them die."""
+    made = killed(at(0.02, "relay0", "relay1", "relay2"))
+    report = hfg.run(relays(0.0, 0.0, 0.05, count=1), clock="virtual", until_s=LONG_S)
+    assert made[0].lives == {"relay0": 2, "relay1": 2, "relay2": 2}
+    assert (report.outcome, report.outputs) == ("done", {"out": [3000]})
+
+
 @pytest.mark.rule("L2")
-@pytest.mark.parametrize("seed", range(10))
-def test_what_a_join_puts_together_belongs_together_whoever_dies(killed: Any, seed: int) -> None:
-    killed(at_random(seed, ["left", "right", "join"], 5), seed)
+def test_what_a_consumer_had_when_it_died_is_sent_to_its_next_life_as_new(killed: Any) -> None:
+    """The producer had begun anew before, and was told by the one that died what it need not count again."""
+    made = killed(in_turn((0.7, "relay0"), (0.85, "relay1")))
+    report = hfg.run(relays(0.3, 0.5, count=2), clock="virtual", until_s=LONG_S)
+    assert made[0].lives == {"relay0": 2, "relay1": 2}
+    assert (report.outcome, report.outputs) == ("done", {"out": [2000, 2001]})
+
+
+def joined(count: int) -> hfg.Graph:
+    """What takes two ways belongs together where they meet."""
     graph = hfg.Graph()
     for name in ("left", "right", "join"):
         graph.group(name, process=True)
-    source, both = graph.add(numbers(count=40)), graph.add(pair(), group="join")
+    source, both = graph.add(numbers(count=count)), graph.add(pair(), group="join")
     for name, port, takes_s in (("left", both.a, 0.001), ("right", both.b, 0.006)):
         one = graph.add(relay(takes_s=takes_s), name=name, group=name)
         graph.connect(source.out, one.value)
         graph.connect(one.out, port)
     graph.connect(both.out, graph.output("out", tuple[int, int]))
-    report = hfg.run(graph, clock="virtual")
+    return graph
+
+
+@pytest.mark.rule("L2")
+@pytest.mark.parametrize("seed", range(10))
+def test_what_a_join_puts_together_belongs_together_whoever_dies(killed: Any, seed: int) -> None:
+    killed(at_random(seed, ["left", "right", "join"], 5), seed)
+    report = hfg.run(joined(40), clock="virtual")
     assert report.outputs == {"out": [(1000 + number, 1000 + number) for number in range(40)]}
+
+
+@pytest.mark.rule("L2", "L3")
+@pytest.mark.parametrize(
+    "deaths",
+    [
+        ((0.0, "join"), (0.05, "left")),
+        ((0.0, "left"), (0.0, "join")),
+        ((0.0, "left"), (0.0, "right"), (0.0, "join")),
+        ((0.0, "right"), (0.06, "join"), (0.105, "right"), (0.2, "left")),
+    ],
+    ids=["it waits to be told by one that dies", "both begin anew", "all do", "what waits there is counted"],
+)
+@pytest.mark.parametrize("count", [1, 8])
+def test_a_join_goes_on_when_those_before_it_begin_anew_too(killed: Any, deaths: Any, count: int) -> None:
+    killed(in_turn(*deaths))
+    report = hfg.run(joined(count), clock="virtual", until_s=LONG_S)
+    assert report.outcome == "done"
+    assert report.outputs == {"out": [(1000 + number, 1000 + number) for number in range(count)]}
 
 
 @pytest.mark.rule("L2", "P3")
@@ -293,6 +357,118 @@ def test_two_chains_in_one_part_do_not_keep_step() -> None:
     assert inheriting(cut(flatten(graph))) == frozenset()
     wanted = [1000 + number for number in range(40)]
     assert hfg.run(graph, clock="virtual").outputs == {"slow_out": wanted, "fast_out": wanted}
+
+
+def in_circles() -> hfg.Graph:
+    """What leaves a process meets there again with what another has made of it."""
+    graph = hfg.Graph()
+    for name in ("here", "there"):
+        graph.group(name, process=True)
+    first, other = graph.add(relay(takes_s=0.0), group="here"), graph.add(relay(takes_s=0.0), group="there")
+    both = graph.add(pair(), group="here")
+    graph.connect(graph.add(numbers(count=30)).out, first.value)
+    graph.connect(first.out, other.value)
+    graph.connect(first.out, both.a)
+    graph.connect(other.out, both.b)
+    graph.connect(both.out, graph.output("out", tuple[int, int]))
+    return graph
+
+
+@pytest.mark.rule("L1", "L2")
+@pytest.mark.parametrize("deaths", [(), ("here",), ("there",), ("here", "there")])
+def test_two_parts_that_feed_each_other_keep_what_they_do_and_do_not_wait_for_each_other(
+    killed: Any, deaths: tuple[str, ...]
+) -> None:
+    cutting = cut(flatten(in_circles()))
+    assert (inheriting(cutting), keeping(cutting)) == (frozenset(), {"here": True, "there": True})
+    killed(at(0.04, *deaths))
+    report = hfg.run(in_circles(), clock="virtual", until_s=LONG_S)
+    assert (report.outcome, report.outputs) == ("done", {"out": [(1000 + at, 2000 + at) for at in range(30)]})
+
+
+@pytest.mark.rule("L2")
+def test_a_loop_by_way_of_the_main_part_is_one_as_well() -> None:
+    graph = chain(relays=2)
+    assert inheriting(cut(flatten(graph))) == {"relay0", "relay1"}
+    again = graph.add(relay(), group="relay0", name="again")
+    pairs = graph.add(pair(), group="relay0", name="pairs")
+    graph.connect(graph["relay1"].out, (between := graph.add(relay(), name="between")).value)
+    graph.connect(between.out, again.value)
+    graph.connect(graph["relay0"].out, pairs.a)
+    graph.connect(again.out, pairs.b)
+    graph.connect(pairs.out, graph.output("pairs", tuple[int, int]))
+    assert set(keeping(cut(flatten(graph)))) == {"relay0", "relay1"}
+
+
+@pytest.mark.rule("L1", "F12")
+@pytest.mark.parametrize(("shorter", "longer"), [("a", "b"), ("b", "a")])
+def test_a_source_that_goes_on_longer_than_its_partner_is_not_held_up(shorter: str, longer: str) -> None:
+    """One node of the part has ended, and what is still for it is drained; another one goes on."""
+    graph = hfg.Graph()
+    graph.group("far", process=True)
+    before, both = graph.add(relay(takes_s=0.0), group="far"), graph.add(pair(), group="far")
+    graph.connect(graph.add(numbers(count=5)).out, both.ports.inputs[shorter])
+    graph.connect(graph.add(numbers(count=40)).out, before.value)
+    graph.connect(before.out, both.ports.inputs[longer])
+    graph.connect(before.out, graph.output("all", int))
+    graph.connect(both.out, graph.output("pairs", tuple[int, int]))
+    assert inheriting(cut(flatten(graph))) == {"far"}
+    report = hfg.run(graph, clock="virtual", until_s=LONG_S)
+    assert report.outcome == "done"
+    assert report.outputs["all"] == [1000 + number for number in range(40)]
+    assert len(report.outputs["pairs"]) == 5
+
+
+@hfg.node
+async def latest(value: int) -> None:
+    LEDGER.setdefault("latest", []).append(value)
+
+
+class Counts(hfg.Node):
+    """Says a number now and then, whether somebody listens or not."""
+
+    said = hfg.Event(int)
+
+    @hfg.slot
+    def go(self, value: int) -> None:
+        self.said.trigger(value)
+
+
+@pytest.mark.rule("L3", "P5")
+def test_signals_that_may_be_lost_go_on_when_both_ends_have_begun_anew(killed: Any) -> None:
+    LEDGER.pop("latest", None)
+    killed(in_turn((0.1, "listener"), (0.15, "speaker")))
+    graph = hfg.Graph()
+    for name in ("speaker", "listener"):
+        graph.group(name, process=True)
+    speaker, source = graph.add(Counts(), group="speaker"), graph.add(ticks(count=60))
+    graph.connect(source.out, speaker.go)
+    graph.connect(speaker.said, graph.add(latest(), group="listener").value, overflow="drop_oldest")
+    assert hfg.run(graph, clock="virtual", until_s=LONG_S).outcome == "done"
+    found = LEDGER.pop("latest")
+    assert found[-1] == 59
+    assert [number for number in found if number > 40] == list(range(41, 60))
+
+
+@pytest.mark.rule("L2")
+def test_who_does_not_know_yet_where_it_goes_on_says_so_and_is_waited_for() -> None:
+    alignment = Alignment(["a", "b"])
+    alignment.goes_on("a", (1, 4))
+    alignment.goes_on("b", UNKNOWN)
+    assert alignment.arrive("a", [fifth := (("five", 0, 0.0), (1, 5))]) == {}
+    assert (alignment.behind, alignment.held("a")) == (UNKNOWN, 1)
+    alignment.goes_on("b", (0, 0))  # nothing was ever sent there
+    assert alignment.arrive("b", []) == {"a": (0, [fifth])}
+    assert (alignment.behind, alignment.held("a")) == ((1, 4), 0)
+
+
+@pytest.mark.rule("L2")
+def test_positions_are_those_of_the_edge_that_goes_on_longest() -> None:
+    inheritance = Inheritance(["a", "b"])
+    assert inheritance.arrive("b", [(1, 1), (1, 2), (1, 3)], ended=False) == []
+    assert inheritance.arrive("a", [(1, 1)], ended=False) == [(1, 1)]
+    assert inheritance.arrive("a", [(1, 2)], ended=True) == [(1, 2), (1, 3)]
+    assert inheritance.arrive("b", [(1, 4)], ended=True) == [(1, 4)]
 
 
 @pytest.mark.rule("L2")

@@ -12,12 +12,14 @@ import hfg
 from hfg.engine.face.composition import Composition
 from hfg.engine.runtime.settings import Settings
 from hfg.graph.flat import MAIN, cut, flatten
+from hfg.links.frames import Tokens, write
 from hfg.links.running import LinkSender
 from hfg.parts.model.agreement import Answer, Question, Rest
 from hfg.parts.model.messages import (
     Ask,
     Begin,
     Call,
+    GoesOn,
     Hears,
     Joins,
     Message,
@@ -31,6 +33,7 @@ from hfg.parts.model.messages import (
     Shares,
     Speaks,
     Told,
+    Untrue,
     pack,
     unpack,
 )
@@ -39,8 +42,9 @@ from hfg.parts.running.channels import Carrier, Channel, name_of
 from hfg.parts.running.part import Part
 from hfg.token import Token
 from hfg.trace import NodeEnded, TokenProcessed, TokenSent, TokenTaken, TraceEvent
+from hfg.transport import Traffic
 from hfg_transports.memory import Network
-from tests.parts.test_deaths import chain
+from tests.parts.test_deaths import Counts, chain, latest
 
 RUN = "hfg/test"
 TO_RELAY, FROM_RELAY = "numbers.out -> relay0.value", "relay0.out -> out"
@@ -58,6 +62,7 @@ TO_RELAY, FROM_RELAY = "numbers.out -> relay0.value", "relay0.out -> out"
         Result(7, value={"nodes": [1, 2.5, None, "x", b"y"]}),
         Seen(2, tokens=[Parcel(b"", b"\x01")], events=[Passed(0.5, "set", "a", Parcel(b"", b""), "b")], count=9),
         Joins("a -> b", 3, 1, 2, "deaf"),
+        GoesOn("a -> b", 1, 2),
         Sees("a -> b", "segment", 1, "it is on another host"),
     ],
     ids=lambda message: type(message).__name__,
@@ -119,12 +124,13 @@ def test_a_channel_counts_what_is_no_message_and_hears_what_comes_behind() -> No
         Sees("no -> where", "segment", 1),
         Speaks(TO_RELAY, False, 1),  # which leaves, so its producer is here
         Hears(FROM_RELAY, "over", 1),  # which comes in, so its consumer is
+        GoesOn(TO_RELAY, 1, 1),
         Shares(TO_RELAY, "segment", 1),
         Sees(FROM_RELAY, "segment", 1),
     ],
     ids=lambda message: f"{type(message).__name__} {message.label}",
 )
-def test_what_is_said_of_an_edge_that_is_not_there_changes_nothing(message: OfAnEdge) -> None:
+def test_what_is_said_of_an_edge_that_is_not_there_is_refused_and_changes_nothing(message: OfAnEdge) -> None:
     async def main() -> None:
         cutting = cut(flatten(chain()))
         edges = list(cutting.edges_of(MAIN))
@@ -132,11 +138,37 @@ def test_what_is_said_of_an_edge_that_is_not_there_changes_nothing(message: OfAn
         part = Part(MAIN, Composition(cutting.parts[MAIN], Settings()), edges, rests=said.append)
         session = await Network().open()
         carrier = Carrier(part, session, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *told: said.append(told))
-        carrier.hear(message)
+        for other in cutting.parts:
+            with pytest.raises(Untrue, match="an edge"):
+                carrier.hear(other, message)
         outlet, inlet = part.outlets[TO_RELAY], part.inlets[FROM_RELAY]
         assert (outlet.hearing, outlet.sent, inlet.speaking, inlet.received, said) == ("open", 0, True, 0, [])
         await carrier.close()
         await session.close()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        runner.run(main())
+
+
+@pytest.mark.rule("L4", "P5")
+def test_a_gap_in_the_numbers_of_an_edge_that_may_lose_is_counted_however_large_it_is() -> None:
+    async def main() -> None:
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        speaker = graph.add(Counts(), name="speaker", group="far")
+        graph.connect(speaker.said, graph.add(latest(), name="latest").value, overflow="drop_oldest")
+        cutting = cut(flatten(graph))
+        edges = list(cutting.edges_of(MAIN))
+        part = Part(MAIN, Composition(cutting.parts[MAIN], Settings()), edges, rests=lambda _: None)
+        here, there = await (network := Network()).open(), await network.open()
+        carrier = Carrier(part, here, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *_: None)
+        publisher = there.publisher(f"{RUN}/edge/{edges[0].number}/tokens", Traffic.BULK)
+        publisher.put(write(Tokens(1, 1, 2**61, 1, [b""])), b"")
+        await asyncio.sleep(0.01)
+        assert part.inlets["speaker.said -> latest.value"].received >= 2**61 - 1
+        await carrier.close()
+        for session in (here, there):
+            await session.close()
 
     with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
         runner.run(main())

@@ -41,7 +41,9 @@ class Outlet:
       hearing: what that does with them, as far as is known here.
     """
 
-    def __init__(self, engine: Engine, worker: Worker, *, keeps: bool, wake: Callable[[], None]) -> None:
+    def __init__(
+        self, engine: Engine, worker: Worker, *, keeps: bool, wake: Callable[[], None], drains: bool = True
+    ) -> None:
         """Stand there.
 
         Args:
@@ -49,10 +51,13 @@ class Outlet:
           worker: the reader at the end of the edge.
           keeps: tokens lie here until they were taken over there; else they are gone when they have left.
           wake: called, amid the pump, when something lies here that has not left.
+          drains: what is for a consumer that has ended is drained here; else over there, where it may be known when all
+            is done that came of what it took before.
         """
         self._engine = engine
         self._worker = worker
         self._keeps = keeps
+        self._drains = drains
         (self._edge,) = worker.in_edges
         self._waiting = 0  # tokens that have left and still lie here
         self._owed = 0  # tokens that a former life has kept and that are not taken: the oldest of those under way
@@ -132,6 +137,21 @@ class Outlet:
         """Whether something lies here that has not left."""
         return bool(self._edge.untaken > self._waiting)
 
+    @property
+    def holds_up(self) -> bool:
+        """Whether somebody is to wait for what becomes of tokens here.
+
+        Not where nobody hears them; nor where one end of the edge has ended, once all is taken that came before.
+        """
+        if self.hearing == "deaf":
+            return False
+        return bool(self._edge.untaken) or not (self.hearing == "over" or self.is_over)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing will come here any more."""
+        return bool(self._edge.source.blocked & ENDED) and not self._edge.untaken
+
     def be_taken(self, total: int) -> None:
         """So many in all were taken by the consumer: their places are free (F5, F8)."""
         count = total - self.taken
@@ -153,14 +173,14 @@ class Outlet:
         worker = self._worker
         if before == "deaf":
             enable_around(worker)
-        elif before == "over":
+        elif before == "over" and self._drains:
             worker.allow(ENDED)
             worker.not_ended()
             enable_around(worker)
         if hearing == "deaf":
             self._waiting = 0
             disable_around([worker])
-        elif hearing == "over":
+        elif hearing == "over" and self._drains:
             self._waiting = 0
             worker.end()
             drain_left(worker.in_edges)
@@ -248,14 +268,12 @@ class Inlet:
     def skip(self, count: int) -> None:
         """So many have come that are not for this life: what belongs to them was done by a former one."""
         self.received += count
-        for _ in range(count):
-            self._edge.count_dropped()
+        self._edge.count_dropped(count)
 
     def lose(self, count: int) -> None:
         """So many have left and will never come: the edge may lose some, and counts them."""
         self.received += count
-        for _ in range(count):
-            self._edge.count_dropped()
+        self._edge.count_dropped(count)
 
     def arrive(self, tokens: Sequence[tuple[Any, int, float]]) -> None:
         """Tokens have come over the link: value, modifier and stamp of each."""

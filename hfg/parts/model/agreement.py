@@ -16,11 +16,11 @@ answers may come at any time and in any order. Knows no network, no clock and no
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import msgspec
 
-__all__ = ["Account", "Agreement", "Answer", "Question", "Rest", "Step"]
+__all__ = ["Account", "Agreement", "Answer", "Counted", "Question", "Rest", "Step"]
 
 Step: TypeAlias = Literal[
     "missing", "lose", "rests", "fullest", "grow", "held", "give_up", "complete", "end", "stuck", "finish"
@@ -30,9 +30,26 @@ _STEPS: Final[tuple[Step, ...]] = ("rests", "fullest", "held", "give_up", "compl
 """What is asked of all parts, in this order (SEMANTICS "quiet"); the others are asked for by the answers."""
 
 
-Account: TypeAlias = tuple[int, int, str, bool]
+Counted: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**62)]
+
+Account: TypeAlias = tuple[Counted, Counted, str, bool]
 """What one side knows of an edge: how many tokens have left or come, how many of them were taken, whether the consumer
 takes, drains or is sent none, and whether the producer is enabled."""
+
+
+_ANSWERS: Final[dict[Step, Any]] = {
+    "missing": Any,
+    "lose": Any,
+    "rests": Any,
+    "finish": Any,
+    "fullest": tuple[float, float, str] | None,
+    "stuck": list[str],
+}
+"""What is answered to a question; to the others, whether it is so."""
+
+
+_QUESTIONS: Final[dict[Step, Any]] = {"lose": dict[str, Counted], "grow": str, "finish": list[str]}
+"""What a question of these steps says."""
 
 
 class Rest(msgspec.Struct, frozen=True):
@@ -64,6 +81,14 @@ class Question(msgspec.Struct, frozen=True):
     step: Step
     rest: int
     value: Any = None
+
+    def check(self) -> None:
+        """Check that its value is one.
+
+        Raises:
+          ValueError: it is not.
+        """
+        msgspec.convert(self.value, _QUESTIONS.get(self.step, Any))
 
 
 class Answer(msgspec.Struct, frozen=True):
@@ -137,9 +162,15 @@ class Agreement:
         self._step = None
 
     def hear(self, answer: Answer) -> None:
-        """A part has answered."""
+        """A part has answered.
+
+        Raises:
+          ValueError: not with what such a question asks for.
+        """
         if self._step is None or answer.step != self._step or self._round.get(answer.part) != answer.rest:
             return  # to a question of which nothing comes any more
+        if not answer.moved:
+            msgspec.convert(answer.value, _ANSWERS.get(answer.step, bool | None))
         if answer.moved:
             self._step = None  # it will rest again
             return

@@ -2,19 +2,20 @@
 
     Whole -> part     Open, TellTime, Begin, Question, Reborn, Kept, Finish, Call, Close
     Part  -> whole    AskTime, Opened, Rest, Answer, Keep, Ended, Result, Seen, Logged, Closed
-    Part  -> part     Speaks, Hears, Joins, Shares, Sees
+    Part  -> part     Speaks, Hears, Joins, GoesOn, Shares, Sees
 
 All of it is data of declared types (rule L4). Stands on the files of graphs and on `agreement`.
 """
 
 from __future__ import annotations
 
-from typing import Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import msgspec
 
 from hfg.engine.observing.report import EdgeReport, NodeReport
-from hfg.parts.model.agreement import Answer, Question, Rest
+from hfg.engine.runtime.borders import Hearing
+from hfg.parts.model.agreement import Answer, Counted, Question, Rest
 from hfg.parts.model.clocks import RunClock
 from hfg.trace import (
     ActivityChanged,
@@ -48,6 +49,7 @@ __all__ = [
     "Ended",
     "Failed",
     "Finish",
+    "GoesOn",
     "Hears",
     "Joins",
     "Keep",
@@ -68,9 +70,26 @@ __all__ = [
     "Speaks",
     "TellTime",
     "Told",
+    "Untrue",
     "pack",
     "unpack",
 ]
+
+
+Outcome: TypeAlias = Annotated[str, msgspec.Meta(pattern="^(done|failed|stalled|stopped|aborted|cancelled|until)$")]
+"""How a run ends; see `Report`."""
+
+Stream: TypeAlias = Annotated[int, msgspec.Meta(ge=-1, le=2**62)]
+"""The stream of a position, which may be that of `UNKNOWN`."""
+
+Label: TypeAlias = Annotated[str, msgspec.Meta(max_length=4096)]
+
+
+class Untrue(Exception):
+    """What a part has said is a message, and cannot be so; nothing was changed by it.
+
+    Its text goes on after 'it was told that', as in 'an edge is ... that has no end there'.
+    """
 
 
 class Failed(msgspec.Struct, frozen=True):
@@ -178,14 +197,14 @@ class Rests(msgspec.Struct, frozen=True, tag=True):
 class Finish(msgspec.Struct, frozen=True, tag=True):
     """The run is over."""
 
-    outcome: str
+    outcome: Outcome
 
 
 class Ended(msgspec.Struct, frozen=True, tag=True):
     """The run is over in a part."""
 
     part: str
-    outcome: str
+    outcome: Outcome
     failed: Failed | None = None
 
 
@@ -280,7 +299,7 @@ class Seen(msgspec.Struct, frozen=True, tag=True):
     number: int
     events: list[Sight] = []
     tokens: list[Parcel] = []
-    count: int = 0
+    count: Counted = 0
 
 
 class Close(msgspec.Struct, frozen=True, tag=True):
@@ -312,24 +331,24 @@ class Closed(msgspec.Struct, frozen=True, tag=True):
 class Speaks(msgspec.Struct, frozen=True, tag=True):
     """The producer of an edge is enabled from now on, or not, behind so many tokens."""
 
-    label: str
+    label: Label
     speaking: bool
-    total: int
+    total: Counted
 
 
 class Hears(msgspec.Struct, frozen=True, tag=True):
     """What the consumer of an edge does with tokens from now on, having taken so many."""
 
-    label: str
-    hearing: str
-    total: int
+    label: Label
+    hearing: Hearing
+    total: Counted
 
 
 class Reborn(msgspec.Struct, frozen=True, tag=True):
     """A part has died and begins anew: from now on this life of it is believed."""
 
     part: str
-    life: int
+    life: Counted
 
 
 class Joins(msgspec.Struct, frozen=True, tag=True):
@@ -338,15 +357,28 @@ class Joins(msgspec.Struct, frozen=True, tag=True):
     Attributes:
       label: of the edge.
       total: how many tokens are done, said by the producer; how many have come, said by the consumer.
-      stream, number: the position of the last of them.
+      stream, number: the position of the last of them; or `UNKNOWN`.
       hearing: what the consumer does with tokens.
     """
 
-    label: str
-    total: int
-    stream: int
-    number: int
-    hearing: str = "open"
+    label: Label
+    total: Counted
+    stream: Stream
+    number: Counted
+    hearing: Hearing = "open"
+
+
+class GoesOn(msgspec.Struct, frozen=True, tag=True):
+    """Behind which position a producer goes on that has begun anew, once it knows that.
+
+    Attributes:
+      label: of the edge.
+      stream, number: the position of the last token that was done.
+    """
+
+    label: Label
+    stream: Stream
+    number: Counted
 
 
 class Logged(msgspec.Struct, frozen=True, tag=True):
@@ -361,8 +393,8 @@ class Logged(msgspec.Struct, frozen=True, tag=True):
       file, line, function: where in the code.
     """
 
-    logger: str
-    level: int
+    logger: Annotated[str, msgspec.Meta(max_length=500)]
+    level: Annotated[int, msgspec.Meta(ge=0, le=1000)]
     text: str
     path: str
     created: float
@@ -399,7 +431,7 @@ class Sees(msgspec.Struct, frozen=True, tag=True):
     refused: str = ""
 
 
-OfAnEdge: TypeAlias = Speaks | Hears | Joins | Shares | Sees
+OfAnEdge: TypeAlias = Speaks | Hears | Joins | GoesOn | Shares | Sees
 """What the two ends of an edge between parts tell each other."""
 
 Message: TypeAlias = (
@@ -425,6 +457,7 @@ Message: TypeAlias = (
     | Speaks
     | Hears
     | Joins
+    | GoesOn
     | Shares
     | Sees
 )

@@ -143,6 +143,16 @@ class Other:
         return self._launched is not None and not self._gone
 
     @property
+    def is_leaving(self) -> bool:
+        """Whether it was told to go."""
+        return self._leaves
+
+    @property
+    def is_keeping(self) -> bool:
+        """Whether what it said last is still being written into its ledger."""
+        return self._keeping is not None and not self._keeping.done()
+
+    @property
     def process(self) -> int:
         """The id of its process; 0 if it has none."""
         return 0 if self._launched is None else self._launched.process
@@ -206,7 +216,9 @@ class Other:
             await asyncio.wait({self._keeping})
 
     def come_back(self, returning: Coroutine[Any, Any, None]) -> None:
-        """Begin its next life by that."""
+        """Begin its next life by that; one that died while it was set up is waited for no longer."""
+        if self._returning is not None:
+            self._returning.cancel()
         self._returning = asyncio.get_running_loop().create_task(returning, name=f"hfg return of {self.name}")
 
     async def stay_away(self) -> None:

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import msgspec
+
 from hfg.engine.face.composition import Composition
 from hfg.engine.observing.report import edge_reports, node_reports
 from hfg.engine.runtime.engine import Engine
@@ -45,6 +47,7 @@ from hfg.parts.model.messages import (
     Rests,
     TellTime,
     Told,
+    Untrue,
 )
 from hfg.parts.model.sieve import sieve
 from hfg.parts.running.channels import Carrier, Channel, name_of
@@ -85,6 +88,9 @@ class Worker:
         self._build = build
         self._inbox: asyncio.Queue[Message] = asyncio.Queue()
         self._channels = {MAIN: Channel(session, run, name, MAIN, lives, self._inbox.put_nowait)}
+        self._lives: dict[str, int] = {}  # of neighbours
+        self._has_begun = False
+        self._asked = 0  # how often for the time, and not been told
         self._part: Part | None = None
         self._carrier: Carrier | None = None
         self._shares_memory = False
@@ -98,18 +104,13 @@ class Worker:
         try:
             while True:
                 message = self._postponed.popleft() if self._postponed else await self._inbox.get()
-                if isinstance(message, Open):
-                    await self._open(message)
-                elif isinstance(message, Close):
+                if isinstance(message, Close):
                     await self._close()
                     return
-                elif isinstance(message, TellTime):
-                    self._told_time(message)
-                elif isinstance(message, Reborn):
-                    if self._part is not None:
-                        await self._admit(self._part, message)
-                elif self._part is not None:
-                    self._obey(self._part, message)
+                try:
+                    await self._do(message)
+                except Untrue as problem:
+                    self._channels[MAIN].refuse(f'it has said "{type(message).__name__}", {problem}')
         finally:
             if self._part is not None and not self._is_closed:  # nobody is there any more who would say so
                 self._part.finish("cancelled", None)
@@ -117,6 +118,28 @@ class Worker:
                     self._serving.close()
                 await self._part.composition.lifetime.close()
             await self._leave()
+
+    async def _do(self, message: Message) -> None:
+        """Do as the main part says.
+
+        Raises:
+          Untrue: it cannot be meant.
+        """
+        part = self._part
+        if isinstance(message, Open):
+            if part is not None:
+                raise Untrue("for the second time")
+            await self._open(message)
+        elif isinstance(message, TellTime):
+            self._told_time(message)
+        elif part is None:
+            raise Untrue("before there is a part")
+        elif isinstance(message, Reborn):
+            await self._admit(part, message)
+        elif isinstance(message, OfAnEdge):
+            self._hear(part, MAIN, message)
+        else:
+            self._obey(part, message)
 
     def log(self, logged: Logged) -> None:
         """Bring a log record to the main part; when that is slow, some are left out."""
@@ -165,7 +188,7 @@ class Worker:
             composition,
             edges,
             rests=self._rests,
-            inherits=self._name in inheriting(cutting),
+            inheriting=inheriting(cutting),
             returns=self._life > message.incarnations[MAIN],
             keeper=keeper,
         )
@@ -200,13 +223,17 @@ class Worker:
         return keeper
 
     def _channel_to(self, part: Part, other: str, life: int) -> Channel:
-        return Channel(self._session, self._run, self._name, other, (self._life, life), partial(self._obey, part))
+        self._lives[other] = life
+        hear = partial(self._hear, part, other)
+        return Channel(self._session, self._run, self._name, other, (self._life, life), hear)
 
     async def _admit(self, part: Part, message: Reborn) -> None:
         """A neighbour has died and begins anew; nobody hears any more what was said to the one that died."""
-        old = self._channels.get(message.part)
-        if old is None or self._carrier is None:
-            return
+        if message.part not in self._lives or self._carrier is None:
+            return  # who is no neighbour
+        if message.life <= max(self._lives[message.part], FIRST_LIFE):
+            raise Untrue(f"of life {message.life} of {name_of(message.part)}, which has had later ones")
+        old = self._channels[message.part]
         await old.close()
         self._channels[message.part] = self._channel_to(part, message.part, message.life)
         self._carrier.admit(message.part, message.life)
@@ -224,6 +251,7 @@ class Worker:
             while not isinstance(message := await self._inbox.get(), TellTime):
                 self._postponed.append(message)
             offset.hear(message.asked, message.told, time.monotonic())
+            self._asked = max(self._asked - 1, 0)
         used_s = offset.offset_s
         engine.follow(clock.ahead_s + used_s, clock.began_s, lambda: offset.error_of(used_s, time.monotonic()))
         self._ask_time_later()
@@ -234,26 +262,39 @@ class Worker:
 
     def _ask_time(self) -> None:
         if not self._is_closed:
+            self._asked += 1
             self._say(MAIN, AskTime(time.monotonic()))
 
     def _told_time(self, message: TellTime) -> None:
-        if self._offset is not None:
-            self._offset.hear(message.asked, message.told, time.monotonic())
-            self._ask_time_later()
+        if self._offset is None or not self._asked:
+            raise Untrue("without having been asked")
+        self._asked -= 1
+        self._offset.hear(message.asked, message.told, time.monotonic())
+        self._ask_time_later()
 
     # --- what is said -----------------------------------------------------------------------------------------------
 
+    def _hear(self, part: Part, other: str, message: Message) -> None:
+        """Another part has said something; what is to be done only the main one says."""
+        if not isinstance(message, OfAnEdge):
+            raise Untrue("which only the main part says")
+        assert self._carrier is not None
+        self._carrier.hear(other, message)
+
     def _obey(self, part: Part, message: Message) -> None:
-        if isinstance(message, OfAnEdge):
-            assert self._carrier is not None
-            self._carrier.hear(message)
-            return
         match message:
             case Begin():
+                if self._has_begun:
+                    raise Untrue("for the second time")
+                self._has_begun = True
                 part.begin()
             case Kept():
                 part.be_kept(message.number)
             case Ask():
+                try:
+                    message.question.check()
+                except msgspec.ValidationError as error:
+                    raise Untrue(f"which is no such question: {error}") from error
                 self._say(MAIN, Told(part.answer(message.question)))
             case Finish():
                 part.finish(message.outcome, None)
@@ -261,7 +302,7 @@ class Worker:
                 assert self._serving is not None
                 self._serving.obey(message)
             case _:
-                _LOGGER.warning('%s was told "%s", which it does not know', name_of(self._name), type(message).__name__)
+                raise Untrue("which is not for a part")
 
     def _rests(self, rest: Rest) -> None:
         self._say(MAIN, Rests(rest))

@@ -22,10 +22,10 @@ from hfg.links import Outbox
 from hfg.links.consumer import ExactConsumer
 from hfg.links.local import LocalEndpoint, LocalRoute
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
-from hfg.logs import log
+from hfg.logs import Log
 from hfg.parts.model.failing import codec_of
 from hfg.parts.model.inheriting import Arrived, Where
-from hfg.parts.model.messages import Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, pack, unpack
+from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, Untrue, pack, unpack
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
@@ -33,6 +33,8 @@ from hfg.token import Token
 from hfg.transport import Datagrams, Delivery, EncodedToken, Position, Session
 
 __all__ = ["Carrier", "Channel", "name_of"]
+
+_LOGGER = Log("hfg.parts")
 
 _WINDOW: Final = 64  # messages on their way
 _MAIN: Final = "main"  # what the part without a name is called in keys
@@ -64,7 +66,7 @@ class Channel:
     What cannot leave at once waits in memory: there is little of it, and whoever says something goes on.
 
     Attributes:
-      refused: how much has come that is no message (L4).
+      refused: how much has come that is no message, or says what cannot be so (L4).
     """
 
     def __init__(
@@ -84,8 +86,9 @@ class Channel:
           here: the name of this part.
           there: that of the other.
           lives: which life of each this is.
-          receive: called with each message.
+          receive: called with each message; it may raise `Untrue`.
         """
+        self._there = there
         one, other = name_of(here), name_of(there)
         self.refused = 0
         self._receive = receive
@@ -118,9 +121,18 @@ class Channel:
             message = unpack(delivery.token[1])
             self._in.done()
             if message is None:
-                self.refused += 1  # from nobody of this run
-            else:
+                self.refuse("it has sent what is no message")
+                continue
+            try:
                 self._receive(message)
+            except Untrue as problem:
+                self.refuse(f'it has said "{type(message).__name__}", {problem}')
+
+    def refuse(self, why: str) -> None:
+        """What has come changes nothing; it is counted, and logged the first time."""
+        self.refused += 1
+        if self.refused == 1:
+            _LOGGER.warning("%s is not believed: %s; more of the kind is counted", name_of(self._there), why)
 
     async def flush(self, within_s: float) -> None:
         """Wait until the other has all that was said, or for so long."""
@@ -200,20 +212,32 @@ class Carrier:
             if link.other == other:
                 link.admit(life)
 
-    def hear(self, message: OfAnEdge) -> None:
-        """The other end of an edge has said something; what is said of no edge that comes in, or leaves, is nothing."""
+    def hear(self, other: str, message: OfAnEdge) -> None:
+        """A part has said something of an edge.
+
+        Raises:
+          Untrue: it has no such end of an edge to this one, or that end cannot be so.
+        """
         label = message.label
-        if label not in (self._outgoing if isinstance(message, Hears | Sees) else self._links):
-            return
-        if isinstance(message, Speaks | Shares) and label not in self._incoming:
-            return
+        link = self._links.get(label)
+        says_producer = isinstance(message, Speaks | Shares | GoesOn)
+        says_consumer = isinstance(message, Hears | Sees)
+        if (
+            link is None
+            or link.other != other
+            or (says_producer and label not in self._incoming)
+            or (says_consumer and label not in self._outgoing)
+        ):
+            raise Untrue(f'of an edge "{label:.200}", which does not lead so from it to {name_of(self._part.name)}')
         match message:
             case Speaks():
                 self._part.speak(label, message.speaking, message.total)
             case Hears():
-                self._part.hear(label, message.hearing, message.total)  # type: ignore[arg-type]  # checked there
+                self._part.hear(label, message.hearing, message.total)
             case Joins():
-                self._links[label].join(message)
+                link.join(message)
+            case GoesOn():
+                self._part.goes_on(label, (message.stream, message.number))
             case Shares():
                 self._incoming[label].borrow(message)
             case Sees():
@@ -248,7 +272,7 @@ class _Ways:
         try:
             self._endpoint = endpoint = LocalEndpoint(self._name(here, lives[here]), session.largest_message)
         except TransportError as error:
-            log().debug("%s goes over the network alone: %s", name_of(here), error)
+            _LOGGER.debug("%s goes over the network alone: %s", name_of(here), error)
         else:
             self._routes = {
                 other: LocalRoute(endpoint, session, self._name(other, lives[other])) for other in sorted(beside)
@@ -299,6 +323,10 @@ class _NearEnd:
         self._codec = _codec_of(edge)
         self._tell = partial(world.say, other)
 
+    def _need_to_join(self, *, waits: bool) -> None:
+        if not waits:
+            raise Untrue(f'of edge "{self._edge.label}", which this life of {name_of(self._part.name)} knows already')
+
 
 class _Outgoing(_NearEnd):
     """The near end of the link of an edge that leaves."""
@@ -315,6 +343,7 @@ class _Outgoing(_NearEnd):
         self._sender: LinkSender | BoundedSender
         outbox = None if part.keeper is None else part.keeper.outbox(edge.label)
         way = world.ways.to(edge.target)
+        self._kept_from = 1 if outbox is None else outbox.first
         if edge.guarantee == "exact":
             self._sender = sender = LinkSender(
                 way,
@@ -420,6 +449,10 @@ class _Outgoing(_NearEnd):
         """See `Outgoing`."""
         self._tell(Speaks(self._edge.label, speaking, total))
 
+    def goes_on(self, last: Where) -> None:
+        """See `Outgoing`."""
+        self._tell(GoesOn(self._edge.label, *last))
+
     def _released(self) -> None:
         if self._lending is not None:
             self._lending.settle()
@@ -433,6 +466,9 @@ class _Outgoing(_NearEnd):
             sender.admit(name_of(self._edge.target), life)
         stream, number = sender.machine.position
         number -= self._unfinished - len(self._held)
+        if not stream:
+            stream, number = self._part.behind
+        self._known = (0, 0)  # it has nothing
         if self._lending is not None:
             self._lending.admit()
         done = self._part.outlets[label].sent - self._unfinished
@@ -441,13 +477,21 @@ class _Outgoing(_NearEnd):
         self._part.consumer_returns(label)
 
     def join(self, message: Joins) -> None:
-        """The consumer says what it has of former lives."""
+        """The consumer says what it has of former lives; it may wait to be told where this one goes on.
+
+        Raises:
+          Untrue: nobody waits to be told.
+        """
+        self._need_to_join(waits=self._waits_to_join)
+        if isinstance(self._sender, LinkSender) and not self._part.inherits:
+            stream, number = self._sender.machine.position
+            self.goes_on((stream, number))
         self._known = (message.stream, message.number)
         self._waits_to_join = False
         total = message.total
         if self._part.keeper is not None:
             total += self._ahead_of(message) - self._part.outlets[self._edge.label].sent
-        self._part.precede(self._edge.label, total, message.hearing)  # type: ignore[arg-type]  # checked there
+        self._part.precede(self._edge.label, total, message.hearing)
         if self._part.keeper is not None:
             self._released()
 
@@ -456,8 +500,8 @@ class _Outgoing(_NearEnd):
         if not isinstance(self._sender, LinkSender):
             return 0
         stream, number = self._sender.machine.position
-        known = stream == message.stream
-        return len(self._held) + (number - message.number if known else self._sender.machine.unfinished)
+        known = message.number if stream == message.stream else self._kept_from - 1  # it had nothing: all that was kept
+        return len(self._held) + number - known
 
     def share(self, world: _World) -> None:
         """Put large arrays into shared memory from now on, if there are any and the consumer can open it."""
@@ -502,6 +546,8 @@ class _Incoming(_NearEnd):
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
         self._waits_to_join = lives[edge.source] < lives[part.name]
+        self._segment = partial(segment_of, world.run, edge=edge.number)
+        self._lent_by = lives[edge.source]
         self._before = 0  # tokens of former lives of the producer; of a lossy edge, where numbers tell what is lost
         self._receiver: LinkReceiver | BoundedReceiver
         way = world.ways.to(edge.source)
@@ -574,19 +620,27 @@ class _Incoming(_NearEnd):
         """The producer begins anew: what it has sent until now is told to it."""
         label, machine = self._edge.label, self._receiver.machine
         machine.believe(life)
+        self._lent_by = life
+        if self._waits_to_join and self._undecoded:  # who would have told is gone: counting begins with what came
+            self._before = 1 - self._undecoded[0].position.sequence
+        self._waits_to_join = False
         if self._undecoded:  # they lie in the memory of a life that died before it could say so to this one
             self._borrowing = None
             self._decode()
         stream = number = 0
         if isinstance(machine, ExactConsumer):
             stream, number = machine.accepted
-        inlet = self._part.inlets[label]
-        self._before = inlet.received
+        self._before = came = self._part.came(label)
         self._part.producer_returns(label, remembers=self._remembers)
-        self._tell(Joins(label, inlet.received, stream, number, inlet.hearing))
+        self._tell(Joins(label, came, stream, number, self._part.inlets[label].hearing))
 
     def join(self, message: Joins) -> None:
-        """The producer says what former lives have done."""
+        """The producer says what former lives have done.
+
+        Raises:
+          Untrue: nobody waits to be told.
+        """
+        self._need_to_join(waits=self._waits_to_join)
         total = message.total
         ledger = None if self._part.keeper is None else self._part.keeper.position(self._edge.label)
         if ledger is not None and ledger.stream == message.stream:
@@ -603,7 +657,13 @@ class _Incoming(_NearEnd):
             self._borrowing = Borrowing(world.run, self._tell)
 
     def borrow(self, message: Shares) -> None:
-        """The producer offers it."""
+        """The producer offers it.
+
+        Raises:
+          Untrue: it is not of this life and edge.
+        """
+        if message.segment != self._segment(life=self._lent_by):
+            raise Untrue(f'of shared memory "{message.segment:.200}", which is not that of edge "{self._edge.label}"')
         if self._borrowing is not None:
             self._borrowing.open(message)
             self._decode()

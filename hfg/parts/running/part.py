@@ -19,16 +19,18 @@ from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.rules import quiet
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
-from hfg.errors import EngineInternalError, HfgError, UsageError
+from hfg.errors import HfgError, UsageError
 from hfg.graph.flat import CutEdge
 from hfg.parts.model.agreement import Account, Answer, Question, Rest
-from hfg.parts.model.inheriting import Alignment, Arrived, Where
+from hfg.parts.model.inheriting import UNKNOWN, Alignment, Arrived, Inheritance, Where
+from hfg.parts.model.messages import Untrue
 from hfg.parts.running.keeping import Keeper
 from hfg.ports.edges import EventEdge
-from hfg.token import Token
+from hfg.token import END, Token
 
 __all__ = ["Incoming", "Outgoing", "Part"]
 
+_MOST_SAID: Final = 1000  # words that wait for tokens which were sent before them
 _REST_S: Final = 0.002  # how long nothing has moved before that is said to others; in virtual time it is said at once
 
 
@@ -43,6 +45,9 @@ class Outgoing(Protocol):
 
     def speaks(self, speaking: bool, total: int) -> None:
         """Say that the producer is enabled from now on, or not, behind so many tokens."""
+
+    def goes_on(self, last: Where) -> None:
+        """Say that what comes next is behind that position, of a part that inherits positions and has lived before."""
 
 
 class Incoming(Protocol):
@@ -74,7 +79,7 @@ class Part:
         edges: Iterable[CutEdge],
         *,
         rests: Callable[[Rest], None],
-        inherits: bool = False,
+        inheriting: frozenset[str] = frozenset(),
         returns: bool = False,
         keeper: Keeper | None = None,
     ) -> None:
@@ -85,7 +90,7 @@ class Part:
           composition: its engine, not begun yet, and what stands on that.
           edges: those between it and other parts.
           rests: told when nothing moves in it any more.
-          inherits: see above.
+          inheriting: the parts whose tokens inherit positions.
           returns: it has lived before.
           keeper: keeps what the part does, if it has a ledger.
         """
@@ -100,7 +105,9 @@ class Part:
         engine = self.engine
         keeps = {edge.label: edge.guarantee == "exact" for edge in edges}
         self.outlets: dict[str, Outlet] = {
-            worker.port_name: Outlet(engine, worker, keeps=keeps[worker.port_name], wake=self._wake)
+            worker.port_name: Outlet(
+                engine, worker, keeps=keeps[worker.port_name], wake=self._wake, drains=name not in inheriting
+            )
             for worker in engine.core.outlets
         }
         self.inlets: dict[str, Inlet] = {
@@ -110,15 +117,18 @@ class Part:
         self._incoming: dict[str, Incoming] = {}
         self._portions = {edge.label: max(edge.window // 4, 1) for edge in edges}
         self._lossy = frozenset(label for label, kept in keeps.items() if not kept)
+        self._drains = frozenset(edge.label for edge in edges if edge.source not in inheriting)
         self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
         self._speaking = dict.fromkeys(self.outlets, True)
         self._said: list[tuple[str, bool, int]] = []
-        self.inherits = inherits
+        self.inherits = inherits = name in inheriting
         self.positions: dict[str, deque[Where]] = {label: deque() for label in self.outlets} if inherits else {}
         coming = [edge.label for edge in edges if edge.target == name and _is_synchronous(edge)]
-        self._leading = coming[0] if coming else ""
+        self._inheritance = Inheritance(coming)
         self._origin = dict.fromkeys(self.inlets, 0)  # how many tokens came to former lives, or were skipped
         self._alignment = Alignment(coming if returns and keeper is None else [])
+        self._returns = returns
+        self._owes_behind = returns and inherits  # its consumers wait to be told where it goes on
         self._last = self._find_last()
         self._before: dict[Any, int] = {}  # what the ends had done when the part was edited last
         self._cleared: asyncio.Future[None] | None = None  # somebody waits until nothing is in it
@@ -226,10 +236,17 @@ class Part:
             inlet.arrive([token for token, _ in later])
             if self.keeper is not None:
                 self.keeper.came(one, [where for _, where in later])
-            if self.inherits and one == self._leading:
-                for positions in self.positions.values():
-                    positions.extend([where for _, where in later])
+            if self.inherits and later:
+                ended = later[-1][0][0] is END
+                inherited = self._inheritance.arrive(one, [where for _, where in later], ended=ended)
+                for outlet, positions in self.positions.items():
+                    if not self.outlets[outlet].is_over:
+                        positions.extend(inherited)
             inlet.lay()
+        if self._owes_behind and self.behind != UNKNOWN:
+            self._owes_behind = False
+            for link in self._outgoing.values():
+                link.goes_on(self.behind)
         if self._said:
             self._listen()
         self.engine.kick()
@@ -256,7 +273,13 @@ class Part:
         self.send()
 
     def speak(self, label: str, speaking: bool, total: int) -> None:
-        """The producer of an edge that comes in was disabled or enabled, behind so many tokens."""
+        """The producer of an edge that comes in was disabled or enabled, behind so many tokens.
+
+        Raises:
+          Untrue: it says so of more and more tokens that do not come.
+        """
+        if sum(one == label for one, _, _ in self._said) >= _MOST_SAID:
+            raise Untrue(f'of edge "{label}" for the {_MOST_SAID}th time, behind tokens that do not come')
         self._is_at_rest = False
         self._said.append((label, speaking, total))
         self._listen()
@@ -273,9 +296,16 @@ class Part:
         self._said = waiting
 
     def hear(self, label: str, hearing: Hearing, total: int) -> None:
-        """The consumer of an edge that leaves does otherwise with tokens, from when it has taken so many."""
+        """The consumer of an edge that leaves does otherwise with tokens, from when it has taken so many.
+
+        Raises:
+          Untrue: so many have not left.
+        """
+        if total > self.outlets[label].sent:
+            raise Untrue(f'that {total} tokens were taken from edge "{label}", by which fewer have left')
         self._is_at_rest = False
-        self.outlets[label].be_taken(total)
+        if not self.inherits:  # else it is taken when all that came of it is done
+            self.outlets[label].be_taken(total)
         self.outlets[label].hear(hearing)
         self.send()
 
@@ -287,8 +317,21 @@ class Part:
         if self.keeper is not None:
             self.keeper.rebased(label, total)
         self._origin[label] += total
+        self.goes_on(label, last)
+
+    def goes_on(self, label: str, last: Where) -> None:
+        """What comes next on an edge is behind that position."""
         self._alignment.goes_on(label, last)
         self.receive(label, [])
+
+    @property
+    def behind(self) -> Where:
+        """The position behind which this life goes on with what comes, and so with what it sends; or `UNKNOWN`."""
+        return self._alignment.behind if self._returns else (0, 0)
+
+    def came(self, label: str) -> int:
+        """How many tokens have come on an edge, also those that wait to be told where others go on."""
+        return self.inlets[label].received + self._alignment.held(label)
 
     def precede(self, label: str, total: int, hearing: Hearing) -> None:
         """This life takes the place of others, of whose tokens on an edge that leaves so many have come."""
@@ -355,11 +398,10 @@ class Part:
     def _settle(self) -> None:
         """Each token gives one everywhere: so many are done as have passed every end, and their firings are over.
 
-        Who has ended holds nobody up: whatever still comes to it is drained (F12).
+        Who has ended holds nobody up, once that is done which came before: whatever still comes is drained (F12).
         """
         before = self._before
-        outlets = [outlet for outlet in self.outlets.values() if outlet.hearing == "open"]
-        ends = [outlet.finished - before.get(outlet, 0) for outlet in outlets]
+        ends = [outlet.finished - before.get(outlet, 0) for outlet in self.outlets.values() if outlet.holds_up]
         if self._last:
             self.engine.core.settle_counts()
             ends += [
@@ -436,17 +478,17 @@ class Part:
                 self.name,
                 self._numbered,
                 {label: self._account(one, one.sent, one.taken) for label, one in self.outlets.items()},
-                {label: self._account(one, one.received, one.settled) for label, one in self.inlets.items()},
+                {label: self._account(one, self.came(label), one.settled) for label, one in self.inlets.items()},
             )
         )
 
     def _account(self, end: Outlet | Inlet, count: int, done: int) -> Account:
         """Give what the two ends of an edge have to agree on.
 
-        Of one whose consumer has ended all tokens are drained; and nobody is told what becomes of those that may be
-        lost.
+        Of one whose consumer has ended all tokens are drained where they are; and nobody is told what becomes of those
+        that may be lost.
         """
-        settled = end.hearing == "over" or end.label in self._lossy
+        settled = (end.hearing == "over" and end.label in self._drains) or end.label in self._lossy
         return (count, count if settled else done, end.hearing, end.speaking)
 
     def answer(self, question: Question) -> Answer:
@@ -497,7 +539,7 @@ class Part:
             if edge.label == label and isinstance(edge, EventEdge):
                 quiet.grow_queue(self.engine.core, edge)
                 return
-        raise EngineInternalError(f'queue "{label}" is to grow and is not full')
+        raise Untrue(f'that queue "{label}" is to grow, which is none here')
 
     def _finish(self, reasons: list[str]) -> None:
         stalled = quiet.stalled(reasons) if reasons else None

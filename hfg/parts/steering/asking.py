@@ -10,13 +10,15 @@ it only looks or waits; else it fails, for nobody knows whether it was done. Kno
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import count
 from typing import Any, Final
 
+import msgspec
+
 from hfg.engine.face.composition import Composition
 from hfg.engine.runtime import relays
-from hfg.errors import HfgError, RunError
+from hfg.errors import EncodingError, HfgError, RunError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, Cutting, FlatGraph
 from hfg.graph.flat.flat_graph import ROOT, FlatEdge
@@ -24,7 +26,7 @@ from hfg.graph.structure.edge import Edge as DrawnEdge
 from hfg.logs import Log
 from hfg.nodetype import Node
 from hfg.parts.model.failing import as_error
-from hfg.parts.model.messages import Call, Failed, Parcel, Result, Seen
+from hfg.parts.model.messages import Call, Failed, Parcel, Result, Seen, Untrue
 from hfg.parts.steering.crossing import Crossing
 
 __all__ = ["Asking", "Homes", "Standing"]
@@ -123,11 +125,19 @@ class Standing:
 
     Attributes:
       number: of its calls.
+      parts: that were asked.
       waits_for: the parts in which it goes on.
     """
 
-    def __init__(self, number: int, seen: Callable[[str, Seen], None], ended: Callable[[], None] | None) -> None:
+    def __init__(
+        self,
+        number: int,
+        parts: Iterable[str],
+        seen: Callable[[str, Seen], None],
+        ended: Callable[[], None] | None,
+    ) -> None:
         self.number = number
+        self.parts = frozenset(parts)
         self.seen = seen
         self.ended = ended
         self.waits_for: set[str] = set()
@@ -165,6 +175,7 @@ class Asking:
         self._waiting: dict[int, tuple[str, Call, asyncio.Future[Any]]] = {}
         self._standing: dict[int, Standing] = {}
         self._when_gone: list[Callable[[], None]] = []
+        self._answers: dict[str, Any] = {}
 
     # --- asking -----------------------------------------------------------------------------------------------------
 
@@ -201,6 +212,10 @@ class Asking:
         self.crossing.draw(flat)
         self.cutting = cutting
 
+    def expect(self, answers: Mapping[str, Any]) -> None:
+        """Take nothing else for the answer of a verb than what is of its type."""
+        self._answers.update(answers)
+
     def when_gone(self, then: Callable[[], None]) -> None:
         """Have somebody called when a part has died."""
         self._when_gone.append(then)
@@ -235,9 +250,9 @@ class Asking:
           ended: called when nothing more will come, for all these parts are over.
           **arguments: of the verb.
         """
-        standing = Standing(next(self._numbers), seen, ended)
+        standing = Standing(next(self._numbers), parts, seen, ended)
         self._standing[standing.number] = standing
-        for part in parts:
+        for part in sorted(standing.parts):
             if part not in self._over:
                 standing.waits_for.add(part)
                 self.keep(part, f"standing {standing.number}", verb, number=standing.number, **arguments)
@@ -267,23 +282,43 @@ class Asking:
         return kept + self._early.pop(part, [])
 
     def hear(self, part: str, message: Result | Seen) -> None:
-        """A part has answered, or something has come by there."""
+        """A part has answered, or something has come by there.
+
+        Raises:
+          Untrue: it was not asked, or what it says cannot be read.
+        """
         if isinstance(message, Seen):
             standing = self._standing.get(message.number)
-            if standing is not None:
+            if standing is None:
+                return  # it was ended here meanwhile
+            if part not in standing.parts:
+                raise Untrue("and was not asked to look")
+            try:
                 standing.seen(part, message)
+            except EncodingError as error:
+                raise Untrue(f"which cannot be read: {error}") from error
             return
         if message.number == _NOBODY:
             if message.failed is not None:
                 _LOGGER.warning("%s", self._error(part, message.failed))
             return
-        _, _, future = self._waiting.get(message.number, (part, None, None))
-        if future is None or future.done():
+        waiting = self._waiting.get(message.number)
+        if waiting is None or waiting[2].done():
             return
+        asked, call, future = waiting
+        if asked != part:
+            raise Untrue("to what another part was asked")
         if message.failed is None:
-            future.set_result(message.value)
+            self._answered(call, future, message.value)
         else:
             future.set_exception(self._error(part, message.failed))
+
+    def _answered(self, call: Call, future: asyncio.Future[Any], value: Any) -> None:
+        try:
+            future.set_result(msgspec.convert(value, self._answers.get(call.verb, Any)))
+        except msgspec.ValidationError as error:
+            future.set_exception(RunError(f"{_named(call)} was answered with what is no answer: {error}"))
+            raise Untrue(f"which is no answer to {_named(call)}: {error}") from error
 
     def gone(self, part: str, error: HfgError) -> None:
         """A part answers no more; whether it begins anew is for others to say."""

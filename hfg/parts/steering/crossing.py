@@ -165,5 +165,6 @@ class Crossing:
         if place in self._ports:
             return self._ports[place]
         port = self._graph[place.rpartition(" -> ")[2]]
-        assert isinstance(port, Port)
+        if not isinstance(port, Port):
+            raise EncodingError(f'"{place:.200}" is no port: no token passes there')
         return port

@@ -74,6 +74,7 @@ class CutRun(Run):
         super().__init__(graph, composition)
         self._cut_edits = CutEdits(graph, composition.edits, asking, drawing, self._answer)
         self._asking = asking
+        asking.expect({"counts": Counts, "step": Step})
         self._homes = asking.homes
         self._counts: dict[str, Counts] = {}
         self._asked: dict[str, asyncio.Future[Any]] = {}
@@ -241,8 +242,8 @@ class CutRun(Run):
         return Step(moved, "" if moved else "no node can move")
 
     async def _step_there(self, part: str, path: str | None) -> Step:
-        told = await self._answer(part, "the run ended before the step was made", "step", node=path)
-        return msgspec.convert(told, Step)
+        step: Step = await self._answer(part, "the run ended before the step was made", "step", node=path)
+        return step
 
     @property
     def breakpoints(self) -> list[Breakpoint]:
@@ -398,7 +399,7 @@ class CutRun(Run):
             firings=sum(node.firings for node in nodes.values()),
             nodes=self._in_order(nodes),
             edges=edges,
-            groups=mine.groups | {part: one.groups[part] for part, one in said.items()},
+            groups=mine.groups | {part: one.groups[part] for part, one in said.items() if part in one.groups},
             lost_activity=sum(one.lost_activity for one in all_of_them),
             errors=[error for one in all_of_them for error in one.errors],
             ages_s={part: max(now - self._counts[part].at, 0.0) for part in said},
@@ -427,8 +428,32 @@ class CutRun(Run):
         if not asked.cancelled() and asked.exception() is None:
             self._take_counts(part, asked.result())
 
-    def _take_counts(self, part: str, told: Any) -> None:
-        self._counts[part] = msgspec.structs.replace(msgspec.convert(told, Counts), at=self.now())
+    def _take_counts(self, part: str, told: Counts) -> None:
+        """What it says of others is for those to say."""
+        homes, glance, statistics = self._homes, told.glance, told.statistics
+        labels = {edge.label for flat in self._asking.cutting.parts[part].walk() for edge in flat.edges}
+
+        def own(found: dict[str, T], *, of_edges: bool = False) -> dict[str, T]:
+            return {
+                place: one
+                for place, one in found.items()
+                if (place in labels if of_edges else homes.of_path(place) == part)
+            }
+
+        if glance is not None:
+            mine = [node for node in glance.nodes if homes.of_path(node.path) == part]
+            glance = msgspec.structs.replace(glance, nodes=mine)
+        if statistics is not None:
+            nodes, edges = own(statistics.nodes), own(statistics.edges, of_edges=True)
+            statistics = msgspec.structs.replace(statistics, nodes=nodes, edges=edges)
+        self._counts[part] = msgspec.structs.replace(
+            told,
+            nodes=own(told.nodes),
+            edges=own(told.edges, of_edges=True),
+            glance=glance,
+            statistics=statistics,
+            at=self.now(),
+        )
 
     def _in_order(self, nodes: dict[str, T]) -> dict[str, T]:
         return {path: nodes[path] for path in self._homes.order if path in nodes} | nodes
