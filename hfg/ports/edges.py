@@ -279,10 +279,10 @@ class _QueueEdge(Edge):
         self.initial = initial
         self.deepest = len(initial)
 
-    def lay(self, token: Token[Any]) -> None:
+    def lay(self, lying: Lying) -> None:
         """Put a token behind all others."""
         queue = self.queue
-        queue.append((token.value, token.activity, token.stamp, token.sequence))
+        queue.append(lying)
         if len(queue) > self.deepest:
             self.deepest = len(queue)
 
@@ -344,7 +344,7 @@ class BufferEdge(_QueueEdge):
         """
         if self.held:
             raise EngineInternalError(f'one token too many on synchronous edge "{self.label}"')
-        self.lay(token)
+        self.lay((token.value, token.activity, token.stamp, token.sequence))
         self.held = self.crowded
         return self.held
 

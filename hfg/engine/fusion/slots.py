@@ -68,7 +68,7 @@ def _signal_step(group: Group, core: Core) -> Step:
     in_a_row = group.in_a_row
 
     def step(worker: Worker) -> None:
-        given = more = max(group.turns - 1, 0) if in_a_row else 0
+        given = more = group.turns - 1 if in_a_row else 0
         try:
             while True:
                 calls: Any = worker.calls
@@ -115,7 +115,9 @@ def _token_step(worker: Worker, edge: SyncEdge) -> Step:
     handler: Any = edge.handler
     core, general = worker.core, firing.step
     calls: Any = worker.calls
+    lies: Any = edge  # what lies there is taken without a call
     held = (edge,) if edge.sequential else ()
+    pipelined = () if held else (edge,)
     while_active = edge.while_active
 
     def step(worker: Worker) -> None:
@@ -124,9 +126,9 @@ def _token_step(worker: Worker, edge: SyncEdge) -> Step:
         # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
         calls.popleft()
         worker.call_number += 1
-        token = edge.take()
-        if not held:
-            release((edge,))
+        token, lies.token = lies.token, None
+        if pipelined:
+            release(pipelined)
         if token.activity:
             _take_activity(worker, token.activity > 0)
         if not while_active or worker.active:  # T4: it was when the token came

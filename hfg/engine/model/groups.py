@@ -26,7 +26,8 @@ class Group:
       take: gives out what is to be stepped next.
       in_a_row: nobody wants to see each turn by itself: a step may go on with the next in the queue, while there are
         turns.
-      turns: how many nodes may still move before the pump looks round; 0 if it is not the pump that lets them.
+      turns: how many nodes may move before the pump looks round, the one whose turn it is included; 1 if it is not the
+        pump that lets them.
       signal_step: of all its nodes that live by slots which events feed, once there is one.
     """
 
@@ -44,7 +45,7 @@ class Group:
         self.clock = clock  # read only where time is shared
         self.held = False
         self.in_a_row = False
-        self.turns = 0
+        self.turns = 1
         self.signal_step: Callable[[Worker], None] | None = None
 
     def hold(self, held: bool) -> None:

@@ -360,7 +360,7 @@ class Engine:
         finally:
             core.pumping = False
             core.current = core.speaker = None
-            self._loop_group.turns = 0
+            self._loop_group.turns = 1
 
     def _waits_for_work(self) -> bool:
         """R5, R1: a loop that is always busy must not keep out what comes back from threads.
