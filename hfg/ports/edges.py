@@ -9,14 +9,21 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 from hfg.errors import EngineInternalError
 from hfg.token import Token
 
-__all__ = ["AnyEdge", "BufferEdge", "Edge", "EventEdge", "Overflow", "SyncEdge"]
+__all__ = ["ACTIVITY", "NUMBER", "VALUE", "AnyEdge", "BufferEdge", "Edge", "EventEdge", "Lying", "Overflow", "SyncEdge"]
 
 Overflow = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
+
+Lying: TypeAlias = tuple[Any, int, float, int]
+"""What a queue holds for each token: value, activity, stamp and number; the token is made when somebody takes it."""
+
+VALUE: Final = 0
+ACTIVITY: Final = 1
+NUMBER: Final = 3
 
 
 class Edge:
@@ -268,29 +275,29 @@ class _QueueEdge(Edge):
 
     def __init__(self, index: float, label: str, active: bool, initial: tuple[Any, ...]) -> None:
         super().__init__(index, label, active)
-        self.queue: deque[Token[Any]] = deque()
+        self.queue: deque[Lying] = deque()
         self.initial = initial
         self.deepest = len(initial)
 
-    def lay(self, token: Token[Any]) -> None:
+    def lay(self, lying: Lying) -> None:
         """Put a token behind all others."""
         queue = self.queue
-        queue.append(token)
+        queue.append(lying)
         if len(queue) > self.deepest:
             self.deepest = len(queue)
 
     def begin(self, stamp: float) -> None:
         """The run, or the edge, begins: its initial tokens lie on it (P7)."""
-        self.queue.extend(Token(value, 0, stamp, 0) for value in self.initial)
+        self.queue.extend((value, 0, stamp, 0) for value in self.initial)
 
     def take(self) -> Token[Any]:
         """Take the oldest token."""
-        return self.queue.popleft()
+        return Token(*self.queue.popleft())
 
     def strip(self, changed: Callable[[Token[Any]], Token[Any]]) -> None:
         """Give what lies on it other modifiers."""
-        for position, token in enumerate(self.queue):
-            self.queue[position] = changed(token)
+        tokens = [changed(token) for token in self.clear()]
+        self.queue.extend((token.value, token.activity, token.stamp, token.sequence) for token in tokens)
 
     @property
     def untaken(self) -> int:
@@ -299,13 +306,13 @@ class _QueueEdge(Edge):
 
     def clear(self) -> list[Token[Any]]:
         """Take away what lies on it, oldest first."""
-        tokens = list(self.queue)
+        tokens = self.contents()
         self.queue.clear()
         return tokens
 
     def contents(self) -> list[Token[Any]]:
         """What lies on it, oldest first, without taking it."""
-        return list(self.queue)
+        return [Token(*lying) for lying in self.queue]
 
 
 class BufferEdge(_QueueEdge):
@@ -337,14 +344,14 @@ class BufferEdge(_QueueEdge):
         """
         if self.held:
             raise EngineInternalError(f'one token too many on synchronous edge "{self.label}"')
-        self.lay(token)
+        self.lay((token.value, token.activity, token.stamp, token.sequence))
         self.held = self.crowded
         return self.held
 
     def take(self) -> Token[Any]:
         """Take the oldest token; a sequential one keeps its place until `release` (F5)."""
         self.working = self.sequential
-        return self.queue.popleft()
+        return super().take()
 
     def release(self) -> bool:
         """What was taken is processed; whether its producer has waited for that and goes on."""

@@ -30,8 +30,9 @@ class LoopGroup(Group):
 
     def __init__(self, name: str, policy: Policy, clock: Callable[[], float]) -> None:
         super().__init__(name, policy, clock)
+        self.in_a_row = True
         if self.fair is not None:
-            self.take = _Turn(self).take
+            self.look_at_each_turn(_Turn(self).take)
 
 
 class _Turn:

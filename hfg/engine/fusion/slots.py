@@ -12,6 +12,8 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
+from hfg.engine.model.core import Core
+from hfg.engine.model.groups import Group
 from hfg.engine.model.worker import CALLS_BLOCKED, RunningEvent, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
@@ -19,7 +21,7 @@ from hfg.engine.rules.calls import await_call
 from hfg.engine.rules.modifiers import derive_scopes, tell_activity
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import bring_activity, trigger
-from hfg.ports.edges import EventEdge, SyncEdge
+from hfg.ports.edges import AnyEdge, EventEdge, SyncEdge
 from hfg.token import Token
 
 __all__ = ["calls_step", "emitter"]
@@ -32,7 +34,7 @@ def calls_step(worker: Worker) -> Step:
     general = firing.step
     calls: Any = worker.calls
     steps = {edge: _call_step(worker, edge) for edge in worker.slot_edges}
-    if len(steps) == 1:
+    if len(set(steps.values())) == 1:
         return steps.popitem()[1]
 
     def step(worker: Worker) -> None:
@@ -45,36 +47,88 @@ def calls_step(worker: Worker) -> Step:
 
 
 def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
-    """One edge into one slot, whose handler takes the value.
-
-    A token that an output has sent is processed when the call is over, or takes it (F6).
-    """
-    handler: Any = edge.handler
-    queue = edge.queue if type(edge) is EventEdge else None
-    if handler is None or (edge.while_active and queue is not None):
+    """One edge into one slot, whose handler takes the value."""
+    if edge.handler is None:
         return firing.step
+    if isinstance(edge, SyncEdge):
+        return _token_step(worker, edge)
+    return firing.step if edge.while_active else _signal_step(worker.group, worker.core)
+
+
+def _signal_step(group: Group, core: Core) -> Step:
+    """Signals into slots whose handlers take the value: one step for all nodes of a group that live by such slots.
+
+    Being the same for all, it goes on with the next of them in the run queue by itself: a *row of calls*, which ends
+    where the pump would look round.
+    """
+    if group.signal_step is not None:
+        return group.signal_step
+    general, flags, queued, take = firing.step, core.flags, group.policy, group.take
+    ready: Any = core.host._ready_groups  # type: ignore[attr-defined]  # noqa: SLF001 - asked for as the pump does
+    in_a_row = group.in_a_row
+
+    def step(worker: Worker) -> None:
+        given = more = group.turns - 1 if in_a_row else 0
+        try:
+            while True:
+                calls: Any = worker.calls
+                if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
+                    return general(worker)
+                # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
+                edge = calls.popleft()
+                handler = edge.handler  # what is called as a field is looked up the slow way
+                worker.call_number += 1
+                value, modifier, worker.stamp, _ = edge.queue.popleft()
+                if edge.full:
+                    freed(edge)
+                if modifier:
+                    _take_activity(worker, modifier > 0)
+                core.speaker = worker
+                try:
+                    result = handler(value)
+                except Exception as error:
+                    return _failed(worker, edge, error)
+                if result is not None and type(result) is CoroutineType:
+                    return _waits(worker, edge, result)
+                worker.stamp = None
+                worker.right = False
+                worker.queued = False
+                if calls or worker.on_idle is not None:
+                    idle_again(worker)
+                if not more or flags or ready or not queued:
+                    return None
+                more -= 1
+                worker = take()
+                other = worker.step
+                if other is not step:
+                    return other(worker)
+        finally:
+            if more < given:
+                group.had_turns(given - more)
+
+    group.signal_step = step
+    return step
+
+
+def _token_step(worker: Worker, edge: SyncEdge) -> Step:
+    """A token that an output has sent is processed when the call is over, or takes it (F6)."""
+    handler: Any = edge.handler
     core, general = worker.core, firing.step
     calls: Any = worker.calls
-    lies: Any = edge  # a synchronous one, where there is no queue
-    held = (edge,) if queue is None and lies.sequential else ()
-    pipelined = (edge,) if queue is None and not held else ()
+    lies: Any = edge  # what lies there is taken without a call
+    held = (edge,) if edge.sequential else ()
+    pipelined = () if held else (edge,)
     while_active = edge.while_active
 
     def step(worker: Worker) -> None:
         if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
-            general(worker)
-            return
+            return general(worker)
         # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
         calls.popleft()
         worker.call_number += 1
-        if queue is None:
-            token, lies.token = lies.token, None
-            if pipelined:
-                release(pipelined)
-        else:
-            token = queue.popleft()
-            if lies.full:
-                freed(lies)
+        token, lies.token = lies.token, None
+        if pipelined:
+            release(pipelined)
         if token.activity:
             _take_activity(worker, token.activity > 0)
         if not while_active or worker.active:  # T4: it was when the token came
@@ -83,13 +137,9 @@ def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
             try:
                 result = handler(token.value)
             except Exception as error:
-                worker.be_amid_call(edge)
-                errors.fail_call(worker, edge.port_name, error)
-                return
-            if type(result) is CoroutineType:
-                worker.be_amid_call(edge)
-                await_call(worker, edge.port_name, result)
-                return
+                return _failed(worker, edge, error)
+            if result is not None and type(result) is CoroutineType:
+                return _waits(worker, edge, result)
             worker.stamp = None
             worker.right = False
         if held:
@@ -97,8 +147,21 @@ def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
         worker.queued = False
         if calls or worker.on_idle is not None:
             idle_again(worker)
+        return None
 
     return step
+
+
+def _failed(worker: Worker, edge: AnyEdge, error: Exception) -> None:
+    """The handler has raised: from here on the call is one like any other."""
+    worker.be_amid_call(edge)
+    errors.fail_call(worker, edge.port_name, error)
+
+
+def _waits(worker: Worker, edge: AnyEdge, coroutine: CoroutineType[Any, Any, Any]) -> None:
+    """The handler has given code that waits: from here on the call is one like any other."""
+    worker.be_amid_call(edge)
+    await_call(worker, edge.port_name, coroutine)
 
 
 def emitter(event: RunningEvent, *, plainly: bool = False) -> Callable[..., None]:
@@ -117,6 +180,7 @@ def _may_be_short(event: RunningEvent, edge: EventEdge) -> bool:
         edge.target_kind == "slot"
         and not edge.while_active
         and edge.overflow == "wait"
+        and edge.capacity > 1  # one signal alone fills no queue
         and edge.pipeline is None
         and event.worker.within is None
         and not event.worker.watched
@@ -145,7 +209,6 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
     queue = edge.queue
     calls: Any = target.calls
     carries = edge.active
-    alone = 0 if edge.capacity == 1 else 1  # so many signals fill no queue
 
     # (parameters by keyword alone would cost 20 ns; who gives them by position is refused by the type checker)
     def emit(value: object = None, activity: int | None = None, stamp: float | None = None) -> None:
@@ -164,19 +227,19 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
                 stamp = core.now()
         edge.sent = number = edge.sent + 1
         if carries and (worker.active or worker.right):
-            queue.append(Token(value, 1, stamp, number))
+            queue.append((value, 1, stamp, number))
             _give_activity(worker, target)
         else:
-            queue.append(Token(value, 0, stamp, number))
-        if len(queue) > alone or target.busy:
+            queue.append((value, 0, stamp, number))
+        if target.queued or target.busy or target.blocked & CALLS_BLOCKED:
             edge.deepest = max(edge.deepest, len(queue))
             note_full(edge)
             add_call(target, edge)
         else:
             calls.append(edge)
-            if not target.queued:  # if it is blocked its step does nothing
-                target.queued = True
-                target.push(target)
+            target.queued = True
+            push = target.push
+            push(target)
         if core.speaker is not worker:  # a thread was here after all, and perhaps the loop has gone to rest
             host.from_any_thread(host.kick)
 

@@ -29,7 +29,7 @@ from hfg.engine.rules import firing
 from hfg.engine.rules.agenda import consider, idle_again, let_follow
 from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import put
-from hfg.ports.edges import SyncEdge
+from hfg.ports.edges import ACTIVITY, SyncEdge
 from hfg.token import NO_MESSAGE
 
 __all__ = ["SOONER_IN_THREADS", "ThreadRegion"]
@@ -158,7 +158,7 @@ class ThreadRegion(Region):
             if type(edge) is SyncEdge:
                 if edge.token.activity:  # type: ignore[union-attr]  # no input is missing
                     return False
-            elif not edge.live or edge.queue[0].activity:
+            elif not edge.live or edge.queue[0][ACTIVITY]:
                 return False
         return True
 

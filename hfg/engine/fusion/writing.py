@@ -25,7 +25,7 @@ from hfg.engine.model.worker import Worker
 from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import put
-from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
+from hfg.ports.edges import ACTIVITY, BufferEdge, EventEdge, SyncEdge
 from hfg.token import NO_MESSAGE, Token
 
 if TYPE_CHECKING:
@@ -299,7 +299,7 @@ class Writer:
             if type(edge) is SyncEdge:
                 odd.append(f"entry{number}.token.activity")
             else:
-                odd += [f"not entry{number}.live", f"entry{number}.queue[0].activity"]
+                odd += [f"not entry{number}.live", f"entry{number}.queue[0][{ACTIVITY}]"]
         say(f"if {' or '.join(odd)} or not (region.armed or region.arm()): return region.decline(worker)")
         say("worker.queued = worker.placed = False")
         say("region.running = True")
@@ -524,7 +524,7 @@ class Writer:
         stop = ["queue", "ready", "flags", "worker.blocked"]
         stop += ["region.amid"] if self.is_async else []
         if not self.is_source:
-            stop += ["inputs.missing", "worker.special", "entry0.queue[0].activity", "now() > core.until"]
+            stop += ["inputs.missing", "worker.special", f"entry0.queue[0][{ACTIVITY}]", "now() > core.until"]
         if self.has_border:
             stop.append("outputs.missing")
         say(f"if {' or '.join(stop)}: break")

@@ -24,6 +24,11 @@ class Group:
     Attributes:
       push: takes in a worker that can move.
       take: gives out what is to be stepped next.
+      in_a_row: nobody wants to see each turn by itself: a step may go on with the next in the queue, while there are
+        turns.
+      turns: how many nodes may move before the pump looks round, the one whose turn it is included; 1 if it is not the
+        pump that lets them.
+      signal_step: of all its nodes that live by slots which events feed, once there is one.
     """
 
     threaded = False
@@ -39,10 +44,22 @@ class Group:
         self.fair = policy if isinstance(policy, FairShare) else None
         self.clock = clock  # read only where time is shared
         self.held = False
+        self.in_a_row = False
+        self.turns = 1
+        self.signal_step: Callable[[Worker], None] | None = None
 
     def hold(self, held: bool) -> None:
         """R3: whether nobody of it moves, for the run is paused."""
         self.held = held
+
+    def had_turns(self, more: int) -> None:
+        """So many more nodes have moved in the step of the one that the pump has let move."""
+        self.turns -= more
+
+    def look_at_each_turn(self, take: Callable[[], Any]) -> None:
+        """Somebody wants to see each turn by itself: this gives out what stands for the node whose turn it is."""
+        self.take = take
+        self.in_a_row = False
 
     @property
     def full(self) -> bool:

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from hfg.engine.model.worker import Worker
 from hfg.nodetype import Node
-from hfg.ports.edges import Edge, SyncEdge
+from hfg.ports.edges import NUMBER, Edge, Lying, SyncEdge
 from hfg.token import Marker, Token
 
 __all__ = ["DEPTH", "Sharing"]
@@ -376,8 +376,8 @@ def _oldest(edge: Edge) -> int | None:
     """The number of the oldest token on an edge; None: there is none."""
     if isinstance(edge, SyncEdge):
         return None if edge.token is None else edge.token.sequence
-    queue: deque[Token[Any]] = edge.queue  # type: ignore[attr-defined]
-    return queue[0].sequence if queue else None
+    queue: deque[Lying] = edge.queue  # type: ignore[attr-defined]
+    return queue[0][NUMBER] if queue else None
 
 
 def _way() -> int:

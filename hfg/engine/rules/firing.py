@@ -21,7 +21,7 @@ from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, put_value, unwrapped
 from hfg.engine.rules.wiring import rewire
 from hfg.errors import EndOfStream, UsageError
-from hfg.ports.edges import AnyEdge
+from hfg.ports.edges import VALUE, AnyEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringKind, FiringOutcome, FiringStarted, TokenTaken
 from hfg.types import accepts, describe, describe_value
@@ -216,7 +216,7 @@ def take(edge: AnyEdge) -> Token[Any]:
     token = edge.take()
     if not edge.untaken:
         edge.target.inputs.expect()
-    elif type(edge.queue[0].value) is Marker:  # type: ignore[union-attr]  # of two tokens one is behind
+    elif type(edge.queue[0][VALUE]) is Marker:  # type: ignore[union-attr]  # of two tokens one is behind
         edge.target.mark_special()
     return token
 

@@ -25,7 +25,7 @@ from hfg.engine.rules.modifiers import (
     touch,
 )
 from hfg.errors import QueueOverflow
-from hfg.ports.edges import AnyEdge, BufferEdge, EventEdge, SyncEdge
+from hfg.ports.edges import ACTIVITY, AnyEdge, BufferEdge, EventEdge, Lying, SyncEdge
 from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, TokenSent
 
@@ -173,8 +173,8 @@ def put(edge: SyncEdge | BufferEdge, value: object, modifier: int, stamp: float)
     if core.sharing is not None:
         core.sharing.sent(edge, token)
     slot = edge.target_kind == "slot"
-    if _is_unheard(edge, token) if slot else target.blocked & ENDED:
-        _drain(edge, token)
+    if _is_unheard(edge, value, modifier) if slot else target.blocked & ENDED:
+        _drain(edge, (value, modifier, stamp, token.sequence))
         return
     if modifier > 0:
         bring_activity(target)
@@ -200,9 +200,9 @@ def _show(edge: AnyEdge, token: Token[Any]) -> None:
         edge.tap(token)
 
 
-def _is_unheard(edge: AnyEdge, token: Token[Any]) -> bool:
+def _is_unheard(edge: AnyEdge, value: object, modifier: int) -> bool:
     """T4: a slot is not called by a marker, nor while it does not listen: the token is processed at once."""
-    return type(token.value) is Marker or (edge.while_active and token.activity <= 0 and not listens(edge.target))
+    return type(value) is Marker or (edge.while_active and modifier <= 0 and not listens(edge.target))
 
 
 def bring_activity(target: Worker) -> None:
@@ -213,22 +213,23 @@ def bring_activity(target: Worker) -> None:
         touch(target.core, target.scopes)
 
 
-def _drain(edge: AnyEdge, token: Token[Any]) -> None:
+def _drain(edge: AnyEdge, lying: Lying) -> None:
     """T4, F12: the token is processed at once, without a firing or call; its modifier acts behind the sending."""
     target: Worker = edge.target
     core = target.core
+    modifier = lying[ACTIVITY]
     into_slot = edge.target_kind == "slot"
     if not into_slot:
         edge.count_drained()
     if core.trace is not None:
-        core.trace(TokenDrained(core.now(), edge.label, token))
-    if token.activity:
+        core.trace(TokenDrained(core.now(), edge.label, Token(*lying)))
+    if modifier:
         if target.deferred is not None and not into_slot:
-            target.defer(token.activity)
+            target.defer(modifier)
             if target.scopes:
                 touch(core, target.scopes)
         else:
-            core.drained.append((target, token.activity))
+            core.drained.append((target, modifier))
 
 
 def _sent(core: Core) -> None:
@@ -395,28 +396,28 @@ def enqueue(edge: EventEdge, value: object, modifier: int, stamp: float) -> None
 
 def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None:
     """Put one token into the queue of an event edge, by its policy (P5, F8)."""
-    token = Token(value, modifier, stamp, edge.number())
+    lying = (value, modifier, stamp, edge.number())
     target: Worker = edge.target
     core = target.core
     if core.trace is not None or edge.tap is not None:
-        _show(edge, token)
+        _show(edge, Token(*lying))
     if core.sharing is not None:
-        core.sharing.sent(edge, token)
+        core.sharing.sent(edge, Token(*lying))
     if edge.end_sent and value is not END:  # END came first: nobody waits for what comes behind it (F13)
-        count_dropped(edge, token, "ended")
+        count_dropped(edge, Token(*lying), "ended")
         if modifier > 0:
             core.returned.append(edge)
         return
     joins = edge.joins()
-    if target.blocked & ENDED if joins else _is_unheard(edge, token):
-        _drain(edge, token)
+    if target.blocked & ENDED if joins else _is_unheard(edge, value, modifier):
+        _drain(edge, lying)
         return
     if modifier > 0:
         bring_activity(target)
     holds_one = bool(edge.queue)
-    if edge.overflows() and not _has_made_room(edge, token):
+    if edge.overflows() and not _has_made_room(edge, lying):
         return
-    edge.lay(token)
+    edge.lay(lying)
     note_full(edge)
     if not joins:
         add_call(target, edge)
@@ -429,10 +430,10 @@ def _append(edge: EventEdge, value: object, modifier: int, stamp: float) -> None
         arrived(edge)
 
 
-def _has_made_room(edge: EventEdge, token: Token[Any]) -> bool:
+def _has_made_room(edge: EventEdge, lying: Lying) -> bool:
     """P5: one token too many: the oldest goes, or this one does."""
     oldest = edge.overflow != "drop_newest"
-    drop(edge, edge.take() if oldest else token, "overflow")
+    drop(edge, edge.take() if oldest else Token(*lying), "overflow")
     if oldest and not edge.joins():
         edge.target.forget_call(edge)
     return oldest

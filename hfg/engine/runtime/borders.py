@@ -84,7 +84,8 @@ class Outlet:
         elif type(edge) is SyncEdge:
             tokens = [edge.token] if edge.token is not None and not self._waiting and most > 0 else []
         else:
-            tokens = list(islice(edge.queue, self._waiting, self._waiting + max(most, 0)))
+            lying = islice(edge.queue, self._waiting, self._waiting + max(most, 0))
+            tokens = [Token(*one) for one in lying]
         if self._keeps:
             self._waiting += len(tokens)
         self.sent += len(tokens)

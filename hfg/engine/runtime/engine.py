@@ -251,9 +251,9 @@ class Engine:
             else:
                 groups[name] = SideGroup(name, policy, clock, self._ready_groups, self.core.flags)
             if settings.check_all or settings.debug:
-                groups[name].take = CheckedTurn(
-                    groups[name], self.check_invariants if settings.check_all else None
-                ).take
+                groups[name].look_at_each_turn(
+                    CheckedTurn(groups[name], self.check_invariants if settings.check_all else None).take
+                )
         return groups
 
     def check_invariants(self) -> None:
@@ -350,7 +350,7 @@ class Engine:
         core.flags.clear()
         drain = self._drain_virtual if self.virtual else self._drain
         try:
-            drain(policy, self._loop_group.take, self._ready_groups)
+            drain(policy, self._loop_group, self._ready_groups)
         except Exception as error:
             self.internal_fault(error)
         except KeyboardInterrupt:
@@ -360,6 +360,7 @@ class Engine:
         finally:
             core.pumping = False
             core.current = core.speaker = None
+            self._loop_group.turns = 1
 
     def _waits_for_work(self) -> bool:
         """R5, R1: a loop that is always busy must not keep out what comes back from threads.
@@ -407,32 +408,33 @@ class Engine:
         except BaseException as error:
             self.misused(self.core.current or self.core.speaker, error)
 
-    def _drain(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
+    def _drain(self, policy: Any, group: Group, ready_groups: deque[Dispatching]) -> None:
         """Step what is queued until nothing is, or the slice is over; short drains do not look at the clock.
 
         A flag ends the slice at once: a pause, the end of the run, or the watchdog, which raises it when nodes take so
         long that the slice is over before the next look.
         """
-        core, flags = self.core, self.core.flags
+        core, flags, take = self.core, self.core.flags, group.take
         until = core.until = self.now() + _SLICE_S
-        left = _SLICE_STEPS
+        group.turns = _SLICE_STEPS
         while True:
             if ready_groups:
                 ready_groups.popleft().dispatch()
             if policy:
                 worker = take()
-                worker.step(worker)
+                step = worker.step  # what is called as a field is looked up the slow way
+                step(worker)
             elif self._resumed and not self._others_are_ready():
                 self._resumed.popleft()()
             elif not ready_groups:
                 return
             if flags and core.ends_slice():
                 return
-            left -= 1
-            if not left:
+            group.turns -= 1
+            if not group.turns:
                 if self.now() >= until:
                     return
-                left = _SLICE_STEPS
+                group.turns = _SLICE_STEPS
 
     def give_way(self, call: Callable[[], None]) -> None:
         """Code has given way to others for a moment (`sleep(0)`): let it go on behind all that is ready now.
@@ -448,29 +450,30 @@ class Engine:
         """Whether the event loop has something to do; taken for granted where it does not tell."""
         return bool(getattr(self.loop, "_ready", True))
 
-    def _drain_virtual(self, policy: Any, take: Callable[[], Any], ready_groups: deque[Dispatching]) -> None:
+    def _drain_virtual(self, policy: Any, group: Group, ready_groups: deque[Dispatching]) -> None:
         """The same where time stands still: a slice is a number of waves, however fast the machine is (R6).
 
         What has gone in front of the queue belongs to its wave, so that fused regions and single steps count alike.
         """
-        core, flags = self.core, self.core.flags
+        core, flags, take = self.core, self.core.flags, group.take
         instant = self.loop.time()
         core.followed = 0
         for _ in range(_VIRTUAL_SLICE_WAVES // _VIRTUAL_LOOK_WAVES):
-            left = _VIRTUAL_LOOK_WAVES
-            while left > 0:
+            group.turns = _VIRTUAL_LOOK_WAVES
+            while group.turns > 0:
                 if ready_groups:
                     ready_groups.popleft().dispatch()
                 if policy:
                     worker = take()
-                    worker.step(worker)
+                    step = worker.step
+                    step(worker)
                 elif not ready_groups:
                     return
                 if flags and core.ends_slice():
                     return
-                left -= 1
-                if left <= 0:
-                    left += core.followed
+                group.turns -= 1
+                if group.turns <= 0:
+                    group.turns += core.followed
                     core.followed = 0
             self.beside_work += 1
             if self.loop.time() != instant:  # code has spent time: what is due by now has its turn

@@ -11,11 +11,12 @@ import inspect
 import textwrap
 from collections.abc import Callable, Iterator
 from functools import lru_cache
+from itertools import islice
 from types import CodeType, FunctionType
 from typing import Any, Final
 
-from hfg.graph.flat.flattening import FlatGraph
-from hfg.nodetype import Node
+from hfg.graph.flat.flattening import FlatGraph, FlatNode
+from hfg.nodetype import Node, NodeType
 from hfg.problem import Problem
 
 __all__ = ["changed_inputs"]
@@ -32,25 +33,31 @@ _CHANGING: Final = frozenset(
 
 def changed_inputs(whole: FlatGraph) -> list[Problem]:
     """Node types that write into a value that they have taken; each told once."""
-    found: dict[Any, Problem] = {}
+    first: dict[NodeType, FlatNode] = {}
     for flat in whole.walk():
         for node in flat.nodes:
-            kind = node.node._type
-            if kind not in found and kind.process_kind != "none":
-                inputs = frozenset(name for name, spec in kind.inputs.items() if not spec.token)
-                for name, line in _changes(_function(node.node), inputs):
-                    found[kind] = Problem(
-                        path=node.path,
-                        severity="warning",
-                        what=f'its code changes what it takes by "{name}"',
-                        why="a value that is shared is not changed: its sender, other nodes and the trace see it "
-                        "change, too (rule T1)",
-                        remedy=f"change a copy in line {line}, as in {name} = {name}.copy(); a run with debug=True "
-                        "refuses it",
-                        check="changes-input",
-                    )
-                    break
-    return list(found.values())
+            first.setdefault(node.node._type, node)
+    return [problem for node in first.values() for problem in _found_in(node)]
+
+
+def _found_in(node: FlatNode) -> list[Problem]:
+    """What is to be told of the type of a node: the first input that its code writes into."""
+    kind = node.node._type
+    if kind.process_kind == "none":
+        return []
+    inputs = frozenset(name for name, spec in kind.inputs.items() if not spec.token)
+    return [
+        Problem(
+            path=node.path,
+            severity="warning",
+            what=f'its code changes what it takes by "{name}"',
+            why="a value that is shared is not changed: its sender, other nodes and the trace see it change, too "
+            "(rule T1)",
+            remedy=f"change a copy in line {line}, as in {name} = {name}.copy(); a run with debug=True refuses it",
+            check="changes-input",
+        )
+        for name, line in islice(_changes(_function(node.node), inputs), 1)
+    ]
 
 
 def _function(node: Node) -> Callable[..., Any] | None:

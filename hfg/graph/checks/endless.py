@@ -53,9 +53,11 @@ def endless(flat: FlatGraph, *, virtual: bool = False) -> Iterator[FlatNode]:
 
 
 def _may_be_endless(flat: FlatGraph, node: FlatNode) -> bool:
+    options, kind = node.options, node.node._type
+    if not kind.is_source or options.max_rate_hz is not None or not options.enabled or not runs_for_ever(kind):
+        return False
     gated = any(gate.target == node.index or scope_end(gate.target) in node.scopes for gate in flat.gates)
-    enabled = node.options.enabled and all(flat.scopes[scope].options.enabled for scope in node.scopes)
-    return not gated and enabled and node.options.max_rate_hz is None and runs_for_ever(node.node._type)
+    return not gated and all(flat.scopes[scope].options.enabled for scope in node.scopes)
 
 
 def _neighbours(flat: FlatGraph) -> dict[int, list[int]]:

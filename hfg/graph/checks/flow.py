@@ -148,6 +148,8 @@ def _some(flat: FlatGraph, nodes: list[int]) -> str:
 
 def signal_rings(flat: FlatGraph) -> Iterator[Problem]:
     """Nodes that need a signal of which they are themselves the cause (rule P7)."""
+    if not any(edge.is_event_edge for edge in flat.edges):
+        return
     own = [edge for edge in flat.edges if not edge.is_event_edge or _needs_firing(edge)]
     successors = _successors(flat, own)
     begun_by_slot = {edge.target.node for edge in flat.edges if edge.target.kind == "slot"}

@@ -99,8 +99,9 @@ def empty_subgraphs(flat: FlatGraph) -> Iterator[Problem]:
     """Subgraphs with ports and nothing inside: what comes is lost (rule G1)."""
     for path, node, _ in _members(flat):
         level, kind = inside(node), node._type
-        ports = [*kind.inputs, *kind.outputs, *kind.events, *kind.slots]
-        if level is not None and ports and not level.nodes and not level.edges:
+        if level is None or level.nodes or level.edges:
+            continue
+        if kind.inputs or kind.outputs or kind.events or kind.slots:
             build = "build() adds nothing" if type(node).build is not Subgraph.build else "it has no build()"  # type: ignore[attr-defined]
             yield Problem(
                 path=path,

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from reactivex import Observable
+
 from hfg.graph.flat.flat_graph import ROOT, End, EndKind, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, is_port
 from hfg.graph.structure.gates import Gate
@@ -215,12 +217,8 @@ class EdgeFollower:
         return found
 
     def _make_end(self, port: SourceEnd) -> End | None:
-        if not is_port(port):
-            return End(ROOT, "observable", "observable", port)
-        if isinstance(port, InnerSource | InnerTarget):  # only those of what iterates come here: its boundary
-            if port.kind in ("slot", "event"):
-                return None  # no edge leads there from outside (rule G4)
-            return End(ROOT, "output" if isinstance(port, InnerSource) else "input", port.name, port)
+        if not isinstance(port, Port):
+            return self._make_border(port)
         node = port.node
         index = self.index_of.get(node)
         if index is None:
@@ -233,6 +231,14 @@ class EdgeFollower:
                 self._report_border(port)
                 return None
         return End(index, port.kind, port.name, port)
+
+    def _make_border(self, port: InnerSource[Any] | InnerTarget[Any] | Observable[Any]) -> End | None:
+        """Give the end that no node has: at what feeds from outside, or at the boundary of what iterates."""
+        if not is_port(port):
+            return End(ROOT, "observable", "observable", port)
+        if port.kind in ("slot", "event"):
+            return None  # no edge leads there from outside (rule G4)
+        return End(ROOT, "output" if isinstance(port, InnerSource) else "input", port.name, port)
 
     def _label(self, source: End, target: End) -> str:
         label = f"{self._path(source)} -> {self._path(target)}"

@@ -14,7 +14,7 @@ from hfg import errors
 from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, TargetEnd, end_path, is_port, type_of
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.options import PLAIN, EdgeOptions, edge_options
-from hfg.graph.structure.pointing import meant, source_at, target_at
+from hfg.graph.structure.pointing import source_at, target_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.nodetype import Node
@@ -37,7 +37,8 @@ def connect(level: Level, source: SourceEnd | str, target: TargetEnd | str, said
     """
     edge: Edge | None = None
     with Refusable(source, target):
-        begin, end = meant(level, source, source_at), meant(level, target, target_at)
+        begin = source_at(level, source) if isinstance(source, str) else source
+        end = target_at(level, target) if isinstance(target, str) else target
         edge = declare_edge(_level_for(level, begin, end), begin, end, said)
     return Edge(source, target, PLAIN) if edge is None else edge  # something to go on with, where refusals are kept
 
@@ -81,19 +82,10 @@ def refuse(level: Level, source: SourceEnd, target: TargetEnd, options: EdgeOpti
     if is_port(source):
         _need_membership(level, source, target)
     _need_membership(level, target, source)
-    if target.kind == "parameter" and target.node._type.parameters[target.name].read_only:
-        raise errors.ConnectionError(
-            f'"{end_path(source)}" cannot lead into the parameter "{target.path}", which is read-only: its node alone '
-            "sets it; let an edge begin there, or declare it without read_only=True (rule P8)"
-        )
+    if target.kind == "parameter":
+        _need_settable(source, target)
     if is_port(source):
         _need_types(source, target)
-    if target.kind == "parameter" and target.node._type.given_parameters_once:
-        raise errors.ConnectionError(
-            f'"{target.path}" belongs to a generator function, which is given it when it begins and sees no value '
-            f'that comes later, from "{end_path(source)}"; make it a class whose process() yields, or counts in an '
-            f"hfg.State, and reads self.{target.name} (rule P8)"
-        )
     if options.active or options.for_events:
         _need_right_options(source, target, options)
     if options.initial:
@@ -215,6 +207,21 @@ def _need_types(source: PortEnd, target: TargetEnd) -> None:
         f'"{source.path}" sends {describe(sent)} ({reason}); '
         "put a node between them that converts, or change one of the types"
     )
+
+
+def _need_settable(source: SourceEnd, target: TargetEnd) -> None:
+    kind = target.node._type
+    if kind.parameters[target.name].read_only:
+        raise errors.ConnectionError(
+            f'"{end_path(source)}" cannot lead into the parameter "{target.path}", which is read-only: its node alone '
+            "sets it; let an edge begin there, or declare it without read_only=True (rule P8)"
+        )
+    if kind.given_parameters_once:
+        raise errors.ConnectionError(
+            f'"{target.path}" belongs to a generator function, which is given it when it begins and sees no value '
+            f'that comes later, from "{end_path(source)}"; make it a class whose process() yields, or counts in an '
+            f"hfg.State, and reads self.{target.name} (rule P8)"
+        )
 
 
 # --- options ---

@@ -6,7 +6,7 @@ Stands on ports and options; knows neither graphs nor what is right or wrong.
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import msgspec
 from reactivex import Observable
@@ -32,6 +32,7 @@ __all__ = [
 PortEnd: TypeAlias = Port | InnerSource[Any] | InnerTarget[Any]
 SourceEnd: TypeAlias = PortEnd | Observable[Any]  # that the direction is right is seen when an edge is declared
 TargetEnd: TypeAlias = PortEnd
+_ENDS: Final = (Source, Target)
 
 
 class Edge(msgspec.Struct, frozen=True, eq=False):
@@ -79,12 +80,12 @@ def end_path(end: object) -> str:
 
 def is_port(end: object) -> TypeIs[PortEnd]:
     """Whether it is a port or the inner side of one, no observable from outside; an event is both, and a port."""
-    return isinstance(end, Source | Target)
+    return isinstance(end, _ENDS)
 
 
 def is_feed(end: object) -> bool:
     """Whether it is a plain observable, which feeds from outside; an event is one too, but a port."""
-    return not isinstance(end, Source | Target)
+    return not isinstance(end, _ENDS)
 
 
 def owner_of(end: SourceEnd) -> object:
