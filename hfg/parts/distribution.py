@@ -62,7 +62,8 @@ from hfg.parts.model.messages import (
 from hfg.parts.model.sieve import sieve
 from hfg.parts.processes.other import Launcher, Other
 from hfg.parts.processes.worker import FIRST_LIFE
-from hfg.parts.running.channels import Carrier, Channel, name_of
+from hfg.parts.running.carrier import Carrier
+from hfg.parts.running.channels import Channel, name_of
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import sweep_run, sweep_runs
 from hfg.parts.steering.asking import Asking

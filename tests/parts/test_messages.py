@@ -38,7 +38,8 @@ from hfg.parts.model.messages import (
     unpack,
 )
 from hfg.parts.model.sieve import sieve
-from hfg.parts.running.channels import Carrier, Channel, name_of
+from hfg.parts.running.carrier import Carrier
+from hfg.parts.running.channels import Channel, name_of
 from hfg.parts.running.part import Part
 from hfg.token import Token
 from hfg.trace import NodeEnded, TokenProcessed, TokenSent, TokenTaken, TraceEvent

@@ -64,8 +64,7 @@ def _signal_step(group: Group, core: Core) -> Step:
     if group.signal_step is not None:
         return group.signal_step
     general, flags, queued, take = firing.step, core.flags, group.policy, group.take
-    ready: Any = core.host._ready_groups  # type: ignore[attr-defined]  # noqa: SLF001 - asked for as the pump does
-    in_a_row = group.in_a_row
+    ready, in_a_row = core.ready_groups, group.in_a_row
 
     def step(worker: Worker) -> None:
         given = more = group.turns - 1 if in_a_row else 0

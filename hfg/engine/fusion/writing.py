@@ -88,7 +88,7 @@ class _Names:
         self.epoch = host.epoch
         self.flags = region.flags
         self.queue = region.head.group.policy
-        self.ready = host._ready_groups  # noqa: SLF001 - asked for by a wave at each of its ends
+        self.ready = core.ready_groups  # asked for by a wave at each of its ends
         self.entries = region.entries
         self.workers = order
         self.calls = [_code_of(worker) for worker in order]

@@ -308,6 +308,7 @@ class Core:
         self.pumping = False
         self.slices = 0  # of the pump, for the watchdog
         self.until = 0.0  # on the run's clock: the pump's slice is over
+        self.ready_groups: deque[Any] = deque()  # those beside the loop's own in which something can move
         self.flags: list[str] = []  # why the pump is to look round; not empty: a wave ends behind the call under way
         self.futile: set[Worker] = set()  # sources that feed only ended nodes (R5)
         self.current: Worker | None = None

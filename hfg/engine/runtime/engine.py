@@ -138,7 +138,7 @@ class Engine:
         self._scheduled = False
         self._resumed: deque[Callable[[], None]] = deque()  # code that goes on when all is done that is ready now
         self._thread = threading.get_ident()
-        self._ready_groups: deque[Dispatching] = deque()
+        self._ready_groups: deque[Dispatching] = self.core.ready_groups
         self.scheduler = rx.RunScheduler(self)
         self.code = CodeRunner(self, self.core, self.loop, self.context)
         self.core.code = self.code

@@ -50,7 +50,8 @@ from hfg.parts.model.messages import (
     Untrue,
 )
 from hfg.parts.model.sieve import sieve
-from hfg.parts.running.channels import Carrier, Channel, name_of
+from hfg.parts.running.carrier import Carrier
+from hfg.parts.running.channels import Channel, name_of
 from hfg.parts.running.keeping import Keeper, read
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import sweep_run

@@ -5,7 +5,7 @@ and from other parts. That is kept together, or not at all. Until it is kept, no
 and no producer is told that anything of it is done: so whoever dies, what others have heard of the part and what the
 part knows of itself never differ, and no node has to do the same thing twice in the same way.
 
-Decides, never waits. Stands on the engine; what `part` and `channels` know of edges comes from them.
+Decides, never waits. Stands on the engine; what `part` and `ends` know of edges comes from them.
 """
 
 from __future__ import annotations

@@ -1,0 +1,117 @@
+"""Connects a part of a run with the links of all its edges to and from others.
+
+Stands on `ends` and `ways`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hfg.graph.flat import CutEdge
+from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, Untrue
+from hfg.parts.running.channels import name_of
+from hfg.parts.running.ends import IncomingEnd, OutgoingEnd, World
+from hfg.parts.running.part import Part
+from hfg.parts.running.ways import Ways
+from hfg.transport import Session
+
+__all__ = ["Carrier"]
+
+
+class Carrier:
+    """Carries the tokens of a part over its edges to and from others."""
+
+    def __init__(
+        self,
+        part: Part,
+        session: Session,
+        run: str,
+        lives: dict[str, int],
+        edges: list[CutEdge],
+        say: Callable[[str, Message], None],
+        remembering: frozenset[str] = frozenset(),
+        *,
+        shares_memory: bool = False,
+        admits: bool = True,
+    ) -> None:
+        """Connect the part.
+
+        Args:
+          part: nothing of which has begun yet.
+          session: of the transport.
+          run: by which name all parts of the run know it.
+          lives: which life of each part this is for.
+          edges: those between it and others.
+          say: brings a message to another part.
+          remembering: the parts that know in each life what they have sent in others.
+          shares_memory: parts of one host may reach each other by its means: large arrays go through shared memory, all
+            else over local sockets.
+          admits: parts of younger lives are there, and hear what they are told.
+        """
+        self._part = part
+        self._links: dict[str, OutgoingEnd | IncomingEnd] = {}
+        outgoing: dict[str, OutgoingEnd] = {}
+        incoming: dict[str, IncomingEnd] = {}
+        beside = {edge.source if edge.target == part.name else edge.target for edge in edges if edge.within_host}
+        self._ways = Ways(session, run, part.name, lives, beside if shares_memory else set())
+        world = World(part, self._ways, run, lives, say)
+        for edge in edges:
+            if edge.source == part.name:
+                self._links[edge.label] = outgoing[edge.label] = OutgoingEnd(world, edge)
+            else:
+                self._links[edge.label] = incoming[edge.label] = IncomingEnd(world, edge, edge.source in remembering)
+            if part.keeper is not None and edge.source == part.name:
+                continue  # what is kept must hold the arrays
+            if shares_memory and edge.within_host and edge.guarantee == "exact":
+                self._links[edge.label].share(world)
+        self._outgoing, self._incoming = outgoing, incoming
+        part.connect(outgoing, incoming)
+        if part.keeper is not None:
+            part.keeper.stand_at(part.inlets, part.outlets, outgoing)
+        for other, life in lives.items() if admits else ():
+            if life > lives[part.name]:
+                self.admit(other, life)
+
+    def admit(self, other: str, life: int) -> None:
+        """Another part has died and begins anew, as that life."""
+        self._ways.admit(other, life)
+        for link in self._links.values():
+            if link.other == other:
+                link.admit(life)
+
+    def hear(self, other: str, message: OfAnEdge) -> None:
+        """A part has said something of an edge.
+
+        Raises:
+          Untrue: it has no such end of an edge to this one, or that end cannot be so.
+        """
+        label = message.label
+        link = self._links.get(label)
+        says_producer = isinstance(message, Speaks | Shares | GoesOn)
+        says_consumer = isinstance(message, Hears | Sees)
+        if (
+            link is None
+            or link.other != other
+            or (says_producer and label not in self._incoming)
+            or (says_consumer and label not in self._outgoing)
+        ):
+            raise Untrue(f'of an edge "{label:.200}", which does not lead so from it to {name_of(self._part.name)}')
+        match message:
+            case Speaks():
+                self._part.speak(label, message.speaking, message.total)
+            case Hears():
+                self._part.hear(label, message.hearing, message.total)
+            case Joins():
+                link.join(message)
+            case GoesOn():
+                self._part.goes_on(label, (message.stream, message.number))
+            case Shares():
+                self._incoming[label].borrow(message)
+            case Sees():
+                self._outgoing[label].seen(message)
+
+    async def close(self) -> None:
+        """End all links."""
+        for link in self._links.values():
+            await link.close()
+        self._ways.close()

@@ -1,0 +1,424 @@
+"""The near ends of edges between the parts of a run: links, and what is kept, lent and counted beside them.
+
+A link goes on when the other end has died and begins anew: the older of two lives tells the younger where (`Joins`).
+Stands on `hfg.links`, `part`, `ways` and `messages`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+from hfg.encoding import TokenCodec
+from hfg.engine.runtime.borders import Hearing
+from hfg.errors import EncodingError, RunError, TransportError
+from hfg.graph.flat import CutEdge
+from hfg.links import Outbox
+from hfg.links.consumer import ExactConsumer
+from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
+from hfg.parts.model.failing import codec_of
+from hfg.parts.model.inheriting import Arrived, Where
+from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, Sees, Shares, Speaks, Untrue
+from hfg.parts.running.channels import name_of
+from hfg.parts.running.part import Part
+from hfg.parts.running.rings import Borrowing, Lending, segment_of
+from hfg.parts.running.ways import Ways
+from hfg.ports.outputs import OutputPort
+from hfg.token import Token
+from hfg.transport import Delivery, EncodedToken, Position
+
+__all__ = ["IncomingEnd", "OutgoingEnd", "World"]
+
+_UNBOUNDED: Final = 2**31
+
+
+def _most_under_way(edge: CutEdge) -> int:
+    """Give how many tokens a link may hold.
+
+    For signals the edge itself says so, and may come to say more (F8): a link that had a bound of its own would not
+    let go what the larger queue took in.
+    """
+    return _UNBOUNDED if edge.edge.is_event_edge else edge.window
+
+
+def _codec_of(edge: CutEdge) -> TokenCodec[Any]:
+    port = edge.edge.source.port
+    return codec_of(port, edge.hint, f'the value of "{port.path}"')
+
+
+class World(NamedTuple):
+    """What all near ends of a part know alike; see `Carrier`."""
+
+    part: Part
+    ways: Ways
+    run: str
+    lives: dict[str, int]
+    say: Callable[[str, Message], None]
+
+
+class _NearEnd:
+    """What is alike at both ends of an edge between parts.
+
+    Attributes:
+      other: the part at its far end.
+    """
+
+    def __init__(self, world: World, edge: CutEdge, other: str) -> None:
+        self.other = other
+        self._part = world.part
+        self._edge = edge
+        self._key = f"{world.run}/edge/{edge.number}"
+        self._codec = _codec_of(edge)
+        self._tell = partial(world.say, other)
+
+    def _need_to_join(self, *, waits: bool) -> None:
+        if not waits:
+            raise Untrue(f'of edge "{self._edge.label}", which this life of {name_of(self._part.name)} knows already')
+
+
+class OutgoingEnd(_NearEnd):
+    """The near end of the link of an edge that leaves."""
+
+    def __init__(self, world: World, edge: CutEdge) -> None:
+        super().__init__(world, edge, edge.target)
+        part, lives = world.part, world.lives
+        self._loop = asyncio.get_running_loop()
+        self._most = _most_under_way(edge)
+        self._waits_to_join = lives[part.name] > lives[edge.target]
+        self._known: Where = (0, 0)  # the last that had come from former lives
+        self._lending: Lending | None = None
+        self._held: deque[EncodedToken] = deque()  # what is not kept yet, and may not leave before it is
+        self._sender: LinkSender | BoundedSender
+        outbox = None if part.keeper is None else part.keeper.outbox(edge.label)
+        way = world.ways.to(edge.target)
+        self._kept_from = 1 if outbox is None else outbox.first
+        if edge.guarantee == "exact":
+            self._sender = sender = LinkSender(
+                way,
+                self._key,
+                epoch=lives[part.name],
+                window=self._most,
+                released=self._released,
+                inherits=part.inherits,
+                outbox=outbox,
+            )
+            after = None if outbox is None else outbox.first - 1
+            sender.admit(name_of(edge.target), lives[edge.target], after=after)
+            part.outlets[edge.label].owe(sender.machine.unfinished)
+        else:
+            self._sender = BoundedSender(way, self._key, epoch=lives[part.name])
+
+    def room(self) -> int:
+        """See `Outgoing`."""
+        sender = self._sender
+        if self._waits_to_join:
+            return 0
+        if isinstance(sender, BoundedSender):
+            return self._edge.window * 4
+        room = self._most - self._unfinished
+        if self._lending is not None:
+            if not self._lending.is_answered:
+                return 0
+            if not self._edge.edge.is_event_edge:  # whose links have no bound
+                room = min(room, self._lending.room)
+        return self._in_a_row(sender, room) if self._part.inherits and room > 0 else room
+
+    def _in_a_row(self, sender: LinkSender, most: int) -> int:
+        """How many can be sent before numbers jump: that they do when all before is done."""
+        positions = self._part.positions[self._edge.label]
+        if not positions or not sender.machine.takes(Position(*positions[0])):
+            return 0
+        count = 1
+        while count < min(most, len(positions)):
+            stream, number = positions[count - 1]
+            if positions[count] != (stream, number + 1):
+                break
+            count += 1
+        return count
+
+    def send(self, tokens: list[Token[Any]]) -> None:
+        """See `Outgoing`."""
+        sender, part, label, lending = self._sender, self._part, self._edge.label, self._lending
+        repeated = 0
+        try:
+            for token in tokens:
+                encoded = self._codec.encode(token) if lending is None else lending.encode(self._codec, token)
+                if part.keeper is not None:
+                    self._held.append(encoded)
+                elif part.inherits and isinstance(sender, LinkSender):
+                    where = part.positions[label].popleft()
+                    repeated += where <= self._known
+                    sender.send_nowait(encoded, Position(*where))
+                else:
+                    sender.send_nowait(encoded)
+                if lending is not None:
+                    lending.sent()
+        except (EncodingError, TransportError) as error:
+            problem = RunError(f'edge "{label}" cannot carry a value to {name_of(self._edge.target)}: {error}')
+            problem.__cause__ = error
+            part.finish("failed", problem)
+            return
+        outlet = part.outlets[label]
+        if repeated:
+            outlet.repeat(repeated)
+        if part.inherits and outlet.sent - self._unfinished > outlet.taken:
+            self._loop.call_soon(self._released)  # done before: nobody will say so again
+
+    @property
+    def _unfinished(self) -> int:
+        return len(self._held) + (self._sender.machine.unfinished if isinstance(self._sender, LinkSender) else 0)
+
+    # --- of a part with a ledger (see `Leaving`)
+
+    def outbox(self) -> Outbox | None:
+        """See `Leaving`."""
+        if not isinstance(self._sender, LinkSender):
+            return None
+        stream, first, tokens = self._sender.machine.outbox
+        return Outbox(stream, first, (*tokens, *self._held))
+
+    @property
+    def held(self) -> int:
+        """See `Leaving`."""
+        return len(self._held)
+
+    def let_go(self, count: int) -> None:
+        """See `Leaving`."""
+        try:
+            for _ in range(count):
+                self._sender.send_nowait(self._held.popleft())
+        except TransportError as error:
+            label = self._edge.label
+            problem = RunError(f'edge "{label}" cannot carry a value to {name_of(self._edge.target)}: {error}')
+            problem.__cause__ = error
+            self._part.finish("failed", problem)
+
+    def speaks(self, speaking: bool, total: int) -> None:
+        """See `Outgoing`."""
+        self._tell(Speaks(self._edge.label, speaking, total))
+
+    def goes_on(self, last: Where) -> None:
+        """See `Outgoing`."""
+        self._tell(GoesOn(self._edge.label, *last))
+
+    def _released(self) -> None:
+        if self._lending is not None:
+            self._lending.settle()
+        label = self._edge.label
+        self._part.be_taken(label, self._part.outlets[label].sent - self._unfinished)
+
+    def admit(self, life: int) -> None:
+        """The consumer begins anew: it is sent what is not done, and told from where that is."""
+        label, sender = self._edge.label, self._sender
+        if isinstance(sender, LinkSender):
+            sender.admit(name_of(self._edge.target), life)
+        stream, number = sender.machine.position
+        number -= self._unfinished - len(self._held)
+        if not stream:
+            stream, number = self._part.behind
+        self._known = (0, 0)  # it has nothing
+        if self._lending is not None:
+            self._lending.admit()
+        done = self._part.outlets[label].sent - self._unfinished
+        self._tell(Joins(label, done, stream, number))
+        self._waits_to_join = False
+        self._part.consumer_returns(label)
+
+    def join(self, message: Joins) -> None:
+        """The consumer says what it has of former lives; it may wait to be told where this one goes on.
+
+        Raises:
+          Untrue: nobody waits to be told.
+        """
+        self._need_to_join(waits=self._waits_to_join)
+        if isinstance(self._sender, LinkSender) and not self._part.inherits:
+            stream, number = self._sender.machine.position
+            self.goes_on((stream, number))
+        self._known = (message.stream, message.number)
+        self._waits_to_join = False
+        total = message.total
+        if self._part.keeper is not None:
+            total += self._ahead_of(message) - self._part.outlets[self._edge.label].sent
+        self._part.precede(self._edge.label, total, message.hearing)
+        if self._part.keeper is not None:
+            self._released()
+
+    def _ahead_of(self, message: Joins) -> int:
+        """How many tokens former lives have kept, and this one sent, that the consumer has not got."""
+        if not isinstance(self._sender, LinkSender):
+            return 0
+        stream, number = self._sender.machine.position
+        known = message.number if stream == message.stream else self._kept_from - 1  # it had nothing: all that was kept
+        return len(self._held) + number - known
+
+    def share(self, world: World) -> None:
+        """Put large arrays into shared memory from now on, if there are any and the consumer can open it."""
+        edge, sender = self._edge, self._sender
+        if not self._codec.holds_arrays:
+            return
+        assert isinstance(sender, LinkSender)
+        machine = sender.machine
+        self._lending = Lending(
+            world.run,
+            segment_of(world.run, world.lives[edge.source], edge.number),
+            edge.label,
+            edge.window,
+            lambda: machine.unfinished,
+            self._tell,
+        )
+        port = edge.edge.source.port
+        if isinstance(port, OutputPort):
+            port._loan_from(self._lending.loan)
+
+    def seen(self, message: Sees) -> None:
+        """The consumer has opened it, or cannot."""
+        if self._lending is not None:
+            self._lending.seen(message)
+            self._part.room(self._edge.label)
+
+    async def close(self) -> None:
+        """End it."""
+        await self._sender.close()
+        if self._lending is not None:
+            self._lending.close()
+
+
+class IncomingEnd(_NearEnd):
+    """The near end of the link of an edge that comes in."""
+
+    def __init__(self, world: World, edge: CutEdge, remembers: bool) -> None:
+        super().__init__(world, edge, edge.source)
+        part, lives = world.part, world.lives
+        self._done = 0
+        self._remembers = remembers
+        self._borrowing: Borrowing | None = None
+        self._undecoded: deque[Delivery] = deque()
+        self._waits_to_join = lives[edge.source] < lives[part.name]
+        self._segment = partial(segment_of, world.run, edge=edge.number)
+        self._lent_by = lives[edge.source]
+        self._before = 0  # tokens of former lives of the producer; of a lossy edge, where numbers tell what is lost
+        self._receiver: LinkReceiver | BoundedReceiver
+        way = world.ways.to(edge.source)
+        if edge.guarantee == "exact":
+            self._receiver = LinkReceiver(
+                way,
+                self._key,
+                consumer=name_of(part.name),
+                incarnation=lives[part.name],
+                arrived=self._arrived,
+                capacity=_most_under_way(edge),
+                producer=lives[edge.source],
+                ledger=None if part.keeper is None else part.keeper.position(edge.label),
+            )
+        else:
+            # What comes is laid on the edge at once, and that drops by the edge's own policy.
+            self._receiver = BoundedReceiver(
+                way, self._key, arrived=self._arrived, capacity=_UNBOUNDED, producer=lives[edge.source]
+            )
+
+    def _arrived(self) -> None:
+        self._undecoded.extend(self._receiver.machine.take_all())
+        self._decode()
+
+    def _decode(self) -> None:
+        is_lossy = isinstance(self._receiver, BoundedReceiver)
+        if is_lossy and self._waits_to_join:
+            return  # what their numbers mean is not known yet
+        tokens: list[Arrived] = []
+        decode = self._codec.decode
+        borrowing = self._borrowing
+        view = None if borrowing is None else borrowing.view
+        while self._undecoded:
+            delivery = self._undecoded[0]
+            if is_lossy and not self._is_new(delivery.sequence, len(tokens)):
+                self._undecoded.popleft()  # it is late, and was counted as lost
+                continue
+            try:
+                token = decode(delivery.metadata, delivery.value, view=view)
+            except EncodingError as error:
+                if borrowing is not None and borrowing.is_awaited:
+                    break  # sent to a former life, and this one has not heard of the memory yet
+                problem = RunError(f'edge "{self._edge.label}" brought what it cannot: {error}')
+                problem.__cause__ = error
+                self._part.finish("failed", problem)
+                return
+            self._undecoded.popleft()
+            tokens.append(((token.value, token.activity, token.stamp), (delivery.stream, delivery.sequence)))
+        if tokens:
+            self._part.receive(self._edge.label, tokens)
+
+    def _is_new(self, number: int, held: int) -> bool:
+        """Whether it comes behind all that came; what it has left behind is lost."""
+        missing = self._before + number - 1 - self._part.inlets[self._edge.label].received - held
+        if missing > 0:
+            self._part.lose(self._edge.label, self._before + number - 1 - held)
+        return missing >= 0
+
+    def taken(self, total: int) -> None:
+        """See `Incoming`."""
+        if isinstance(self._receiver, LinkReceiver):
+            self._receiver.done(total - self._done)
+        self._done = total
+
+    def hears(self, hearing: Hearing, total: int) -> None:
+        """See `Incoming`."""
+        self._tell(Hears(self._edge.label, hearing, total))
+
+    def admit(self, life: int) -> None:
+        """The producer begins anew: what it has sent until now is told to it."""
+        label, machine = self._edge.label, self._receiver.machine
+        machine.believe(life)
+        self._lent_by = life
+        if self._waits_to_join and self._undecoded:  # who would have told is gone: counting begins with what came
+            self._before = 1 - self._undecoded[0].position.sequence
+        self._waits_to_join = False
+        if self._undecoded:  # they lie in the memory of a life that died before it could say so to this one
+            self._borrowing = None
+            self._decode()
+        stream = number = 0
+        if isinstance(machine, ExactConsumer):
+            stream, number = machine.accepted
+        self._before = came = self._part.came(label)
+        self._part.producer_returns(label, remembers=self._remembers)
+        self._tell(Joins(label, came, stream, number, self._part.inlets[label].hearing))
+
+    def join(self, message: Joins) -> None:
+        """The producer says what former lives have done.
+
+        Raises:
+          Untrue: nobody waits to be told.
+        """
+        self._need_to_join(waits=self._waits_to_join)
+        total = message.total
+        ledger = None if self._part.keeper is None else self._part.keeper.position(self._edge.label)
+        if ledger is not None and ledger.stream == message.stream:
+            total += max(ledger.sequence - message.number, 0)  # which the producer does not know to be done
+        self._done += total
+        self._before = message.total - message.number
+        self._waits_to_join = False
+        self._part.follow(self._edge.label, total, (message.stream, message.number))
+        self._decode()
+
+    def share(self, world: World) -> None:
+        """Look at large arrays in shared memory, when the producer offers it."""
+        if self._codec.holds_arrays:
+            self._borrowing = Borrowing(world.run, self._tell)
+
+    def borrow(self, message: Shares) -> None:
+        """The producer offers it.
+
+        Raises:
+          Untrue: it is not of this life and edge.
+        """
+        if message.segment != self._segment(life=self._lent_by):
+            raise Untrue(f'of shared memory "{message.segment:.200}", which is not that of edge "{self._edge.label}"')
+        if self._borrowing is not None:
+            self._borrowing.open(message)
+            self._decode()
+
+    async def close(self) -> None:
+        """End it."""
+        await self._receiver.close()
