@@ -61,7 +61,7 @@ def rows() -> None:
 def leaky_rows() -> None:
     """Those who can do without waiting for anybody."""
     row("hfg edge, latest", partial(crossing.edge, 8), 400_000, 200_000, leaky=True)
-    row("hfg link, bounded", partial(crossing.link, 1, "straight"), 20_000, 150, leaky=True)
+    row("hfg link, bounded, over Zenoh", partial(crossing.link, 1, "zenoh"), 20_000, 150, leaky=True)
     row("hfg publish and subscribe, latest", partial(crossing.meeting, 1), 20_000, 150, leaky=True)
     zenoh = peer("zenoh_links", "puts")
     row("Zenoh, puts that drop", zenoh, 40_000, 0, leaky=True, needs="zenoh")

@@ -118,7 +118,7 @@ class Way:
     async def close(self) -> None:
         """Close all of it."""
         if self._route is not None and self._endpoint is not None:
-            self._route.close()
+            await self._route.close()
             self._endpoint.close()
         await self._session.close()
 

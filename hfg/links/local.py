@@ -21,7 +21,7 @@ import struct
 import sys
 from collections import deque
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NoReturn
 
 from hfg.errors import TransportError
 from hfg.logs import log
@@ -172,29 +172,27 @@ class _Incoming:
             self._gone(self, misbehaved)
 
     def _read(self) -> None:
-        """Take what is there, once: what else comes has to wait for others' turns."""
-        into = memoryview(self._chunk)[self._filled :] if self._large is None else self._large.rest
-        try:
-            count = self._socket.recv_into(into)
-        except BlockingIOError:
-            return
-        except OSError:
-            count = 0
-        if not count:
-            self.close()
-            return
+        """Take what is there: once, so that others have their turns, but of a large datagram as much as comes."""
         bursts: dict[bytes, list[Message]] = {}
         try:
             if self._large is None:
-                self._filled += count
+                self._filled += self._socket.recv_into(memoryview(self._chunk)[self._filled :]) or self._ended()
                 self._part(bursts)
-            elif self._large.fill(count):
-                bursts[self._large.key] = [self._large.message]
-                self._large = None
+            while self._large is not None:
+                if self._large.fill(self._socket.recv_into(self._large.rest) or self._ended()):
+                    bursts.setdefault(self._large.key, []).append(self._large.message)
+                    self._large = None
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.close()
         except _Refused:
             self.close(misbehaved=True)
         if bursts:
             self._deliver(bursts)
+
+    def _ended(self) -> NoReturn:
+        raise ConnectionResetError("the neighbour has gone")
 
     def _part(self, bursts: dict[bytes, list[Message]]) -> None:
         """Give the whole datagrams that have come, and keep what is left of another."""
@@ -279,6 +277,7 @@ class LocalRoute:
         self._not_before = 0.0
         self._unsent: deque[memoryview] = deque()
         self._waiting = 0  # bytes of it
+        self._emptied: asyncio.Future[None] | None = None  # somebody waits until all has left
 
     @property
     def largest_message(self) -> int:
@@ -293,27 +292,41 @@ class LocalRoute:
 
     def publisher(self, key: str, traffic: Traffic) -> Publisher:
         """Make what puts datagrams on a key; see `Session.publisher`."""
-        return _LocalPublisher(self, key, self._session.publisher(key, traffic))
+        may_wait = traffic not in (Traffic.BULK, Traffic.BACKGROUND)
+        return _LocalPublisher(self, key, self._session.publisher(key, traffic), may_wait=may_wait)
 
     def subscribe(self, key: str, receive: Receive) -> Closing:
         """Have all datagrams of a key, whichever way they come; see `Session.subscribe`."""
         return _Both(self._endpoint.subscribe(key, receive), self._session.subscribe(key, receive))
 
-    def close(self) -> None:
-        """End it; what has not left is lost."""
+    async def close(self, within_s: float = 1.0) -> None:
+        """End it; what was put is still sent, if the neighbour takes it by then."""
+        if self._unsent:
+            self._emptied = self._loop.create_future()
+            await asyncio.wait({self._emptied}, timeout=within_s)
         self._close()
         self._not_before = float("inf")
 
-    def put(self, key: bytes, header: bytes, payload: Buffer) -> bool:
-        """Send a datagram; False if it has to go another way."""
+    def put(self, key: bytes, header: bytes, payload: Buffer, *, may_wait: bool) -> bool:
+        """Send a datagram; False if it has to go another way.
+
+        Args:
+          key: on which it is put.
+          header: of it.
+          payload: of it.
+          may_wait: it waits behind what has not left yet; else it is lost then, for nobody wants what is old, and if it
+            is long it goes over the session, which has threads for that while a loop is busy.
+        """
         connected = self._socket or self._connected()
         if connected is None or len(header) > _LONGEST_HEADER:
             return False
         size = payload.nbytes if isinstance(payload, memoryview) else len(payload)
+        if size > _CHUNK and not may_wait:
+            return False
         head = _HEAD.pack(len(key), len(header), size) + key + header
         parts: list[Buffer] = [head + payload] if size <= _CHUNK else [head, payload]
         if self._unsent:
-            return self._keep(parts, 0)
+            return self._keep(parts, 0) if may_wait else True
         try:
             sent = connected.send(parts[0]) if len(parts) == 1 else connected.sendmsg(parts)
         except BlockingIOError:
@@ -339,21 +352,22 @@ class LocalRoute:
         return True
 
     def _go_on(self) -> None:
-        """There is room again."""
+        """There is room again: fill it, also what is made meanwhile, for the next turn may be long in coming."""
         assert self._socket is not None
         try:
-            sent = self._socket.send(self._unsent[0])
+            while self._unsent:
+                sent = self._socket.send(self._unsent[0])
+                self._waiting -= sent
+                rest = self._unsent.popleft()[sent:]
+                if rest:
+                    self._unsent.appendleft(rest)
         except BlockingIOError:
             return
         except OSError:
             self._close()
             return
-        self._waiting -= sent
-        rest = self._unsent.popleft()[sent:]
-        if rest:
-            self._unsent.appendleft(rest)
-        elif not self._unsent:
-            self._loop.remove_writer(self._socket.fileno())
+        self._loop.remove_writer(self._socket.fileno())
+        self._tell_emptied()
 
     def _connected(self) -> socket.socket | None:
         now = self._loop.time()
@@ -380,23 +394,29 @@ class LocalRoute:
             self._socket = None
         self._unsent.clear()
         self._waiting = 0
+        self._tell_emptied()
+
+    def _tell_emptied(self) -> None:
+        if self._emptied is not None and not self._emptied.done():
+            self._emptied.set_result(None)
 
 
 class _LocalPublisher:
     """Puts datagrams on one key, straight if the way is open."""
 
-    def __init__(self, route: LocalRoute, key: str, beside: Publisher) -> None:
+    def __init__(self, route: LocalRoute, key: str, beside: Publisher, *, may_wait: bool) -> None:
         self._route = route
         self._key = key.encode()
         self._beside = beside
         self._largest = route.largest_message
+        self._may_wait = may_wait
         self._is_closed = False
 
     def put(self, header: bytes, payload: Buffer = b"") -> None:
         """Send one datagram; see `Publisher.put`."""
         # What the session would refuse it refuses in its own words.
         refused = self._is_closed or len(header) + memoryview(payload).nbytes > self._largest
-        if refused or not self._route.put(self._key, header, payload):
+        if refused or not self._route.put(self._key, header, payload, may_wait=self._may_wait):
             self._beside.put(header, payload)
 
     def close(self) -> None:

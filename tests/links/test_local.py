@@ -110,7 +110,7 @@ async def two() -> AsyncIterator[Two]:
     try:
         yield both
     finally:
-        both.route.close()
+        await both.route.close()
         both.there.close()
         both.here.close()
 
@@ -217,6 +217,44 @@ def test_what_is_too_many_for_one_that_does_not_read_is_lost_and_never_half(monk
     run(scenario)
 
 
+def test_what_was_put_before_the_end_is_still_sent() -> None:
+    async def scenario(both: Two) -> None:
+        for number in range(5):
+            both.publisher.put(b"%d" % number, bytes(2**20))  # more than the system takes at once
+        await both.route.close()
+        await both.heard.wait(5)
+
+    run(scenario)
+
+
+def test_the_end_does_not_wait_for_ever_for_one_that_does_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scenario(both: Two) -> None:
+        monkeypatch.setattr(local._Incoming, "_read", lambda _: None)
+        for number in range(5):
+            both.publisher.put(b"%d" % number, bytes(2**20))
+        await both.route.close(within_s=0.01)
+        assert not both.heard.messages
+
+    run(scenario)
+
+
+def test_what_may_be_lost_does_not_wait_behind_what_has_not_left() -> None:
+    async def scenario(both: Two) -> None:
+        leaky = both.route.publisher("a key", Traffic.BULK)
+        for number in range(20):  # nobody reads before this is over
+            leaky.put(b"%d" % number, bytes(2**17))
+        leaky.put(b"long", bytes(2**20))
+        both.publisher.put(b"exact")
+        async with asyncio.timeout(10):
+            while b"exact" not in both.heard.headers:
+                await asyncio.sleep(0)
+        assert b"0" in both.heard.headers
+        assert b"19" not in both.heard.headers
+        assert both.beside.put == [b"long"]
+
+    run(scenario)
+
+
 def test_who_sends_what_is_no_datagram_is_turned_away_and_others_go_on() -> None:
     async def scenario(both: Two) -> None:
         source = random.Random(3)
@@ -316,10 +354,10 @@ def test_a_link_goes_straight_both_ways_and_on_when_its_consumer_begins_anew() -
                 if life == len(names):
                     await sender.wait_finished()
             there.close()  # at once and without a word
-            way_back.close()
+            await way_back.close()
         assert got == [b"%d" % number for number in range(40)]
         await sender.close()
-        route.close()
+        await route.close()
         here.close()
 
     asyncio.run(main())

@@ -132,8 +132,8 @@ def test_tokens_go_straight_to_a_process_of_this_host_and_also_to_its_next_life(
     if __name__ == "__main__":
         straight, put = [], LocalRoute.put
 
-        def noted(route, key, header, payload):
-            went = put(route, key, header, payload)
+        def noted(route, *args, **kwargs):
+            went = put(route, *args, **kwargs)
             straight.append((route._neighbour, went))
             return went
 

@@ -114,4 +114,4 @@ class Carrier:
         """End all links."""
         for link in self._links.values():
             await link.close()
-        self._ways.close()
+        await self._ways.close()

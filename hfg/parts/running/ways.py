@@ -56,9 +56,9 @@ class Ways:
         if other in self._routes:
             self._routes[other].lead_to(self._name(other, life))
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """End those that this has made."""
         for route in self._routes.values():
-            route.close()
+            await route.close()
         if self._endpoint is not None:
             self._endpoint.close()

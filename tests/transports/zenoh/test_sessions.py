@@ -149,6 +149,19 @@ async def test_who_speaks_another_version_than_those_who_are_there_is_refused(
         await open_one(**here, mode="client")
 
 
+async def test_a_session_that_cannot_be_made_leaves_no_thread_that_keeps_the_program(
+    here: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def raises(*_: object) -> str:
+        raise ValueError("on purpose")
+
+    before = set(threading.enumerate())
+    monkeypatch.setattr(sys.modules["hfg_transports.zenoh.transport"], "version_key", raises)
+    with pytest.raises(ValueError, match="on purpose"):
+        await ZenohTransport().open(**here)
+    await until(lambda: not [one for one in threading.enumerate() if "pyo3" in one.name and one not in before])
+
+
 async def test_a_program_that_was_there_first_warns(
     open_one: Open, here: dict[str, Any], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

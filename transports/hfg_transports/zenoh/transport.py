@@ -90,7 +90,15 @@ def _open(settings: Settings, mode: Mode, wait_s: float) -> Callable[[asyncio.Ab
         if reply.ok is not None and (sentence := complaint(keys, str(reply.ok.key_expr), settings.realm)):
             raw.close()
             raise TransportError(sentence)
-    return lambda loop: ZenohSession(raw, settings, loop)
+
+    def made(loop: asyncio.AbstractEventLoop) -> ZenohSession:
+        try:
+            return ZenohSession(raw, settings, loop)
+        except BaseException:  # Zenoh's threads would keep the program from ending
+            raw.close()
+            raise
+
+    return made
 
 
 async def _in_thread(
@@ -139,12 +147,11 @@ class ZenohSession:
         self._replies: Mailbox[tuple[Question, Any]] = Mailbox(self._inbox, "answers", _settle)
         versions: Mailbox[str] = Mailbox(self._inbox, "the watch over versions", self._version_told)
         self._warned: set[str] = set()
-        watching = raw.liveliness().declare_subscriber(
+        raw.liveliness().declare_subscriber(
             f"{self._keys.versions}/**",
             binding.callback(lambda sample: versions.leave(str(sample.key_expr))),
             history=True,
         )
-        self._declared: set[Callable[[], object]] = {watching.undeclare}  # what has a thread of Zenoh's
         self._version = raw.liveliness().declare_token(version_key(self._keys, self.name))
         close_at_the_end(self)
 
@@ -307,13 +314,8 @@ class ZenohSession:
         """Close Zenoh's session, from any thread; blocks.
 
         Zenoh raises when somebody has stood still for ten seconds to whom something was to be sent: nobody's error.
-        What has a thread is withdrawn before: by closing the session alone a thread has been seen to stay for ever, and
-        Python waits for all of them at its end.
         """
         self._sender.close(CLOSE_S / 2)
-        for undeclare in list(self._declared):
-            with contextlib.suppress(Exception):
-                undeclare()
         with contextlib.suppress(Exception):
             self._raw.close()
 
@@ -339,7 +341,6 @@ class ZenohSession:
     def _until_closed(self, mailbox: Mailbox[Any], undeclare: Callable[[], object]) -> Announcement:
         """Keep what was declared until it is closed."""
         self._mailboxes.append(mailbox)
-        self._declared.add(undeclare)
 
         def close() -> None:
             mailbox.close()
@@ -351,7 +352,6 @@ class ZenohSession:
 
     def _undeclare(self, undeclare: Callable[[], object]) -> None:
         if self._closing is None:
-            self._declared.discard(undeclare)
             try:
                 undeclare()
             except Exception as error:
