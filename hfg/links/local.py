@@ -321,38 +321,39 @@ class LocalRoute:
         if connected is None or len(header) > _LONGEST_HEADER:
             return False
         size = payload.nbytes if isinstance(payload, memoryview) else len(payload)
-        if size > _CHUNK and not may_wait:
-            return False
+        is_long = size > _CHUNK
+        if not may_wait and (is_long or self._unsent):
+            return not is_long
         head = _HEAD.pack(len(key), len(header), size) + key + header
-        parts: list[Buffer] = [head + payload] if size <= _CHUNK else [head, payload]
-        if self._unsent:
-            return self._keep(parts, 0) if may_wait else True
+        if is_long or self._unsent:
+            self._stand_in_line(head if is_long else head + payload, payload if is_long else b"")
+            return True
+        datagram = head + payload
         try:
-            sent = connected.send(parts[0]) if len(parts) == 1 else connected.sendmsg(parts)
+            sent = connected.send(datagram)
         except BlockingIOError:
             sent = 0
         except OSError:  # it has gone; who comes after it has another name
             self._close()
             return False
-        return sent == len(head) + size or self._keep(parts, sent)
-
-    def _keep(self, parts: list[Buffer], sent: int) -> bool:
-        """Send what is left of a datagram as there is room; one that nobody makes room for is lost, but never half."""
-        size = sum(map(len, parts)) - sent
-        if not sent and self._waiting + size > _MOST_UNSENT and self._unsent:
-            return True
-        if not self._unsent and self._socket is not None:
-            self._loop.add_writer(self._socket.fileno(), self._go_on)
-        for part in parts:
-            view = memoryview(part)[sent:]
-            sent = max(sent - len(part), 0)
-            if view:
-                self._unsent.append(view)
-        self._waiting += size
+        if sent < len(datagram):
+            self._stand_in_line(memoryview(datagram)[sent:])
         return True
 
+    def _stand_in_line(self, *parts: Buffer) -> None:
+        """Send it when all before it has left; what there is no room for in the line is lost, but never half of it."""
+        size = sum(map(len, parts))
+        if self._unsent and self._waiting + size > _MOST_UNSENT:
+            return
+        is_first = not self._unsent
+        self._unsent.extend(memoryview(part) for part in parts if part)
+        self._waiting += size
+        if is_first and self._socket is not None:
+            self._loop.add_writer(self._socket.fileno(), self._go_on)
+            self._go_on()
+
     def _go_on(self) -> None:
-        """There is room again: fill it, also what is made meanwhile, for the next turn may be long in coming."""
+        """There is room, perhaps: fill it, also what is made meanwhile, for the next turn may be long in coming."""
         assert self._socket is not None
         try:
             while self._unsent:

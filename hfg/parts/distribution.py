@@ -16,7 +16,7 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -71,6 +71,8 @@ from hfg.parts.steering.editing import Drawing
 from hfg.parts.steering.run import Counts, CutRun
 
 __all__ = ["Distribution", "distribute"]
+
+Reported = TypeVar("Reported")
 
 _LOGGER = Log("hfg.parts")
 _PATIENCE_S = 1.0  # how long a signal that may be lost may be on its way, while nothing else moves
@@ -258,10 +260,7 @@ class Distribution:
             case Rests():
                 self._agreement.rest(message.rest)
             case Told():
-                try:
-                    self._agreement.hear(message.answer)
-                except msgspec.ValidationError as error:
-                    raise Untrue(f"which is no answer to that question: {error}") from error
+                self._told(message)
             case Keep():
                 if other.name not in self._ledgers or other.is_keeping:
                     raise Untrue("and has no ledger, or has not heard yet that what it said before is kept")
@@ -276,6 +275,12 @@ class Distribution:
                 other.close(message)
             case _:
                 raise Untrue("which is not for the main part")
+
+    def _told(self, message: Told) -> None:
+        try:
+            self._agreement.hear(message.answer)
+        except msgspec.ValidationError as error:
+            raise Untrue(f"which is no answer to that question: {error}") from error
 
     def _need_own(self, other: Other, message: Message) -> None:
         """A part speaks for itself, of what it has.
@@ -470,8 +475,8 @@ class Distribution:
                     f'the process of group "{other.name}" was begun again {other.deaths.count} times; what it counted '
                     "before is not in the report"
                 )
-            nodes |= {path: one for path, one in found.nodes.items() if homes.get(path, other.name) == other.name}
-            edges |= {label: one for label, one in found.edges.items() if homes.get(label, other.name) == other.name}
+            nodes |= _own(found.nodes, homes, other.name)
+            edges |= _own(found.edges, homes, other.name)
             halves[other.name] = found.edges
             errors += found.errors
             lost += found.lost_activity
@@ -565,6 +570,11 @@ def _known_packages() -> list[str]:
 
 def _all_nodes(cutting: Cutting) -> list[Any]:
     return [node for flat in cutting.parts.values() for node in flat.nodes]
+
+
+def _own(found: Mapping[str, Reported], homes: Mapping[str, str], part: str) -> dict[str, Reported]:
+    """What a part reports of itself, and of what is nobody's."""
+    return {place: one for place, one in found.items() if homes.get(place, part) == part}
 
 
 def _places(flat: FlatGraph) -> Iterator[str]:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from hfg.parts.processes import launching
 
 pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 
@@ -94,6 +98,48 @@ CHAIN = """
         graph.connect(one.out, graph.output("out", int))
         return graph
 """
+
+
+class SlowTransport:
+    """One whose session is there after a while, with a file of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.begun, self.may_go_on = asyncio.Event(), asyncio.Event()
+        self.closed = False
+
+    async def open(self, **_: object) -> SlowTransport:
+        self.begun.set()
+        await self.may_go_on.wait()
+        for folder in self.folder.iterdir():
+            (folder / "meet").touch()
+        return self
+
+    async def close(self) -> None:
+        self.closed = True
+
+
+def test_who_is_interrupted_while_parts_begin_to_meet_leaves_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+
+    async def scenario() -> None:
+        slow = SlowTransport(tmp_path)
+        monkeypatch.setattr(launching, "transport", lambda _: slow)
+        launcher = launching.ProcessLauncher()
+        opening = asyncio.create_task(launcher.open())
+        await slow.begun.wait()
+        opening.cancel()
+        await asyncio.wait({opening})
+        closing = asyncio.create_task(launcher.close())
+        await asyncio.sleep(0)
+        slow.may_go_on.set()
+        await closing
+        assert slow.closed
+
+    asyncio.run(scenario())
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.rule("L2", "L3")

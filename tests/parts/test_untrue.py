@@ -15,7 +15,7 @@ import pytest
 
 import hfg
 from hfg.graph.flat import MAIN
-from hfg.parts.model.agreement import Answer, Question, Rest
+from hfg.parts.model.agreement import Answer, Question, Rest, Step
 from hfg.parts.model.clocks import RunClock
 from hfg.parts.model.messages import (
     Ask,
@@ -52,6 +52,7 @@ from hfg.parts.processes import launching
 from hfg.parts.processes.launching import LoopLauncher
 from hfg.parts.processes.worker import Worker
 from hfg.parts.running.channels import Channel
+from hfg.parts.steering.run import CutRun
 from hfg_transports.memory import Faults, Network
 
 COUNT = 20
@@ -61,6 +62,11 @@ TO_TRUE, TO_LIAR = "numbers.out -> first.value", "numbers.out -> third.value"
 FROM_TRUE, FROM_LIAR = "first.out -> second.value", "third.out -> fourth.value"  # from one to the other
 OUT_OF_TRUE, OUT_OF_LIAR = "fourth.out -> out", "second.out -> there"
 LABELS = [TO_TRUE, TO_LIAR, FROM_TRUE, FROM_LIAR, OUT_OF_TRUE, OUT_OF_LIAR, "no -> where", ""]
+
+
+def cut_run(run: hfg.Run) -> CutRun:
+    assert isinstance(run, CutRun)
+    return run
 
 
 @hfg.node
@@ -142,7 +148,9 @@ class World:
 
     def say(self, to: str, message: Message) -> None:
         """The liar says it."""
-        self.workers["liar"]._channels[to].send(unpack(pack(message)))  # type: ignore[arg-type]  # it is well formed
+        well_formed = unpack(pack(message))
+        assert well_formed is not None
+        self.workers["liar"]._channels[to].send(well_formed)
 
     def run(self, plan: Callable[[hfg.Run], Any]) -> hfg.Report:
         """Run the two parts, and this beside them."""
@@ -279,7 +287,7 @@ def test_who_was_not_asked_to_look_is_not_heard_and_what_cannot_be_read_is_refus
 
     async def plan(run: hfg.Run) -> None:
         tap, other = run.tap("first.out"), run.tap("second.out")
-        numbers = sorted(run._asking._standing)  # type: ignore[attr-defined]
+        numbers = sorted(cut_run(run)._asking._standing)
         await asyncio.sleep(0.01)
         world.say(MAIN, Seen(numbers[0], tokens=[PARCEL]))  # which the other part was asked for
         world.say(MAIN, Seen(numbers[1], tokens=[Parcel(b"\xff", b"", shown="me")]))
@@ -303,7 +311,7 @@ def test_counts_that_are_none_are_refused_and_those_of_others_are_left_out(
     async def plan(run: hfg.Run) -> None:
         await run.refresh()
         run.statistics()  # asks anew
-        number = max(run._asking._waiting)  # type: ignore[attr-defined]
+        number = max(cut_run(run)._asking._waiting)
         for one in (number - 1, number):
             world.say(MAIN, Result(one, value))
         await asyncio.sleep(0.01)
@@ -342,7 +350,8 @@ def a_lie(choose: random.Random) -> Message:
     """Something well formed that the liar cannot know, or that is for others to say."""
     label, count = choose.choice(LABELS), choose.choice([0, 1, 5, 10_000, HUGE])
     part, stream = choose.choice(["", "true", "x", "part true"]), choose.choice([-1, 0, 1, 3, HUGE])
-    step = choose.choice(["rests", "fullest", "lose", "grow", "stuck", "finish", "end"])
+    steps: list[Step] = ["rests", "fullest", "lose", "grow", "stuck", "finish", "end"]
+    step = choose.choice(steps)
     value = choose.choice([None, 1, "a", [1], {"a": 1}, ["a", "b"], [[]]])
     account = (choose.choice([0, count]), count, choose.choice(["open", "over", "so"]), True)
     own = [FROM_LIAR, OUT_OF_LIAR, TO_LIAR, FROM_TRUE]  # of these it may say what it likes that can be so
@@ -358,8 +367,8 @@ def a_lie(choose: random.Random) -> Message:
         lambda: Ended(part, "failed", Failed("NodeError", "x", "y")),
         lambda: Closed(choose.choice([part, "liar"]), {}, {}, ["x"] * 50, 5),
         lambda: Rests(Rest(choose.choice([part, "liar"]), count, {label: account}, {label: account})),
-        lambda: Told(Answer(choose.choice([part, "liar"]), step, count, value=value)),  # type: ignore[arg-type]
-        lambda: Ask(Question(step, count, value)),  # type: ignore[arg-type]
+        lambda: Told(Answer(choose.choice([part, "liar"]), step, count, value=value)),
+        lambda: Ask(Question(step, count, value)),
         lambda: Keep(count, b"x" * choose.randrange(1000)),
         lambda: Kept(count),
         lambda: Result(choose.randrange(20), value, Failed("x", "y") if choose.random() < 0.3 else None),

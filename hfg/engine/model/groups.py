@@ -52,6 +52,10 @@ class Group:
         """R3: whether nobody of it moves, for the run is paused."""
         self.held = held
 
+    def give_turns(self, turns: int) -> None:
+        """So many nodes may move before the pump looks round."""
+        self.turns = turns
+
     def had_turns(self, more: int) -> None:
         """So many more nodes have moved in the step of the one that the pump has let move."""
         self.turns -= more

@@ -360,7 +360,7 @@ class Engine:
         finally:
             core.pumping = False
             core.current = core.speaker = None
-            self._loop_group.turns = 1
+            self._loop_group.give_turns(1)
 
     def _waits_for_work(self) -> bool:
         """R5, R1: a loop that is always busy must not keep out what comes back from threads.
@@ -416,7 +416,7 @@ class Engine:
         """
         core, flags, take = self.core, self.core.flags, group.take
         until = core.until = self.now() + _SLICE_S
-        group.turns = _SLICE_STEPS
+        group.give_turns(_SLICE_STEPS)
         while True:
             if ready_groups:
                 ready_groups.popleft().dispatch()
@@ -434,7 +434,7 @@ class Engine:
             if not group.turns:
                 if self.now() >= until:
                     return
-                group.turns = _SLICE_STEPS
+                group.give_turns(_SLICE_STEPS)
 
     def give_way(self, call: Callable[[], None]) -> None:
         """Code has given way to others for a moment (`sleep(0)`): let it go on behind all that is ready now.
@@ -459,7 +459,7 @@ class Engine:
         instant = self.loop.time()
         core.followed = 0
         for _ in range(_VIRTUAL_SLICE_WAVES // _VIRTUAL_LOOK_WAVES):
-            group.turns = _VIRTUAL_LOOK_WAVES
+            group.give_turns(_VIRTUAL_LOOK_WAVES)
             while group.turns > 0:
                 if ready_groups:
                     ready_groups.popleft().dispatch()
@@ -473,7 +473,7 @@ class Engine:
                     return
                 group.turns -= 1
                 if group.turns <= 0:
-                    group.turns += core.followed
+                    group.give_turns(group.turns + core.followed)
                     core.followed = 0
             self.beside_work += 1
             if self.loop.time() != instant:  # code has spent time: what is due by now has its turn

@@ -188,13 +188,15 @@ class ProcessLauncher:
         self._said = settings
         self._folder: Path | None = None
         self._session: Session | None = None
+        self._opening: asyncio.Future[Session] | None = None
         self._spares = Spares()
 
     async def open(self) -> Session:
         """See `Launcher`: nobody but this user reaches the socket at which the parts meet."""
         if self._said is None:
             self._folder = Path(tempfile.mkdtemp(prefix="hfg-"))
-        self._session = await self._transport.open(**self._settings)
+        self._opening = asyncio.ensure_future(self._transport.open(**self._settings))
+        self._session = await asyncio.shield(self._opening)
         return self._session
 
     @property
@@ -232,8 +234,9 @@ class ProcessLauncher:
     async def close(self) -> None:
         """See `Launcher`."""
         await self._spares.close()
-        if self._session is not None:
-            await self._session.close()
+        if self._opening is not None:  # who was interrupted amid it would leave what it makes in the folder
+            with contextlib.suppress(TransportError):
+                await (await self._opening).close()
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
 

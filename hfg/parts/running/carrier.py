@@ -52,17 +52,17 @@ class Carrier:
         self._links: dict[str, OutgoingEnd | IncomingEnd] = {}
         outgoing: dict[str, OutgoingEnd] = {}
         incoming: dict[str, IncomingEnd] = {}
-        beside = {edge.source if edge.target == part.name else edge.target for edge in edges if edge.within_host}
-        self._ways = Ways(session, run, part.name, lives, beside if shares_memory else set())
+        near = [edge for edge in edges if shares_memory and edge.within_host]
+        self._ways = Ways(session, run, part.name, lives, {edge.far_from(part.name) for edge in near})
         world = World(part, self._ways, run, lives, say)
         for edge in edges:
             if edge.source == part.name:
                 self._links[edge.label] = outgoing[edge.label] = OutgoingEnd(world, edge)
             else:
                 self._links[edge.label] = incoming[edge.label] = IncomingEnd(world, edge, edge.source in remembering)
-            if part.keeper is not None and edge.source == part.name:
-                continue  # what is kept must hold the arrays
-            if shares_memory and edge.within_host and edge.guarantee == "exact":
+        for edge in near:
+            must_hold_arrays = part.keeper is not None and edge.source == part.name  # for they are kept with it
+            if edge.guarantee == "exact" and not must_hold_arrays:
                 self._links[edge.label].share(world)
         self._outgoing, self._incoming = outgoing, incoming
         part.connect(outgoing, incoming)

@@ -69,13 +69,23 @@ class _NearEnd:
     def __init__(self, world: World, edge: CutEdge, other: str) -> None:
         self.other = other
         self._part = world.part
+        self._waits_to_join = world.lives[world.part.name] > world.lives[other]
         self._edge = edge
         self._key = f"{world.run}/edge/{edge.number}"
         self._codec = _codec_of(edge)
         self._tell = partial(world.say, other)
 
-    def _need_to_join(self, *, waits: bool) -> None:
-        if not waits:
+    def _fail(self, why: str, error: Exception) -> None:
+        """The edge cannot do what it has to: the run ends with that."""
+        problem = RunError(f'edge "{self._edge.label}" {why}: {error}')
+        problem.__cause__ = error
+        self._part.finish("failed", problem)
+
+    def _cannot_carry(self, error: Exception) -> None:
+        self._fail(f"cannot carry a value to {name_of(self.other)}", error)
+
+    def _need_to_join(self) -> None:
+        if not self._waits_to_join:
             raise Untrue(f'of edge "{self._edge.label}", which this life of {name_of(self._part.name)} knows already')
 
 
@@ -87,7 +97,6 @@ class OutgoingEnd(_NearEnd):
         part, lives = world.part, world.lives
         self._loop = asyncio.get_running_loop()
         self._most = _most_under_way(edge)
-        self._waits_to_join = lives[part.name] > lives[edge.target]
         self._known: Where = (0, 0)  # the last that had come from former lives
         self._lending: Lending | None = None
         self._held: deque[EncodedToken] = deque()  # what is not kept yet, and may not leave before it is
@@ -157,9 +166,7 @@ class OutgoingEnd(_NearEnd):
                 if lending is not None:
                     lending.sent()
         except (EncodingError, TransportError) as error:
-            problem = RunError(f'edge "{label}" cannot carry a value to {name_of(self._edge.target)}: {error}')
-            problem.__cause__ = error
-            part.finish("failed", problem)
+            self._cannot_carry(error)
             return
         outlet = part.outlets[label]
         if repeated:
@@ -191,10 +198,7 @@ class OutgoingEnd(_NearEnd):
             for _ in range(count):
                 self._sender.send_nowait(self._held.popleft())
         except TransportError as error:
-            label = self._edge.label
-            problem = RunError(f'edge "{label}" cannot carry a value to {name_of(self._edge.target)}: {error}')
-            problem.__cause__ = error
-            self._part.finish("failed", problem)
+            self._cannot_carry(error)
 
     def speaks(self, speaking: bool, total: int) -> None:
         """See `Outgoing`."""
@@ -233,7 +237,7 @@ class OutgoingEnd(_NearEnd):
         Raises:
           Untrue: nobody waits to be told.
         """
-        self._need_to_join(waits=self._waits_to_join)
+        self._need_to_join()
         if isinstance(self._sender, LinkSender) and not self._part.inherits:
             stream, number = self._sender.machine.position
             self.goes_on((stream, number))
@@ -296,7 +300,6 @@ class IncomingEnd(_NearEnd):
         self._remembers = remembers
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
-        self._waits_to_join = lives[edge.source] < lives[part.name]
         self._segment = partial(segment_of, world.run, edge=edge.number)
         self._lent_by = lives[edge.source]
         self._before = 0  # tokens of former lives of the producer; of a lossy edge, where numbers tell what is lost
@@ -341,9 +344,7 @@ class IncomingEnd(_NearEnd):
             except EncodingError as error:
                 if borrowing is not None and borrowing.is_awaited:
                     break  # sent to a former life, and this one has not heard of the memory yet
-                problem = RunError(f'edge "{self._edge.label}" brought what it cannot: {error}')
-                problem.__cause__ = error
-                self._part.finish("failed", problem)
+                self._fail("brought what it cannot", error)
                 return
             self._undecoded.popleft()
             tokens.append(((token.value, token.activity, token.stamp), (delivery.stream, delivery.sequence)))
@@ -391,7 +392,7 @@ class IncomingEnd(_NearEnd):
         Raises:
           Untrue: nobody waits to be told.
         """
-        self._need_to_join(waits=self._waits_to_join)
+        self._need_to_join()
         total = message.total
         ledger = None if self._part.keeper is None else self._part.keeper.position(self._edge.label)
         if ledger is not None and ledger.stream == message.stream:

@@ -96,6 +96,7 @@ class Part:
         """
         edges = list(edges)
         self.name = name
+        self.inherits = inherits = name in inheriting
         self.composition = composition
         self.keeper = keeper
         self._rests = rests
@@ -105,10 +106,8 @@ class Part:
         engine = self.engine
         keeps = {edge.label: edge.guarantee == "exact" for edge in edges}
         self.outlets: dict[str, Outlet] = {
-            worker.port_name: Outlet(
-                engine, worker, keeps=keeps[worker.port_name], wake=self._wake, drains=name not in inheriting
-            )
-            for worker in engine.core.outlets
+            one.port_name: Outlet(engine, one, keeps=keeps[one.port_name], wake=self._wake, drains=not inherits)
+            for one in engine.core.outlets
         }
         self.inlets: dict[str, Inlet] = {
             worker.port_name: Inlet(engine, worker, self._moved) for worker in engine.core.inlets
@@ -121,7 +120,6 @@ class Part:
         self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
         self._speaking = dict.fromkeys(self.outlets, True)
         self._said: list[tuple[str, bool, int]] = []
-        self.inherits = inherits = name in inheriting
         self.positions: dict[str, deque[Where]] = {label: deque() for label in self.outlets} if inherits else {}
         coming = [edge.label for edge in edges if edge.target == name and _is_synchronous(edge)]
         self._inheritance = Inheritance(coming)
@@ -216,9 +214,7 @@ class Part:
     def _settle_kept(self) -> None:
         assert self.keeper is not None
         for label, inlet in self.inlets.items():
-            done = min(inlet.taken, self.keeper.safe(label))
-            if inlet.settle(done):
-                self._incoming[label].taken(done)
+            self._settle_at(inlet, min(inlet.taken, self.keeper.safe(label)))
 
     # --- tokens -----------------------------------------------------------------------------------------------------
 
@@ -237,19 +233,28 @@ class Part:
             if self.keeper is not None:
                 self.keeper.came(one, [where for _, where in later])
             if self.inherits and later:
-                ended = later[-1][0][0] is END
-                inherited = self._inheritance.arrive(one, [where for _, where in later], ended=ended)
-                for outlet, positions in self.positions.items():
-                    if not self.outlets[outlet].is_over:
-                        positions.extend(inherited)
+                self._inherit(one, later)
             inlet.lay()
-        if self._owes_behind and self.behind != UNKNOWN:
-            self._owes_behind = False
-            for link in self._outgoing.values():
-                link.goes_on(self.behind)
+        if self._owes_behind:
+            self._say_behind()
         if self._said:
             self._listen()
         self.engine.kick()
+
+    def _inherit(self, label: str, tokens: list[Arrived]) -> None:
+        """What will be sent has the positions of what has come."""
+        ended = tokens[-1][0][0] is END
+        inherited = self._inheritance.arrive(label, [where for _, where in tokens], ended=ended)
+        for outlet, positions in self.positions.items():
+            if not self.outlets[outlet].is_over:
+                positions.extend(inherited)
+
+    def _say_behind(self) -> None:
+        """Consumers wait to be told where this life goes on: as soon as it knows."""
+        if self.behind != UNKNOWN:
+            self._owes_behind = False
+            for link in self._outgoing.values():
+                link.goes_on(self.behind)
 
     def lose(self, label: str, total: int) -> None:
         """Of so many tokens that have left for here, those that have not come are lost: the edge may lose some."""
@@ -388,12 +393,12 @@ class Part:
         elif not self.inherits and (
             not self.engine.core.pumping or inlet.taken - inlet.settled >= self._portions[inlet.label]
         ):
-            self._tell_taken(inlet)
+            self._settle_at(inlet, inlet.taken)
 
-    def _tell_taken(self, inlet: Inlet) -> None:
-        """Each token that was taken is done."""
-        if inlet.settle(inlet.taken):
-            self._incoming[inlet.label].taken(inlet.taken)
+    def _settle_at(self, inlet: Inlet, done: int) -> None:
+        """So many of its tokens are done: the producer hears of those that were not before."""
+        if inlet.settle(done):
+            self._incoming[inlet.label].taken(done)
 
     def _settle(self) -> None:
         """Each token gives one everywhere: so many are done as have passed every end, and their firings are over.
@@ -410,9 +415,7 @@ class Part:
                 if worker.busy or not worker.blocked & ENDED
             ]
         for label, inlet in self.inlets.items():
-            done = min([inlet.taken, *(self._origin[label] + count for count in ends)])
-            if inlet.settle(done):
-                self._incoming[label].taken(done)
+            self._settle_at(inlet, min([inlet.taken, *(self._origin[label] + count for count in ends)]))
 
     def _wake(self) -> None:
         """Something lies before an outlet: it leaves when the engine is done with what it does now, see `_pumped`."""
@@ -435,7 +438,7 @@ class Part:
                 self._incoming[label].hears(hearing, inlet.taken)
             inlet.lay()
             if self.keeper is None and not self.inherits:
-                self._tell_taken(inlet)
+                self._settle_at(inlet, inlet.taken)
         self.send()
         if self.inherits:
             self._settle()
