@@ -47,6 +47,21 @@ async def soon(waiting: Awaitable[T]) -> T:
         return await waiting
 
 
+async def put_until(came: Callable[[], object], *puts: Callable[[], None], again_s: float = 0.5) -> None:
+    """Put datagrams until what they should cause has come.
+
+    Any of them may be lost: the first ones, for that somebody wants them is known before the way there is, and long
+    ones, which find no room when Zenoh's threads have no turn.
+    """
+    async with asyncio.timeout(PATIENCE_S):
+        while not came():
+            for put in puts:
+                put()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(again_s):
+                    await until(came)
+
+
 def into(queue: asyncio.Queue[T]) -> Callable[[list[T]], None]:
     """Give what puts each of a burst into a queue."""
 

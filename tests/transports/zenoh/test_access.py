@@ -14,7 +14,7 @@ from hfg.errors import NoAnswer
 from hfg.transport import Message, Presence, Traffic
 from hfg_transports.zenoh import Access, ZenohSession
 from hfg_transports.zenoh.names import Keys
-from tests.transports.zenoh.conftest import Certificates, Open, free_port, into, soon, until
+from tests.transports.zenoh.conftest import Certificates, Open, free_port, into, put_until, soon, until
 
 pytestmark = pytest.mark.asyncio
 
@@ -52,8 +52,8 @@ async def test_a_viewer_sees_values_and_who_is_there_and_asks_for_what_may_be_re
     assert await soon(presences.get()) == Presence("vision", b"1", True)
     publisher = system.worker.publisher("camera", Traffic.TOKENS)
     await until(lambda: publisher.wanted)
-    publisher.put(b"head", b"body")
-    assert await soon(values.get()) == (b"head", b"body")
+    await put_until(lambda: not values.empty(), lambda: publisher.put(b"head", b"body"))
+    assert values.get_nowait() == (b"head", b"body")
 
     async def graph(question: bytes) -> bytes:
         return b"the graph"
@@ -109,8 +109,7 @@ async def test_what_a_viewer_would_write_reaches_nobody(system: System) -> None:
         assert await answered(system.other, name) == b"done"
     fences = system.other.publisher("fence", Traffic.TOKENS)
     await until(lambda: fences.wanted)
-    fences.put(b"")
-    await soon(fence.wait())
+    await put_until(fence.is_set, lambda: fences.put(b""))
     assert values == []
     assert presences == []
     assert steered == list(names)

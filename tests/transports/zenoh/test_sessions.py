@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import sys
 import threading
 import time
@@ -18,7 +19,7 @@ from hfg_transports.zenoh.config import LONG
 from hfg_transports.zenoh.sending import Sender
 from hfg_transports.zenoh.transport import CLOSE_S
 from tests.transports.chaos import Program
-from tests.transports.zenoh.conftest import Open, free_port, into, soon, until
+from tests.transports.zenoh.conftest import Open, free_port, into, put_until, soon, until
 
 pytestmark = pytest.mark.asyncio
 
@@ -57,11 +58,7 @@ async def test_programs_that_were_first_find_the_agent_that_comes_later(open_one
     first.subscribe("a", into(got))
     publisher = client.publisher("a", Traffic.TOKENS)
 
-    def has_come() -> bool:  # the first may be lost: that somebody wants it is known before the way there is
-        publisher.put(b"1")
-        return not got.empty()
-
-    await until(has_come)
+    await put_until(lambda: not got.empty(), lambda: publisher.put(b"1"))
     assert got.get_nowait() == (b"1", b"")
 
 
@@ -76,26 +73,43 @@ async def test_programs_of_two_realms_do_not_hear_each_other(open_one: Open, her
     second.subscribe("fence", into(fence))
     first.announce("k")
     first.publisher("k", Traffic.TOKENS).put(b"1")
-    second.publisher("fence", Traffic.TOKENS).put(b"")
-    await soon(fence.get())
+    fences = second.publisher("fence", Traffic.TOKENS)
+    await put_until(lambda: not fence.empty(), lambda: fences.put(b""))
     assert (got, seen) == ([], [])
 
 
 async def test_long_and_short_payloads_of_one_publisher_keep_their_order(two: Two) -> None:
     """The long ones go through a thread, so a short one must not pass them."""
-    got: asyncio.Queue[Message] = asyncio.Queue()
-    two[1].subscribe("frames", into(got))
+    got: list[tuple[int, bytes]] = []
+
+    def arrived(burst: list[Message]) -> None:
+        got.extend((int.from_bytes(header), bytes(payload)) for header, payload in burst)
+
+    two[1].subscribe("frames", arrived)
     publisher = two[0].publisher("frames", Traffic.TOKENS)
     await until(lambda: publisher.wanted)
     long = bytes(range(256)) * (LONG // 128)
-    for number in range(6):
-        publisher.put(bytes([number]), memoryview(long) if number % 3 == 0 else b"short")
-    arrived = [await soon(got.get()) for _ in range(6)]
-    assert [header for header, _ in arrived] == [bytes([number]) for number in range(6)]
-    assert [bytes(payload) for _, payload in arrived] == [long, b"short", b"short"] * 2
-    publisher.put(b"last", long)
-    publisher.close()
-    assert (await soon(got.get()))[0] == b"last"
+    numbers = itertools.count()
+
+    def put() -> None:
+        number = next(numbers)
+        publisher.put(number.to_bytes(4), b"short" if number % 3 else memoryview(long))
+
+    def whole() -> bool:
+        """Whether one long one and the two behind it have come twice; any may be lost, none may pass another."""
+        came = {number for number, _ in got}
+        return sum({first, first + 1, first + 2} <= came for first in range(0, max(came, default=0), 3)) >= 2
+
+    await put_until(whole, *(put,) * 6)
+    assert [number for number, _ in got] == sorted({number for number, _ in got})
+    assert all(payload == (b"short" if number % 3 else long) for number, payload in got)
+
+    def put_the_last() -> None:
+        last = two[0].publisher("frames", Traffic.TOKENS)
+        last.put(bytes(4), long)
+        last.close()
+
+    await put_until(lambda: got[-1] == (0, long), put_the_last)
 
 
 def wait(event: threading.Event) -> None:
@@ -130,8 +144,8 @@ async def test_what_is_longer_than_the_receiver_takes_is_counted_and_passed_over
     while not second.refused:  # what is long may be dropped on its way
         publisher.put(b"", b"x" * (2**17 + 1))
         await asyncio.sleep(0.01)
-    publisher.put(b"1")
-    assert await soon(got.get()) == (b"1", b"")
+    await put_until(lambda: not got.empty(), lambda: publisher.put(b"1"))
+    assert got.get_nowait() == (b"1", b"")
     with pytest.raises(MessageTooLarge, match="a message of 131073 bytes"):
         second.publisher("a", Traffic.TOKENS).put(b"1", b"x" * 2**17)
 
