@@ -183,10 +183,21 @@ def in_words(error: BaseException) -> str:
     if isinstance(error, SystemExit):
         return "it left the program (sys.exit): end the run by an event that is connected to graph.stop"
     try:
-        text = str(error)
+        text = _of_what_is_not_there(error) or str(error)
     except Exception as fault:
         text = f"its text cannot be made ({type(fault).__name__})"
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _of_what_is_not_there(error: BaseException) -> str:
+    """Of an attribute that a node or a port does not have, say what they say of it, as Python names their class alone.
+
+    (A `__getattr__` of theirs could say it at once, but would make each attribute of each node five times as slow.)
+    """
+    if not isinstance(error, AttributeError) or not error.name:
+        return ""
+    without = getattr(type(error.obj), "_without", None)
+    return "" if without is None else str(without(error.obj, error.name))
 
 
 class Failure(NamedTuple):

@@ -38,7 +38,7 @@ from hfg.token import Token
 from hfg.values import own_copy
 from hfg.vectors import Vectors
 
-__all__ = ["NoSuchAttribute", "Node", "NodeType", "Place"]
+__all__ = ["Node", "NodeType", "Place"]
 
 Other = TypeVar("Other")
 
@@ -265,11 +265,6 @@ class Node:
 
     if not TYPE_CHECKING:  # type checkers say of themselves what there is not
 
-        def __getattr__(self, name: str) -> Any:
-            if name.startswith("_") or hasattr(type(self), name):
-                return object.__getattribute__(self, name)  # raises what the attribute itself has raised
-            raise NoSuchAttribute(self, name)
-
         def __call__(self, *values: Any, **named: Any) -> Any:
             """Refused: a node is no function."""
             function = f", the function itself is {self._type.qualname}.function" if self._type.is_function else ""
@@ -288,6 +283,15 @@ class Node:
         return f"<{self._type.qualname}({values}){where}>"
 
     # --- for whoever runs, draws or stores nodes ---
+
+    def _without(self, name: str) -> str:
+        """Say that there is nothing of this name, neither a port nor anything else, and what there is."""
+        kind = self._type
+        ports = dict.fromkeys([*kind.vectors, *kind.inputs, *kind.outputs, *kind.events, *kind.slots, *kind.parameters])
+        known = [port for port in ports if port.isidentifier()]
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+        has = f"its ports and parameters are {', '.join(known)}" if known else "it has no ports"
+        return f'node "{_name(self)}" has no "{name}"; ' + (f'did you mean "{near[0]}"? ' if near else "") + has
 
     def _port(self, kind: Kind, name: str) -> Any:
         """Give the bound port, made at the first call and kept where attribute access finds it."""
@@ -505,23 +509,6 @@ class Node:
             candidates = [port for port in candidates if not is_taken(port)]
         target: Target[Any] = _only(self, candidates, "free input or slot")
         return target
-
-
-class NoSuchAttribute(AttributeError):
-    """A node has neither a port nor anything else of this name; the sentence is made when somebody reads it."""
-
-    def __init__(self, node: Node, name: str) -> None:
-        super().__init__(name)
-        self._node = node
-
-    def __str__(self) -> str:
-        node, name = self._node, str(self.args[0])
-        kind = node._type
-        ports = dict.fromkeys([*kind.vectors, *kind.inputs, *kind.outputs, *kind.events, *kind.slots, *kind.parameters])
-        known = [port for port in ports if port.isidentifier()]
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
-        has = f"its ports and parameters are {', '.join(known)}" if known else "it has no ports"
-        return f'node "{_name(node)}" has no "{name}"; ' + (f'did you mean "{near[0]}"? ' if near else "") + has
 
 
 def _only(node: Node, candidates: list[Any], what: str) -> Any:

@@ -98,17 +98,25 @@ class Port:
 
     if not TYPE_CHECKING:  # type checkers say of themselves what there is not
 
-        def __getattr__(self, name: str) -> Any:
-            if name.startswith("_"):
-                raise AttributeError(name)  # asked for by many that can do without
-            if name == "value":
-                what, remedy = (
-                    "a port holds no value",
-                    "look at what passes with run.tap(port), or connect it to a node",
-                )
-            else:
-                what, remedy = "it is an end of edges", "ask for its name, type, node or path"
-            raise AttributeError(f'{self.kind} "{self.path}" has no "{name}": {what}; {remedy}')
+        @property
+        def value(self) -> Any:
+            """Refused: what passes is not kept."""
+            raise AttributeError(self._without("value"))
+
+        @property
+        def connect(self) -> Any:
+            """Refused: graphs connect."""
+            raise AttributeError(self._without("connect"))
+
+    def _without(self, name: str) -> str:
+        """Say that there is nothing of this name, and what to do."""
+        if name == "value":
+            what, remedy = "a port holds no value", "look at what passes with run.tap(port), or connect it to a node"
+        elif name == "connect":
+            what, remedy = "it is an end of edges", "write graph.connect(source, target)"
+        else:
+            what, remedy = "it is an end of edges", "ask for its name, type, node or path"
+        return f'{self.kind} "{self.path}" has no "{name}": {what}; {remedy}'
 
     def _not_running(self, call: str) -> NotRunning:
         return NotRunning(

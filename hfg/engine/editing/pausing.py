@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from hfg.engine.model.worker import CALLS_BLOCKED, Worker
+from hfg.engine.model.worker import NO_CALLS, Worker
 from hfg.engine.rules import iterating, quiet
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
@@ -422,4 +422,4 @@ def _next_kind(worker: Worker) -> str:
     calls = worker.calls
     if worker.placed and not (calls and worker.ahead):
         return "firing"
-    return "call" if calls and not worker.blocked & CALLS_BLOCKED else ""
+    return "call" if calls and worker.blocked < NO_CALLS else ""

@@ -31,7 +31,7 @@ from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.telling import tell_rest
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
 from hfg.engine.model.core import PENDING
-from hfg.engine.model.worker import CALLS_BLOCKED, Worker
+from hfg.engine.model.worker import NO_CALLS, Worker
 from hfg.engine.rules import agenda, calls, errors, firing
 from hfg.engine.rules.releasing import release
 from hfg.errors import EngineInternalError
@@ -48,7 +48,7 @@ _LONGEST_PUT_OFF = 255  # waves for which a region that cannot be armed does not
 
 def _rests(worker: Worker, called: bool) -> bool:
     """Whether nothing is under way at a member, nothing lies before it, and nothing forbids its next firing or call."""
-    blocked = worker.blocked & CALLS_BLOCKED if called else worker.blocked
+    blocked = worker.blocked >= NO_CALLS if called else worker.blocked
     if blocked or worker.busy or worker.placed or worker.queued or worker.calls or worker.on_idle is not None:
         return False
     if worker.outputs.missing or worker.pending_end:

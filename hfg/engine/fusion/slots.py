@@ -14,7 +14,7 @@ from typing import Any
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
-from hfg.engine.model.worker import CALLS_BLOCKED, RunningEvent, Worker
+from hfg.engine.model.worker import NO_CALLS, RunningEvent, Worker
 from hfg.engine.rules import errors, firing
 from hfg.engine.rules.agenda import add_call, freed, idle_again, note_full
 from hfg.engine.rules.calls import await_call
@@ -58,8 +58,8 @@ def _call_step(worker: Worker, edge: SyncEdge | EventEdge) -> Step:
 def _signal_step(group: Group, core: Core) -> Step:
     """Signals into slots whose handlers take the value: one step for all nodes of a group that live by such slots.
 
-    Being the same for all, it goes on with the next of them in the run queue by itself: a *row of calls*, which ends
-    where the pump would look round.
+    Being the same for all, it goes on with the next of them in the run queue by itself: a *row of calls*, in which
+    others have their turns too, and which ends where the pump would look round.
     """
     if group.signal_step is not None:
         return group.signal_step
@@ -70,11 +70,13 @@ def _signal_step(group: Group, core: Core) -> Step:
         given = more = group.turns - 1 if in_a_row else 0
         try:
             while True:
-                calls: Any = worker.calls
-                if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
+                edge: Any = worker.caller
+                calls: Any = worker.calls if edge is None else edge.queue
+                if not calls or worker.blocked >= NO_CALLS or worker.busy:
                     return general(worker)
                 # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
-                edge = calls.popleft()
+                if edge is None:
+                    edge = calls.popleft()
                 handler = edge.handler  # what is called as a field is looked up the slow way
                 worker.call_number += 1
                 value, modifier, worker.stamp, _ = edge.queue.popleft()
@@ -98,9 +100,13 @@ def _signal_step(group: Group, core: Core) -> Step:
                     return None
                 more -= 1
                 worker = take()
-                other = worker.step
-                if other is not step:
-                    return other(worker)
+                while worker.step is not step:  # a source, say: the row goes on behind it
+                    other = worker.step
+                    other(worker)
+                    if not more or flags or ready or not queued:
+                        return None
+                    more -= 1
+                    worker = take()
         finally:
             if more < given:
                 group.had_turns(given - more)
@@ -120,7 +126,7 @@ def _token_step(worker: Worker, edge: SyncEdge) -> Step:
     while_active = edge.while_active
 
     def step(worker: Worker) -> None:
-        if not calls or worker.blocked & CALLS_BLOCKED or worker.busy:
+        if not calls or worker.blocked >= NO_CALLS or worker.busy:
             return general(worker)
         # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
         calls.popleft()
@@ -206,7 +212,6 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
     watched = port._observers is not None
     target: Worker = edge.target
     queue = edge.queue
-    calls: Any = target.calls
     carries = edge.active
 
     # (parameters by keyword alone would cost 20 ns; who gives them by position is refused by the type checker)
@@ -230,12 +235,13 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
             _give_activity(worker, target)
         else:
             queue.append((value, 0, stamp, number))
-        if target.queued or target.busy or target.blocked & CALLS_BLOCKED:
+        if target.queued or target.busy or target.blocked >= NO_CALLS:
             edge.deepest = max(edge.deepest, len(queue))
             note_full(edge)
             add_call(target, edge)
         else:
-            calls.append(edge)
+            if edge.called_beside:
+                target.expect_call(edge)
             target.queued = True
             push = target.push
             push(target)

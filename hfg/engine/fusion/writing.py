@@ -118,17 +118,23 @@ def _take_queued(edge: BufferEdge | EventEdge) -> Token[Any]:
 def _values(region: Region, k: int, result: Any) -> list[Any] | None:
     """What member k has sent, or gives back, by output; None if that is not plain: a modifier or stamp, or twice."""
     worker = region.order[k]
-    written, count = worker.written, len(region.order[k].out_edges)
+    written = worker.written
     if written is None:
-        values = [None] * count if result is None else worker.node._split(result)
-        return None if any(type(value) in _EXCEPTIONAL for value in values) else list(values)
-    entries = [entry for entry in written if entry is not None]
-    if result is not None or any(modifier is not None or stamp is not None for _, modifier, stamp in entries):
+        values = [None] * len(worker.out_edges) if result is None else list(worker.node._split(result))
+        return None if any(type(value) in _EXCEPTIONAL for value in values) else values
+    if result is not None:
         return None
-    if any(type(value) in _EXCEPTIONAL for value, _, _ in entries):
-        return None
+    values = []
+    for entry in written:  # (a loop, for generators would cost as much as the node)
+        if entry is None:
+            values.append(None)
+            continue
+        value, modifier, stamp = entry
+        if modifier is not None or stamp is not None or type(value) in _EXCEPTIONAL:
+            return None
+        values.append(value)
     worker.take_written()
-    return [None if entry is None else entry[0] for entry in written]
+    return values
 
 
 def _put_heard(listeners: Any, value: Any, stamp: float) -> None:
@@ -529,11 +535,30 @@ class Writer:
             stop.append("outputs.missing")
         say(f"if {' or '.join(stop)}: break")
 
+    def _may_go_on_at_once(self) -> bool:
+        """Whether what follows a wave is plain: of a source on the loop whose wave leaves nothing outside."""
+        apart = self.head.group.threaded or self.head.paced
+        return self.is_source and not (apart or self.is_async or self.measured or self.has_border)
+
+    def _go_on_at_once(self) -> None:
+        """Where nothing unusual has come the source has its next turn: what `over` would find, without a call."""
+        say = self.say
+        say("if not (flags or worker.blocked or worker.placed or region.doomed or core.followers):")
+        self.indent += 1
+        say("region.running = False")
+        say("region.waves += done")
+        say("worker.placed = worker.queued = True")
+        say("push = worker.push")
+        say("return push(worker)")
+        self.indent -= 1
+
     def _exit(self) -> None:
         say = self.say
         self.indent = 2
         say("except BaseException as error:")
         say("    return region.caught(error, locals())")
+        if self._may_go_on_at_once():
+            self._go_on_at_once()
         say("return region.over(done)")
         self.indent = 1
         say("return (step, waves)" if self.is_async else "return (wave, wave)")

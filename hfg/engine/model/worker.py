@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
+from hfg.engine.model.calls import Calls, CallsOfOne
 from hfg.engine.model.flights import Attempts, Flights
 from hfg.engine.model.vertex import RunningEvent, Vertex
 from hfg.errors import EngineInternalError
@@ -28,12 +29,12 @@ if TYPE_CHECKING:
 __all__ = [
     "AMID_NOTHING",
     "BACKOFF",
-    "CALLS_BLOCKED",
     "CROWDED",
     "DISABLED",
     "ENDED",
     "FULL",
     "FUTILE",
+    "NO_CALLS",
     "RATE",
     "RECORDED",
     "REMOVED",
@@ -52,19 +53,19 @@ __all__ = [
 DISABLED: Final = 1  # F10
 ENDED: Final = 2  # F12; from the moment its end() is called
 UNWIRED: Final = 4  # a mandatory input without a live edge, or neither source nor live input (F1)
-FULL: Final = 8  # a `wait` edge of its events is full (F8)
-RATE: Final = 16  # F11
-RESTING: Final = 32  # a source whose gate is closed (A11)
-BACKOFF: Final = 64  # between teardown and setup after an error (X1)
-UNREADY: Final = 128  # its ready() said no; asked again after each firing, call or wake (F1)
-STARTING: Final = 256  # sources, until `start` has been triggered (A10)
-FUTILE: Final = 512  # a source that works for ended nodes alone and rests, for it holds nobody up (R5)
-TORN_DOWN: Final = 1024  # the run is ending (R5, X3)
-REMOVED: Final = 2048  # an edit took it out of the graph (R4)
-CROWDED: Final = 4096  # as many firings are under way as may be, or somebody waits until none is (F14)
+RATE: Final = 8  # F11
+RESTING: Final = 16  # a source whose gate is closed (A11)
+UNREADY: Final = 32  # its ready() said no; asked again after each firing, call or wake (F1)
+STARTING: Final = 64  # sources, until `start` has been triggered (A10)
+FUTILE: Final = 128  # a source that works for ended nodes alone and rests, for it holds nobody up (R5)
+REMOVED: Final = 256  # an edit took it out of the graph (R4)
+CROWDED: Final = 512  # as many firings are under way as may be, or somebody waits until none is (F14)
+# The highest ones keep its slots from being called, too: whether one is set is a comparison.
+FULL: Final = 1024  # a `wait` edge of its events is full (F8)
+BACKOFF: Final = 2048  # between teardown and setup after an error (X1)
+TORN_DOWN: Final = 4096  # the run is ending (R5, X3)
 RECORDED: Final = 8192  # what it sends is recorded without loss, and the disk is behind
-
-CALLS_BLOCKED: Final = FULL | BACKOFF | TORN_DOWN | RECORDED
+NO_CALLS: Final = FULL  # the least of them
 
 Entry: TypeAlias = "tuple[Any, int | None, float | None]"  # what is written to an output: value, modifier, stamp
 
@@ -81,7 +82,8 @@ class Worker(Vertex):
       outputs: the output barrier; `missing` counts this node's tokens that are not processed.
       blocked: bits from above.
       placed, ahead: a firing is enabled and has its place in the agenda, behind `ahead` slot calls (F9).
-      calls: edges whose oldest token waits for a slot call, in order of arrival; None until there is one.
+      calls: edges whose oldest token waits for a slot call, in order of arrival; None until there is an edge.
+      caller: the one event edge that all its calls are of, if it is one.
       queued: it stands in its group's run queue.
       follows: what a sequential edge has enabled goes next when the call is over for which it stands there (R2).
       busy: "" or what is under way: "firing", "call", "asking", "ending", "setup"; "edit": an edit holds it;
@@ -108,6 +110,7 @@ class Worker(Vertex):
         "busy",
         "call_edge",
         "call_number",
+        "caller",
         "calls",
         "calls_failed",
         "carrier",
@@ -186,7 +189,8 @@ class Worker(Vertex):
     def _has_no_place(self) -> None:
         self.placed = False
         self.ahead = 0
-        self.calls: deque[Any] | None = None
+        self.calls: Calls | None = None
+        self.caller: EventEdge | None = None
         self.queued = False
         self.follows = False
         self.full_edges = 0
@@ -250,8 +254,24 @@ class Worker(Vertex):
     def lead_in(self, edge: Edge, kind: str, name: str) -> None:
         """An edge leads into one of its ports from now on, in the order of those."""
         super().lead_in(edge, kind, name)
-        if self.calls is None and any(self.called_by()):
-            self.calls = deque()
+        self._order_calls()
+
+    def lose_incoming(self, edge: Edge) -> None:
+        """An edge leads into it no more; its tokens have gone before."""
+        super().lose_incoming(edge)
+        self._order_calls()
+
+    def _order_calls(self) -> None:
+        """Where it is one event edge that calls, its queue is their order; else they have a queue of their own."""
+        edges, waiting = tuple(self.called_by()), tuple(self.calls or ())
+        if not edges and self.calls is None:
+            return
+        alone = len(edges) == 1 and type(edges[0]) is EventEdge and all(edge is edges[0] for edge in waiting)
+        self.caller = edges[0] if alone else None
+        self.calls = CallsOfOne(edges[0]) if alone else deque(waiting)
+        for edge in edges:
+            if type(edge) is EventEdge:
+                edge.call_alone(alone)
 
     def lead_out_of_event(self, edge: Edge, name: str, port: EventPort[Any] | None) -> None:
         """An edge leads out of one of its events from now on."""
@@ -944,7 +964,7 @@ class Worker(Vertex):
     def _relations_of_its_place(self) -> Iterator[tuple[bool, str]]:
         """What holds of its place in the agenda and in the run queue (F1, F9)."""
         may_fire = not (self.blocked or self.inputs.missing or self.outputs.missing)
-        may_call = bool(self.calls) and not self.blocked & CALLS_BLOCKED
+        may_call = bool(self.calls) and self.blocked < NO_CALLS
         yield may_fire or not self.placed, "its firing has a place, but F1 does not hold"
         if not self.busy and self.core.started and not self.is_boundary_output:
             yield self.placed or not may_fire, "F1 holds, but its firing has no place"

@@ -6,7 +6,7 @@ Plain functions over the run's state; they queue workers and never run a node's 
 from __future__ import annotations
 
 from hfg.engine.model.core import Core
-from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, FULL, SAME_MOMENT_S, UNREADY, Worker
+from hfg.engine.model.worker import DISABLED, FULL, NO_CALLS, SAME_MOMENT_S, UNREADY, Worker
 from hfg.ports.edges import Edge, EventEdge
 
 __all__ = [
@@ -82,7 +82,7 @@ def unblock(worker: Worker, reason: int) -> None:
 
 def _go_on(worker: Worker) -> None:
     consider(worker)
-    if worker.calls and not worker.blocked & CALLS_BLOCKED:
+    if worker.calls and worker.blocked < NO_CALLS:
         worker.enqueue()
 
 
@@ -106,7 +106,7 @@ def arrived(edge: Edge) -> None:
 def add_call(target: Worker, edge: Edge) -> None:
     """The newest token on the edge waits for a slot call (F9)."""
     target.expect_call(edge)
-    if target.blocked & CALLS_BLOCKED:
+    if target.blocked >= NO_CALLS:
         return
     if edge.follows:
         target.follow()
@@ -137,7 +137,7 @@ def idle_again(worker: Worker, *, asked: bool = False) -> None:
             return
     if not asked and worker.blocked & UNREADY:
         worker.allow(UNREADY)
-    calls = bool(worker.calls) and not worker.blocked & CALLS_BLOCKED
+    calls = bool(worker.calls) and worker.blocked < NO_CALLS
     if worker.follows:
         worker.follow_no_more()
         if worker.placed or calls:  # what is left of the wave that has enabled it comes before all else (R2)

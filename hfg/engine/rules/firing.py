@@ -11,7 +11,7 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
-from hfg.engine.model.worker import CALLS_BLOCKED, DISABLED, SAME_MOMENT_S, UNREADY, Worker
+from hfg.engine.model.worker import DISABLED, NO_CALLS, SAME_MOMENT_S, UNREADY, Worker
 from hfg.engine.rules import sharing
 from hfg.engine.rules.agenda import consider, idle_again
 from hfg.engine.rules.calls import call, refuse_coroutine, set_parameter
@@ -40,6 +40,7 @@ __all__ = [
     "values_of",
     "when_done",
     "write",
+    "writer",
 ]
 
 
@@ -58,7 +59,7 @@ def step(worker: Worker) -> None:
             fire(worker)
         else:
             _ask_ready(worker)
-    elif calls and not worker.blocked & CALLS_BLOCKED:
+    elif calls and worker.blocked < NO_CALLS:
         call(worker)
     else:
         worker.follow_no_more()  # what it stood there for was taken from it meanwhile (F10, R4)
@@ -432,6 +433,18 @@ def _add_parameters(worker: Worker, written: list[Any] | None, parameters: dict[
         value = parameters[worker.out_names[position]]
         written[position] = (own_copy(value), None, None)  # the node may change its own (T1)
     return written
+
+
+def writer(worker: Worker, position: int) -> Callable[[Any, int | None, float | None], None]:
+    """What the `send` of an output does: `write`, with the plain case at hand."""
+
+    def emit(value: Any, activity: int | None, stamp: float | None) -> None:
+        if worker.busy == "firing" and worker.written is None and value is not None and type(value) is not Token:
+            worker.write(position, (value, activity, stamp))
+        else:
+            write(worker, position, value, activity, stamp)
+
+    return emit
 
 
 def write(worker: Worker, position: int, value: object, activity: int | None, stamp: float | None) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import (
     BACKOFF,
-    CALLS_BLOCKED,
     DISABLED,
     ENDED,
     FULL,
@@ -105,7 +104,7 @@ def _held_by_queue_alone(worker: Worker) -> bool:
         return False
     if worker.waiting_room or (worker.tasks is not None and worker.tasks.waiting_room):
         return True
-    if worker.calls and worker.blocked & CALLS_BLOCKED == FULL:
+    if worker.calls and FULL <= worker.blocked < BACKOFF:
         return True
     return worker.blocked == FULL and not worker.inputs.missing and not worker.outputs.missing
 

@@ -36,8 +36,8 @@ def bind(worker: Worker) -> None:
         node._start_task = partial(worker.core.host.start_task, worker)
     ports = node.ports
     for position, name in enumerate(node_type.outputs):
-        write = firing.write if worker.flights is None else concurrency.write
-        emit = partial(write, worker, position)
+        beyond_one = worker.flights is not None
+        emit = partial(concurrency.write, worker, position) if beyond_one else firing.writer(worker, position)
         ports.outputs[name]._emit = emit if worker.tasks is None else beside.refusing(worker, position, emit)
     for name in node_type.events:
         bind_event(worker, name)
