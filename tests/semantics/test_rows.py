@@ -85,6 +85,26 @@ class Begin(hfg.Node):
             self.signal.trigger(value)
 
 
+class Pulses(hfg.Node):
+    """A source whose turns are amid those of the slots: it sends numbers by its output, by its event, or by both."""
+
+    out, signal = hfg.Output(int), hfg.Event(int)
+    count = hfg.Parameter(5)
+    ways = hfg.Parameter(1)
+    seen: Seen
+
+    def process(self) -> None:
+        """Count down."""
+        if not self.count:
+            raise hfg.EndOfStream
+        self.count -= 1
+        self.seen.append((self.place.name, "process", self.count))
+        if self.ways & 1:
+            self.signal.trigger(self.count % 5)
+        if self.ways & 2 and self.count % 4:
+            self.out.send(self.count % 6)
+
+
 def begun_at(graph: hfg.Graph, *slots: Any) -> None:
     """Let a graph of slots have something to do."""
     begin = graph.add(Begin())
@@ -111,6 +131,11 @@ def drawn(seed: int) -> tuple[hfg.Graph, Seen]:
                 slot = random.choice([target.take, target.later if isinstance(target, Waiting) else target.also])
                 graph.connect(event, slot, active=random.random() < 0.3, capacity=random.choice(CAPACITIES))
     begun_at(graph, *(node.take for node in random.sample(nodes, random.randint(1, 2))))
+    for _ in range(random.choice((0, 0, 1, 2))):
+        source: Any = graph.add(Pulses(count=random.randint(1, 20), ways=random.randint(1, 3)))
+        source.seen = seen
+        for port in (source.signal, source.out):
+            graph.connect(port, random.choice(nodes).take, active=random.random() < 0.2)
     return graph, seen
 
 
@@ -130,9 +155,12 @@ def rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.mark.rule("R2", "F8", "F9")
 @pytest.mark.parametrize("block", range(8))
-def test_rows_of_calls_do_what_single_turns_do_in_the_same_order(block: int, rows: list[int]) -> None:
+def test_rows_of_calls_do_what_single_turns_do_in_the_same_order(
+    block: int, rows: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also where full queues hold nodes back: who goes on takes its place when it may."""
     for seed in range(25 * block, 25 * block + 25):
+        monkeypatch.setattr(settings, "FUSE_AFTER", seed % 3)
         done = []
         for fast in (True, False):
             graph, seen = drawn(seed)
@@ -231,3 +259,33 @@ def test_the_loop_has_its_turn_amid_rows_as_often_as_amid_single_turns() -> None
         return len(found)
 
     assert calls(fast=True) == calls(fast=False)
+
+
+@pytest.mark.rule("R2")
+def test_rows_are_not_nested_however_long_they_are() -> None:
+    """Nodes whose slots are fed by outputs, too, have steps of their own, which know of no rows."""
+
+    class Counted(hfg.Node):
+        signal = hfg.Event(int)
+
+        @hfg.slot
+        def take(self, value: int) -> None:
+            if value:
+                self.signal.trigger(value - 1)
+            else:
+                seen.append(value)
+
+        @hfg.slot
+        def also(self, value: int) -> None:
+            self.signal.trigger(5_000 + value)
+
+    graph, seen = hfg.Graph(), list[int]()
+    nodes = [graph.add(Counted()) for _ in range(3)]
+    source = graph.add(Pulses(count=2, ways=2))
+    source.seen = Seen()
+    for node, after in zip(nodes, (*nodes[1:], nodes[0]), strict=True):
+        graph.connect(node.signal, after.take)
+        if node is not nodes[2]:
+            graph.connect(source.out, node.also)
+    hfg.run(graph, clock="virtual")
+    assert seen == [0, 0]

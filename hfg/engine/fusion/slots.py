@@ -66,8 +66,11 @@ def _signal_step(group: Group, core: Core) -> Step:
     general, flags, queued, take = firing.step, core.flags, group.policy, group.take
     ready, in_a_row = core.ready_groups, group.in_a_row
 
+    amid = False  # the turn of another in a row; if it comes back here, that is one call: rows in rows have no end
+
     def step(worker: Worker) -> None:
-        given = more = group.turns - 1 if in_a_row else 0
+        nonlocal amid
+        given = more = group.turns - 1 if in_a_row and not amid else 0
         try:
             while True:
                 edge: Any = worker.caller
@@ -101,14 +104,16 @@ def _signal_step(group: Group, core: Core) -> Step:
                 more -= 1
                 worker = take()
                 while worker.step is not step:  # a source, say: the row goes on behind it
-                    other = worker.step
+                    amid, other = True, worker.step
                     other(worker)
+                    amid = False
                     if not more or flags or ready or not queued:
                         return None
                     more -= 1
                     worker = take()
         finally:
-            if more < given:
+            if given:
+                amid = False
                 group.had_turns(given - more)
 
     group.signal_step = step
