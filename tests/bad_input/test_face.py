@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -110,6 +111,20 @@ def test_an_attribute_that_fails_says_so_itself() -> None:
     with pytest.raises(AttributeError) as refused:
         _ = Broken().length
     assert in_words(refused.value) == 'AttributeError: node "broken" has no "missing"; it has no ports'
+
+
+def test_code_that_asks_for_a_port_that_there_is_not_is_told_the_path_and_those_there_are() -> None:
+    class Lost(hfg.Node):
+        out = hfg.Output(int)
+
+        def process(self) -> None:
+            self.outt.send(3)  # type: ignore[attr-defined]
+
+    graph = hfg.Graph()
+    graph.add(Lost()).out >> graph.add(forward())
+    said = 'node "lost" failed in firing 1: AttributeError: node "lost" has no "outt"; did you mean "out"?'
+    with pytest.raises(NodeError, match=re.escape(said)):
+        hfg.run(graph)
 
 
 def test_a_node_is_no_function() -> None:
