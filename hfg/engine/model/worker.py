@@ -254,12 +254,14 @@ class Worker(Vertex):
     def lead_in(self, edge: Edge, kind: str, name: str) -> None:
         """An edge leads into one of its ports from now on, in the order of those."""
         super().lead_in(edge, kind, name)
-        self._order_calls()
+        if kind != "input":
+            self._order_calls()
 
     def lose_incoming(self, edge: Edge) -> None:
         """An edge leads into it no more; its tokens have gone before."""
         super().lose_incoming(edge)
-        self._order_calls()
+        if edge.target_kind != "input":
+            self._order_calls()
 
     def _order_calls(self) -> None:
         """Where it is one event edge that calls, its queue is their order; else they have a queue of their own."""
