@@ -194,10 +194,12 @@ def _of_what_is_not_there(error: BaseException) -> str:
 
     (A `__getattr__` of theirs could say it at once, but would make each attribute of each node five times as slow.)
     """
-    if not isinstance(error, AttributeError) or not error.name:
+    if not isinstance(error, AttributeError):
         return ""
     without = getattr(type(error.obj), "_without", None)
-    return "" if without is None else str(without(error.obj, error.name))
+    if without is None or str(error) != f"'{type(error.obj).__name__}' object has no attribute '{error.name}'":
+        return ""  # another's, or in somebody's own words
+    return str(without(error.obj, error.name))
 
 
 class Failure(NamedTuple):

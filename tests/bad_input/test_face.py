@@ -113,6 +113,23 @@ def test_an_attribute_that_fails_says_so_itself() -> None:
     assert in_words(refused.value) == 'AttributeError: node "broken" has no "missing"; it has no ports'
 
 
+def test_what_an_attribute_says_of_itself_is_what_is_said() -> None:
+    class Sad(hfg.Node):
+        out = hfg.Output(int)
+
+        @property
+        def speed(self) -> int:
+            raise AttributeError("no calibration file: run calibrate first")
+
+        def process(self) -> int:
+            return self.speed
+
+    graph = hfg.Graph()
+    graph.add(Sad()) >> graph.add(forward())
+    with pytest.raises(NodeError, match="firing 1: AttributeError: no calibration file: run calibrate first$"):
+        hfg.run(graph)
+
+
 def test_code_that_asks_for_a_port_that_there_is_not_is_told_the_path_and_those_there_are() -> None:
     class Lost(hfg.Node):
         out = hfg.Output(int)

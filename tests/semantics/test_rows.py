@@ -7,14 +7,17 @@ Rules F8, F9, R2, R3, R6.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from random import Random
 from typing import Any
 
 import pytest
 
 import hfg
+from hfg import commands
 from hfg.engine.model.groups import Group
 from hfg.engine.runtime import settings
+from tests.semantics.nodes import forward
 
 
 @pytest.fixture(autouse=True)
@@ -289,3 +292,82 @@ def test_rows_are_not_nested_however_long_they_are() -> None:
             graph.connect(source.out, node.also)
     hfg.run(graph, clock="virtual")
     assert seen == [0, 0]
+
+
+class Two(hfg.Node):
+    """Two slots; what is done in a call of one of them is another's to say."""
+
+    signal = hfg.Event(int)
+    seen: Seen
+    amid: Any = None
+
+    @hfg.slot
+    def take(self, value: int) -> None:
+        self.seen.append((self.place.name, "take", value))
+        if self.amid is not None and value == 6:
+            self.amid()
+
+    @hfg.slot
+    def also(self, value: int) -> None:
+        self.seen.append((self.place.name, "also", value))
+
+
+@pytest.mark.rule("F9", "P10")
+def test_a_call_from_outside_that_is_the_first_of_its_kind_and_comes_amid_a_call_is_made_behind_it() -> None:
+    """As of a task that begins at once: it makes an edge, and so the order of calls another one (F9)."""
+    graph, two = hfg.Graph(), Two()
+    graph.add(two)
+    two.seen = Seen()
+    begun_at(graph, two.take)
+
+    async def main() -> None:
+        async with hfg.running(graph) as run:
+
+            def amid() -> None:
+                with contextlib.suppress(StopIteration):
+                    run.trigger(two.also, 5).send(None)
+
+            two.amid = amid
+            await run.wait_finished()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        runner.run(main())
+    assert [slot for _, slot, _ in two.seen] == ["take", "take", "take", "take", "also"]
+
+
+@pytest.mark.rule("R2", "R4")
+def test_who_stood_in_the_queue_for_a_signal_that_an_edit_took_goes_first_for_one_token_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(settings, "CHECK_ALL", True)
+
+    class First(hfg.Node):
+        early, late = hfg.Event(int), hfg.Event(int)
+
+        @hfg.slot
+        def begin(self) -> None:
+            self.early.trigger(1)
+            self.late.trigger(2)
+            running[0].pause()
+
+    running: list[Any] = []
+    graph, two = hfg.Graph(), Two()
+    two.seen = Seen()
+    first, relay = graph.add(First()), graph.add(forward())
+    graph.add(two)
+    graph.start.activates(first.begin)
+    graph.connect(first.early, relay.value)
+    graph.connect(first.late, two.take)
+    graph.connect(relay.out, two.also)
+
+    async def main() -> None:
+        async with hfg.running(graph) as run:
+            running.append(run)
+            await run.wait_paused()
+            await run.edit(commands.Disconnect("first.late", "two.take"))
+            run.resume()
+            await run.wait_finished()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        runner.run(main())
+    assert two.seen == [("two", "also", 1)]

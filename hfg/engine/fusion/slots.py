@@ -40,6 +40,8 @@ def calls_step(worker: Worker) -> Step:
     def step(worker: Worker) -> None:
         if calls:
             steps[calls[0]](worker)
+            if worker.follows and not (worker.busy or worker.queued):
+                worker.follow_no_more()  # it stood in the queue for this call alone (R2)
         else:
             general(worker)
 
@@ -155,7 +157,7 @@ def _token_step(worker: Worker, edge: SyncEdge) -> Step:
         if held:
             release(held)
         worker.queued = False
-        if calls or worker.on_idle is not None:
+        if calls or worker.follows or worker.on_idle is not None:
             idle_again(worker)
         return None
 

@@ -269,8 +269,11 @@ class Worker(Vertex):
         if not edges and self.calls is None:
             return
         alone = len(edges) == 1 and type(edges[0]) is EventEdge and all(edge is edges[0] for edge in waiting)
-        self.caller = edges[0] if alone else None
-        self.calls = CallsOfOne(edges[0]) if alone else deque(waiting)
+        if alone or type(self.calls) is not deque:  # which others may hold
+            self.calls = CallsOfOne(edges[0]) if alone else deque(waiting)
+            self.caller = edges[0] if alone else None
+            if self.core.speaker is self and self.on_idle is None:
+                self.on_idle = []  # a fast call of it is under way, which is to look behind it what waits now
         for edge in edges:
             if type(edge) is EventEdge:
                 edge.call_alone(alone)
