@@ -45,10 +45,17 @@ __all__ = [
     "Traffic",
     "Transport",
     "Watch",
+    "size_of",
 ]
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
 """Bytes somewhere. What has been put or has arrived is not written to."""
+
+
+def size_of(buffer: Buffer) -> int:
+    """Give its bytes; a view may count its elements otherwise."""
+    return buffer.nbytes if isinstance(buffer, memoryview) else len(buffer)
+
 
 Message: TypeAlias = tuple[Buffer, Buffer]
 """One datagram as it arrives: header and payload. Both stay as they are for as long as somebody holds them."""

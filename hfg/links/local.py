@@ -25,7 +25,7 @@ from typing import Final, NoReturn
 
 from hfg.errors import TransportError
 from hfg.logs import log
-from hfg.transport import Buffer, Closing, Datagrams, Message, Publisher, Receive, Traffic
+from hfg.transport import Buffer, Closing, Datagrams, Message, Publisher, Receive, Traffic, size_of
 
 __all__ = ["LocalEndpoint", "LocalRoute"]
 
@@ -320,7 +320,7 @@ class LocalRoute:
         connected = self._socket or self._connected()
         if connected is None or len(header) > _LONGEST_HEADER:
             return False
-        size = payload.nbytes if isinstance(payload, memoryview) else len(payload)
+        size = size_of(payload)
         is_long = size > _CHUNK
         if not may_wait and (is_long or self._unsent):
             return not is_long
@@ -328,7 +328,10 @@ class LocalRoute:
         if is_long or self._unsent:
             self._stand_in_line(head if is_long else head + payload, payload if is_long else b"")
             return True
-        datagram = head + payload
+        return self._send(connected, head + payload)
+
+    def _send(self, connected: socket.socket, datagram: bytes) -> bool:
+        """Send it at once, as far as there is room; False if there is nobody any more."""
         try:
             sent = connected.send(datagram)
         except BlockingIOError:

@@ -390,7 +390,6 @@ class EventEdge(_QueueEdge):
       capacity_limit: the most it may grow to, or None.
       overflow: what happens to a token too many.
       full: a `wait` edge that holds `capacity` or more: its source starts nothing new (F8).
-      called_beside: other edges call slots of its target, too, so that their order is kept there (F9).
       grown: how often F8 made it longer.
       pipeline: feeds a token to the operators on the edge (P9), or None.
       complete: tells the operators that no more comes; None: there are none, or they know.
@@ -399,7 +398,6 @@ class EventEdge(_QueueEdge):
     """
 
     __slots__ = (
-        "called_beside",
         "capacity",
         "capacity_limit",
         "complete",
@@ -426,7 +424,6 @@ class EventEdge(_QueueEdge):
         self.capacity_limit = capacity_limit
         self.overflow: Overflow = overflow
         self.full = False
-        self.called_beside = True
         self.grown = 0
         self.end_sent = False
         self.pipeline: Callable[[Token[Any]], None] | None = None
@@ -459,10 +456,6 @@ class EventEdge(_QueueEdge):
             self.full = False
             return True
         return False
-
-    def call_alone(self, alone: bool) -> None:
-        """Whether its signals are all that calls slots of its target, so that its queue is their order (F9)."""
-        self.called_beside = not alone
 
     def grow(self) -> None:
         """F8: one more place."""

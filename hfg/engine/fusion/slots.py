@@ -67,52 +67,50 @@ def _signal_step(group: Group, core: Core) -> Step:
         return group.signal_step
     general, flags, queued, take = firing.step, core.flags, group.policy, group.take
     ready, in_a_row = core.ready_groups, group.in_a_row
-
     amid = False  # the turn of another in a row; if it comes back here, that is one call: rows in rows have no end
 
     def step(worker: Worker) -> None:
         nonlocal amid
         given = more = group.turns - 1 if in_a_row and not amid else 0
+        own: Step = step  # who is called here goes this way, whatever else it may do in turns of its own
         try:
             while True:
-                edge: Any = worker.caller
-                calls: Any = worker.calls if edge is None else edge.queue
-                if not calls or worker.blocked >= NO_CALLS or worker.busy:
-                    return general(worker)
-                # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
-                if edge is None:
-                    edge = calls.popleft()
-                handler = edge.handler  # what is called as a field is looked up the slow way
-                worker.call_number += 1
-                value, modifier, worker.stamp, _ = edge.queue.popleft()
-                if edge.full:
-                    freed(edge)
-                if modifier:
-                    _take_activity(worker, modifier > 0)
-                core.speaker = worker
-                try:
-                    result = handler(value)
-                except Exception as error:
-                    return _failed(worker, edge, error)
-                if result is not None and type(result) is CoroutineType:
-                    return _waits(worker, edge, result)
-                worker.stamp = None
-                worker.right = False
-                worker.queued = False
-                if calls or worker.on_idle is not None:
-                    idle_again(worker)
+                if own is not step:  # a source, say: the row goes on behind it
+                    amid = True
+                    own(worker)
+                    amid = False
+                else:
+                    edge: Any = worker.caller
+                    calls: Any = worker.calls if edge is None else edge.queue
+                    if not calls or worker.blocked >= NO_CALLS or worker.busy:
+                        return general(worker)
+                    # it stays `queued` while its handler runs, so that what that triggers cannot queue it a second time
+                    if edge is None:
+                        edge = calls.popleft()
+                    handler = edge.handler  # what is called as a field is looked up the slow way
+                    worker.call_number += 1
+                    value, modifier, worker.stamp, _ = edge.queue.popleft()
+                    if edge.full:
+                        freed(edge)
+                    if modifier:
+                        _take_activity(worker, modifier > 0)
+                    core.speaker = worker
+                    try:
+                        result = handler(value)
+                    except Exception as error:
+                        return _failed(worker, edge, error)
+                    if result is not None and type(result) is CoroutineType:
+                        return _waits(worker, edge, result)
+                    worker.stamp = None
+                    worker.right = False
+                    worker.queued = False
+                    if calls or worker.on_idle is not None:
+                        idle_again(worker)
                 if not more or flags or ready or not queued:
                     return None
                 more -= 1
                 worker = take()
-                while worker.step is not step:  # a source, say: the row goes on behind it
-                    amid, other = True, worker.step
-                    other(worker)
-                    amid = False
-                    if not more or flags or ready or not queued:
-                        return None
-                    more -= 1
-                    worker = take()
+                own = worker.step
         finally:
             if given:
                 amid = False
@@ -247,7 +245,7 @@ def _slot_emitter(event: RunningEvent, edge: EventEdge, interpreted: Callable[..
             note_full(edge)
             add_call(target, edge)
         else:
-            if edge.called_beside:
+            if target.caller is not edge:
                 target.expect_call(edge)
             target.queued = True
             push = target.push

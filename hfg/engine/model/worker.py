@@ -274,9 +274,6 @@ class Worker(Vertex):
             self.caller = edges[0] if alone else None
             if self.core.speaker is self and self.on_idle is None:
                 self.on_idle = []  # a fast call of it is under way, which is to look behind it what waits now
-        for edge in edges:
-            if type(edge) is EventEdge:
-                edge.call_alone(alone)
 
     def lead_out_of_event(self, edge: Edge, name: str, port: EventPort[Any] | None) -> None:
         """An edge leads out of one of its events from now on."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from hfg.errors import MessageTooLarge, TransportError
 from hfg.logs import log
-from hfg.transport import Buffer, Traffic
+from hfg.transport import Buffer, Traffic, size_of
 from hfg_transports.zenoh.config import LONG
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     import zenoh
 
-__all__ = ["Sender", "ZenohPublisher", "as_zenoh_takes_it", "quality", "size_of"]
+__all__ = ["Sender", "ZenohPublisher", "as_zenoh_takes_it", "quality"]
 
 MOST_BYTES: Final = 128 * 2**20
 """What waits in the sender's thread; one message may always."""
@@ -83,11 +83,6 @@ class Sender:
                 log().debug("a message could not be sent: %s", error)
             with self._changed:
                 self._waiting -= size
-
-
-def size_of(buffer: Buffer) -> int:
-    """Give the bytes of a buffer."""
-    return buffer.nbytes if isinstance(buffer, memoryview) else len(buffer)
 
 
 def as_zenoh_takes_it(buffer: Buffer) -> bytes | bytearray:
