@@ -142,6 +142,23 @@ def test_who_is_interrupted_while_parts_begin_to_meet_leaves_no_folder(
     assert not list(tmp_path.iterdir())
 
 
+def test_who_leaves_at_once_without_an_end_leaves_no_folder(tmp_path: Path) -> None:
+    """As by a second Ctrl-C, or when tearing down takes too long behind the first."""
+    leaving = """
+import asyncio
+from hfg.parts.processes.launching import ProcessLauncher
+async def main():
+    await ProcessLauncher().open()
+    raise KeyboardInterrupt
+asyncio.run(main())
+"""
+    left = subprocess.run(
+        [sys.executable, "-c", leaving], env=os.environ | {"TMPDIR": str(tmp_path)}, stderr=subprocess.PIPE, timeout=60
+    )
+    assert b"KeyboardInterrupt" in left.stderr
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.rule("L2", "L3")
 @pytest.mark.parametrize("how", ["exit", "SIGKILL"])
 def test_a_process_that_dies_is_begun_again_and_nothing_is_lost(tmp_path: Path, how: str) -> None:

@@ -10,7 +10,6 @@ import asyncio
 import contextlib
 import logging
 import os
-import shutil
 import signal
 import sys
 import tempfile
@@ -187,6 +186,7 @@ class ProcessLauncher:
         self._transport = transport("zenoh")
         self._said = settings
         self._folder: Path | None = None
+        self._keeper: tempfile.TemporaryDirectory[str] | None = None  # who leaves at once leaves no folder either
         self._session: Session | None = None
         self._opening: asyncio.Future[Session] | None = None
         self._spares = Spares()
@@ -194,7 +194,8 @@ class ProcessLauncher:
     async def open(self) -> Session:
         """See `Launcher`: nobody but this user reaches the socket at which the parts meet."""
         if self._said is None:
-            self._folder = Path(tempfile.mkdtemp(prefix="hfg-"))
+            self._keeper = tempfile.TemporaryDirectory(prefix="hfg-", ignore_cleanup_errors=True)
+            self._folder = Path(self._keeper.name)
         self._opening = asyncio.ensure_future(self._transport.open(**self._settings))
         self._session = await asyncio.shield(self._opening)
         return self._session
@@ -237,8 +238,8 @@ class ProcessLauncher:
         if self._opening is not None:  # who was interrupted amid it would leave what it makes in the folder
             with contextlib.suppress(TransportError):
                 await (await self._opening).close()
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        if self._keeper is not None:
+            self._keeper.cleanup()
 
 
 def beat_of(run: str, part: str, life: int) -> str:
