@@ -158,7 +158,9 @@ def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cell]:
             with contextlib.suppress(OSError):
                 os.kill(pid, signal.SIGKILL)
         for process in one.begun:
-            said, _ = process.communicate()
+            assert process.stdout is not None
+            with process:  # not `communicate`: it would leave out what `readline` has taken and not given
+                said = process.stdout.read()
             print(f"--- process {process.pid}: {process.args!r}\n{said}")
 
 
