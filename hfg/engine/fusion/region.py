@@ -30,7 +30,7 @@ from typing import Any
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.telling import tell_rest
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
-from hfg.engine.model.core import PENDING
+from hfg.engine.model.core import PENDING, Flags
 from hfg.engine.model.worker import NO_CALLS, Worker
 from hfg.engine.rules import agenda, calls, errors, firing
 from hfg.engine.rules.releasing import release
@@ -76,7 +76,7 @@ class Region:
         self.order = order = schedule.order
         self.head = head = order[0]
         self.core = head.core
-        self.flags: list[str] = self.core.flags
+        self.flags: Flags = self.core.flags
         self.entries: tuple[Any, ...] = head.live_inputs
         self.held_entries = tuple(edge for edge in self.entries if type(edge) is not EventEdge and edge.sequential)
         self.inner = [edge for out in schedule.outs for edge, _, to in out if to is not None]

@@ -24,6 +24,7 @@ from typing_extensions import override
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
+from hfg.engine.model.core import Flags
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import firing
 from hfg.engine.rules.agenda import consider, idle_again, let_follow
@@ -105,7 +106,7 @@ class ThreadRegion(Region):
     @override
     def _write(self, *, measured: bool) -> Wave:
         if self._thread is None:
-            self.flags = []
+            self.flags = Flags()
             self._thread = _InThread(self)
         return write_wave(self, _ThreadWriter(self, measured), to=self._thread)
 
@@ -313,6 +314,7 @@ class _ThreadWriter(Writer):
         self.say(f"def wave({', '.join(['worker', 'stamp', *arguments])}):")
         self.indent = 2
         self._nonlocal()
+        self._register()
         self.say("done = 0")
         if self.is_generator:
             self.say("generator = worker.generator")

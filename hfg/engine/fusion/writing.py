@@ -2,8 +2,9 @@
 
 What is known when the region is formed is text; what depends on the region's objects comes in as closures, so that
 regions of one shape share their compiled code. A member's values are locals, `v3_0` for the first output of member 3;
-`None` is NO_MESSAGE. Behind each call stands one guard: the type of the result is that of the last one, and no flag is
-up. Everything else is a side exit of the region.
+`None` is NO_MESSAGE. Behind each call stands one guard: the type of the result is that of the last one. Who raises a
+flag lets the wave forget these types, so the guard notices that, too (`Flags`). Everything else is a side exit of the
+region.
 
 Which call raised, and which one is under way, is told by the line; the lines are known to `linecache`, so a traceback
 and a debugger show which node it is. Stands on `schedule`.
@@ -194,6 +195,7 @@ class Writer:
         self.single = [self._is_single(worker) for worker in self.order]
         self.over_if_silent: set[int] = set()  # behind whose silence no code of the wave runs
         self.telling = Telling(self.outs, self.say, real=self.real)
+        self.forgets = bool(self._kinds()) and not self.is_async  # who gives way is not the one that was entered last
         self.lines: list[str] = []
         self.calls: dict[int, int] = {}
         self.indent = 0
@@ -255,6 +257,10 @@ class Writer:
         kinds = self._kinds()
         if kinds:
             say(" = ".join([*kinds, "None"]))  # the types of the last results
+        if self.forgets:
+            say("def forget():")
+            say(f"    nonlocal {', '.join(kinds)}")
+            say(f"    {' = '.join([*kinds, 'None'])}")
 
     def _bindings_of(self, k: int) -> None:
         """One member: its code, the defaults of absent inputs (P6), and where its outputs cross the border."""
@@ -309,6 +315,7 @@ class Writer:
         say(f"if {' or '.join(odd)} or not (region.armed or region.arm()): return region.decline(worker)")
         say("worker.queued = worker.placed = False")
         say("region.running = True")
+        self._register()
         say("core.speaker = worker")
         if self.head.paced:
             say("worker.note_start(worker.options.max_rate_hz)")
@@ -323,6 +330,12 @@ class Writer:
             say("generator = getattr(worker.generator, 'measured', worker.generator)  # a wave measures by itself")
         if self.is_source and self.loops:
             say("until = core.until")
+
+    def _register(self) -> None:
+        """From here on flags let this wave forget; one that was raised just before did not."""
+        if self.forgets:
+            self.say("flags.forget = forget")
+            self.say("if flags: forget()")
 
     def _nonlocal(self) -> None:
         if self._kinds():
@@ -464,7 +477,8 @@ class Writer:
 
     def _guard(self, k: int, within: bool) -> None:
         say, value = self.say, f"v{k}_0"
-        say(f"if type({value}) is not t{k} or flags{self._unusual()}:")
+        asked = "" if self.forgets else f" or flags{self._unusual()}"
+        say(f"if type({value}) is not t{k}{asked}:")
         self.indent += 1
         say(f"if flags or type({value}) in EXCEPTIONAL{self._unusual()}: return region.leave({k}, locals())")
         say(f"if {value} is not None: t{k} = type({value})")

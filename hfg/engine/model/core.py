@@ -13,6 +13,8 @@ from collections.abc import Callable, Coroutine, Sequence
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
 
+from typing_extensions import override
+
 from hfg.engine.model.flights import Flight
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
@@ -26,7 +28,7 @@ from hfg.trace import TraceEvent
 if TYPE_CHECKING:
     pass
 
-__all__ = ["PENDING", "Code", "Core", "Host", "Region", "Timer", "Upstairs"]
+__all__ = ["PENDING", "Code", "Core", "Flags", "Host", "Region", "Timer", "Upstairs"]
 
 
 class _Pending:
@@ -34,8 +36,41 @@ class _Pending:
         return "PENDING"
 
 
-FOR_A_WAVE: Final = frozenset({"disturbed", "dissolved", "speaks"})
+_FOR_A_WAVE: Final = frozenset({"disturbed", "dissolved", "speaks"})
 """Flags that end the wave under way and nothing else."""
+
+
+class Flags(list[str]):
+    """Why who runs is to look round; the pump asks between two steps, a wave behind each of its calls.
+
+    A wave does not even ask: behind a call it looks whether the type of the result is that of the last one, which it
+    must do anyway, and whoever raises a flag lets it forget those types.
+
+    Attributes:
+      forget: lets the wave that was entered last forget the types of its results; from any thread.
+    """
+
+    __slots__ = ("forget",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.forget: Callable[[], None] = _nothing
+
+    @override
+    def append(self, why: str) -> None:
+        """Raise a flag; from any thread. First the flag, so that who finds types forgotten finds why."""
+        super().append(why)
+        self.forget()
+
+    def lower_those_of_waves(self) -> bool:
+        """A wave has ended: whether a flag is up that is not for that wave alone."""
+        self[:] = [flag for flag in self if flag not in _FOR_A_WAVE]
+        return bool(self)
+
+
+def _nothing() -> None:
+    pass
+
 
 PENDING = _Pending()
 """What an executor returns for code that waits: its result comes later."""
@@ -309,7 +344,7 @@ class Core:
         self.slices = 0  # of the pump, for the watchdog
         self.until = 0.0  # on the run's clock: the pump's slice is over
         self.ready_groups: deque[Any] = deque()  # those beside the loop's own in which something can move
-        self.flags: list[str] = []  # why the pump is to look round; not empty: a wave ends behind the call under way
+        self.flags = Flags()  # of the pump and of the waves on the loop; not empty: these end behind the call under way
         self.futile: set[Worker] = set()  # sources that feed only ended nodes (R5)
         self.current: Worker | None = None
         self.speaker: Worker | None = None  # whose code a fast path runs: what it triggers may take one too
@@ -325,8 +360,7 @@ class Core:
 
     def ends_slice(self) -> bool:
         """Whether a flag is up that is not for the wave alone that has ended by it: the pump is to look round."""
-        self.flags[:] = [flag for flag in self.flags if flag not in FOR_A_WAVE]
-        return bool(self.flags)
+        return self.flags.lower_those_of_waves()
 
     def settle_counts(self) -> None:
         """Somebody is about to read how often nodes have fired: fused regions count by waves."""

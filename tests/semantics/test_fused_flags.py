@@ -1,0 +1,92 @@
+"""A wave ends behind the call in which somebody raises a flag, and what it has done stays done (R2, R4)."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import hfg
+from hfg.engine.fusion.region import Region
+from hfg.engine.model.worker import Worker
+from hfg.engine.runtime import settings
+from tests.semantics.nodes import Keep, drive, forward, numbers, scale
+
+
+@pytest.fixture
+def left(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
+    """Behind the calls of which members, and of which wave, waves have ended before their time."""
+    monkeypatch.setattr(settings, "FUSE_AFTER", 0)
+    found: list[tuple[str, int]] = []
+    materialise = Region.materialise
+
+    def noted(region: Region, k: int, locals_: dict[str, Any]) -> Any:
+        worker = materialise(region, k, locals_)
+        found.append((worker.path, worker.firings))
+        return worker
+
+    monkeypatch.setattr(Region, "materialise", noted)
+    return found
+
+
+def _amid_a_call(meddle: Callable[[Any], object], group: str | None) -> list[int]:
+    """Run a chain; what its member `mid` calls amid its eighth firing, with the region it is in."""
+    regions: list[Any] = []
+
+    @hfg.node
+    def mid(value: int) -> int:
+        if value == 7:
+            meddle(regions[0]())
+        return value
+
+    async def main() -> list[int]:
+        graph, keep = hfg.Graph(), Keep()
+        graph.group("side", threads=1)
+        nodes = [graph.add(node(), group=group) for node in (forward, mid, scale)]
+        source = graph.add(numbers(count=20), group=group)
+        graph.connect(source.out, nodes[0].value)
+        for before, behind in itertools.pairwise(nodes):
+            graph.connect(before.out, behind.value)
+        graph.connect(nodes[-1].out, graph.add(keep, group=group).value)
+        async with hfg.running(graph, clock="virtual") as run:
+            regions.append(lambda: run._engine.core.by_path["mid"].region)
+            await run.wait_finished()
+        return keep.values
+
+    return drive(main)
+
+
+@pytest.mark.rule("R2")
+@pytest.mark.parametrize("group", [None, "side"])
+def test_a_wave_ends_behind_the_call_amid_which_another_thread_raises_a_flag(
+    left: list[tuple[str, int]], group: str | None
+) -> None:
+    def meddle(region: Region) -> None:
+        other = threading.Thread(target=region.flags.append, args=["slice"])
+        other.start()
+        other.join()
+
+    assert _amid_a_call(meddle, group) == list(range(2, 42, 2))
+    assert left[0] == ("mid", 7)
+
+
+@pytest.mark.rule("R2")
+def test_a_wave_that_begins_with_a_flag_up_ends_behind_its_first_call(
+    left: list[tuple[str, int]],
+) -> None:
+    def meddle(region: Region) -> None:
+        head, flags, step = region.head, region.flags, region.head.step
+
+        def begin(worker: Worker) -> None:
+            flags.forget = lambda: None  # as if another wave had been entered last
+            flags.append("slice")
+            head.go_by(step)
+            step(worker)
+
+        head.go_by(begin)
+
+    assert _amid_a_call(meddle, None) == list(range(2, 42, 2))
+    assert left[0] == ("numbers", 8)
