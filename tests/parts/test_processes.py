@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from hfg.parts.processes import launching
+from hfg.parts.processes.meeting import MeetingPlace
 
 pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 
@@ -157,6 +158,27 @@ asyncio.run(main())
     )
     assert b"KeyboardInterrupt" in left.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_the_next_run_removes_what_runs_have_left_that_were_killed_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    left, lives, young, other = MeetingPlace(), MeetingPlace(), MeetingPlace(), tmp_path / "hfg-something"
+    other.mkdir()
+    for place in (left, young):
+        (place.folder / "meet").touch()
+        assert place._lock is not None
+        os.close(place._lock)  # as the end of a process does
+        place._lock = None
+    for folder in (left.folder, lives.folder, other):
+        os.utime(folder, (0, 0))
+    following = MeetingPlace()
+    found = {folder.name for folder in tmp_path.iterdir()}
+    assert found == {one.name for one in (lives.folder, young.folder, following.folder, other)}
+    for place in (left, lives, young, following):
+        place.leave()
+    assert list(tmp_path.iterdir()) == [other]
 
 
 @pytest.mark.rule("L2", "L3")

@@ -12,7 +12,6 @@ import logging
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -22,6 +21,7 @@ import msgspec
 from hfg.errors import TransportError, UsageError, in_words
 from hfg.graph import Graph
 from hfg.parts.model.messages import Open
+from hfg.parts.processes.meeting import MeetingPlace
 from hfg.parts.processes.spares import PROCESS, Spares, start
 from hfg.parts.processes.worker import Worker
 from hfg.parts.running.channels import name_of
@@ -185,17 +185,15 @@ class ProcessLauncher:
     def __init__(self, settings: dict[str, Any] | None = None) -> None:
         self._transport = transport("zenoh")
         self._said = settings
-        self._folder: Path | None = None
-        self._keeper: tempfile.TemporaryDirectory[str] | None = None  # who leaves at once leaves no folder either
+        self._place: MeetingPlace | None = None
         self._session: Session | None = None
         self._opening: asyncio.Future[Session] | None = None
         self._spares = Spares()
 
     async def open(self) -> Session:
-        """See `Launcher`: nobody but this user reaches the socket at which the parts meet."""
+        """See `Launcher`."""
         if self._said is None:
-            self._keeper = tempfile.TemporaryDirectory(prefix="hfg-", ignore_cleanup_errors=True)
-            self._folder = Path(self._keeper.name)
+            self._place = MeetingPlace()
         self._opening = asyncio.ensure_future(self._transport.open(**self._settings))
         self._session = await asyncio.shield(self._opening)
         return self._session
@@ -204,8 +202,8 @@ class ProcessLauncher:
     def _settings(self) -> dict[str, Any]:
         if self._said is not None:
             return self._said
-        assert self._folder is not None
-        return {"realm": self._folder.name, "meet": [f"unixsock-stream/{self._folder}/meet"]}
+        assert self._place is not None
+        return self._place.settings
 
     async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
         """See `Launcher`: what is here can be imported here."""
@@ -224,7 +222,7 @@ class ProcessLauncher:
             _targets(),
             sys.path,
             parent=os.getpid(),
-            folder="" if self._folder is None else str(self._folder),
+            folder="" if self._place is None else str(self._place.folder),
             beat=beat_of(run, part, lives[0]),
             level=logging.getLogger("hfg").getEffectiveLevel(),
         )
@@ -238,8 +236,8 @@ class ProcessLauncher:
         if self._opening is not None:  # who was interrupted amid it would leave what it makes in the folder
             with contextlib.suppress(TransportError):
                 await (await self._opening).close()
-        if self._keeper is not None:
-            self._keeper.cleanup()
+        if self._place is not None:
+            self._place.leave()
 
 
 def beat_of(run: str, part: str, life: int) -> str:
