@@ -11,6 +11,7 @@ from hfg.cli.options import Clock
 from hfg.engine import PunctualLoop, Report, Run, VirtualTimeLoop, run_async
 from hfg.errors import HfgError, TargetError, UsageError
 from hfg.graph import Graph
+from hfg.parts.processes.meeting import MeetingPlace
 
 __all__ = ["execute"]
 
@@ -37,6 +38,7 @@ def execute(
       TargetError: the options do not fit.
     """
     begun_run: Run | None = None
+    interrupt.before_leaving.append(MeetingPlace.leave_all)
 
     async def main() -> Report:
         task = asyncio.current_task()

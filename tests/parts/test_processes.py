@@ -143,21 +143,41 @@ def test_who_is_interrupted_while_parts_begin_to_meet_leaves_no_folder(
     assert not list(tmp_path.iterdir())
 
 
-def test_who_leaves_at_once_without_an_end_leaves_no_folder(tmp_path: Path) -> None:
-    """As by a second Ctrl-C, or when tearing down takes too long behind the first."""
-    leaving = """
-import asyncio
-from hfg.parts.processes.launching import ProcessLauncher
-async def main():
-    await ProcessLauncher().open()
-    raise KeyboardInterrupt
-asyncio.run(main())
+LEAVES_A_PROGRAM = """
+    import asyncio
+    from hfg.parts.processes.launching import ProcessLauncher
+    async def main():
+        await ProcessLauncher().open()
+        raise KeyboardInterrupt
+    asyncio.run(main())
 """
+LEAVES_THE_COMMAND = """
+    import os, signal
+    import hfg
+    from hfg.cli.execute import execute
+    from hfg.cli.interrupt import Interrupt
+    from hfg.cli.options import Clock
+    from hfg.parts.processes.meeting import MeetingPlace
+    def begin(run):
+        begin.place = MeetingPlace()
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+    with Interrupt.installed() as interrupt:
+        execute(hfg.Graph(), "it", Clock.real, interrupt, begin)
+"""
+
+
+@pytest.mark.parametrize("leaves", [LEAVES_A_PROGRAM, LEAVES_THE_COMMAND], ids=["program", "command"])
+def test_who_leaves_at_once_without_an_end_leaves_no_folder(tmp_path: Path, leaves: str) -> None:
+    """As by a second Ctrl-C, or when tearing down takes too long behind the first."""
     left = subprocess.run(
-        [sys.executable, "-c", leaving], env=os.environ | {"TMPDIR": str(tmp_path)}, stderr=subprocess.PIPE, timeout=60
+        [sys.executable, "-c", textwrap.dedent(leaves)],
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        stderr=subprocess.PIPE,
+        timeout=60,
     )
-    assert b"KeyboardInterrupt" in left.stderr
-    assert not list(tmp_path.iterdir())
+    assert b"KeyboardInterrupt" in left.stderr or b"interrupted twice: left at once" in left.stderr
+    assert not list(tmp_path.glob("hfg-meet-*"))
 
 
 def test_the_next_run_removes_what_runs_have_left_that_were_killed_and_nothing_else(

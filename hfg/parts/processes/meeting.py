@@ -1,8 +1,9 @@
 """A folder in which the parts of one run meet: nobody but this user reaches the socket in it.
 
-However a run ends, its folder goes: by `leave`, by the end of the interpreter where nobody comes to that, by a part
-that sees that the main one was killed, and if that had no other process yet, by the next run. Who lives holds a lock
-on the folder, so that no other run takes it for one that was left.
+However a run ends, its folder goes: by `leave`, or `leave_all` where the process ends without a teardown; by the end of
+the interpreter where nobody comes to either; by a part that sees that the main one was killed, and if that had no
+other process yet, by the next run. Who lives holds a lock on the folder, so that no other run takes it for one that
+was left.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ import shutil
 import sys
 import tempfile
 import time
+import weakref
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
 if sys.platform != "win32":
     import fcntl
@@ -32,6 +34,8 @@ class MeetingPlace:
       folder: in the directory for temporary files.
     """
 
+    _of_this_process: ClassVar[weakref.WeakSet[MeetingPlace]] = weakref.WeakSet()
+
     def __init__(self) -> None:
         """Make one, and remove those that runs of this user have left which were killed.
 
@@ -42,6 +46,7 @@ class MeetingPlace:
         self._kept = tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
         self.folder = Path(self._kept.name)
         self._lock = _lock(self.folder)
+        self._of_this_process.add(self)
 
     @property
     def settings(self) -> dict[str, object]:
@@ -54,6 +59,12 @@ class MeetingPlace:
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
+
+    @classmethod
+    def leave_all(cls) -> None:
+        """Remove those of this process, which ends at once; from any thread."""
+        for place in tuple(cls._of_this_process):
+            place.leave()
 
 
 def _sweep(place: Path) -> None:
