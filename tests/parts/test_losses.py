@@ -134,7 +134,7 @@ def test_more_signals_at_once_than_a_queue_holds_are_dropped_by_its_own_policy(o
 class Flood(hfg.Node):
     """Triggers as fast as it goes."""
 
-    count = hfg.Parameter(100)
+    count = hfg.Parameter(2000)
     told = hfg.Event(int)
     number = hfg.State(0)
 
@@ -147,7 +147,7 @@ class Flood(hfg.Node):
 
 @pytest.mark.rule("P5")
 def test_a_flood_of_signals_does_not_wait_until_the_loop_has_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running_part, "_LOSSY_S", 0.0)  # else it were for the machine to say how many leave
+    monkeypatch.setattr(running_part, "_LOSSY_SLICE_S", 0.0)  # else it were for the machine to say how many leave
     monkeypatch.setattr(launching, "ProcessLauncher", lambda: launching.LoopLauncher(network=Network()))
     graph = hfg.Graph()
     graph.group("far", process=True)
@@ -156,8 +156,8 @@ def test_a_flood_of_signals_does_not_wait_until_the_loop_has_time(monkeypatch: p
     graph.connect(last.out, graph.output("out", int))
     found = hfg.run(graph).outputs["out"]
     assert found == sorted(set(found))
-    assert len(found) > 50
-    assert found[-1] == 99
+    assert len(found) > 20  # the clock is looked at after every 64 steps
+    assert found[-1] == 1999
 
 
 @pytest.mark.rule("R5", "P5")

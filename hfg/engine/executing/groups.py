@@ -114,17 +114,18 @@ class SideGroup(LoopGroup):
             self._stands = True
             self._ready_groups.append(self)
 
-    def dispatch(self) -> None:
-        """Let some nodes move; then others have their turn."""
+    def dispatch(self) -> int:
+        """Let some nodes move, then others have their turn; give how many."""
         self._stands = False
+        moved = 0
         try:
-            for _ in range(_DISPATCH_STEPS):
-                if self.held or self._flags or not len(self.policy):
-                    return
+            while moved < _DISPATCH_STEPS and not (self.held or self._flags) and len(self.policy):
+                moved += 1
                 worker = self.take()
                 worker.step(worker)
         finally:
             self._stand()
+        return moved
 
 
 class Job:
@@ -225,18 +226,16 @@ class ThreadGroup(Group):
         if self.running < self.threads:
             self._ready_groups.append(self)
 
-    def dispatch(self) -> None:
-        """Let nodes start until the threads are busy; on the loop."""
-        policy = self.policy
-        for _ in range(_DISPATCH_STEPS):
-            if self.held:
-                break
-            if self.running >= self.threads or not len(policy):
-                return
+    def dispatch(self) -> int:
+        """Let nodes start until the threads are busy; on the loop; give how many."""
+        policy, moved = self.policy, 0
+        while moved < _DISPATCH_STEPS and not self.held and self.running < self.threads and len(policy):
+            moved += 1
             worker = self.take()
             worker.step(worker)
         if self.running < self.threads and len(policy):
             self._ready_groups.append(self)  # silent firings need no thread: others have their turn
+        return moved
 
     def submit(self, job: Job) -> None:
         """Give a thread a job; on the loop."""

@@ -39,7 +39,7 @@ from hfg.ports import EventPort
 
 __all__ = ["Engine"]
 
-_SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
+_SLICE_S = 0.005
 _SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
 _MOST_CHECKED = 200  # nodes, of which all invariants are asked for after every step
 _VIRTUAL_SLICE_WAVES = 2048  # in virtual time a slice must not depend on how fast the machine is
@@ -101,6 +101,7 @@ class Engine:
       holds: people outside who may still bring something (R5).
       readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
       read_out: those whose END somebody has read.
+      slice_s: how long the pump may keep the loop to itself on the real clock.
       clock_within_s: tells by how much the clock here may differ from that of the run of which this is a part.
     """
 
@@ -125,6 +126,7 @@ class Engine:
         self.core.seed = settings.seed or 0
         self.core.fuse_after = settings.fuse_after
         self.graph: Graph = flat.graph
+        self.slice_s = _SLICE_S
         self.holds = 0
         self.readers: list[Worker] = []
         self.read_out: set[Worker] = set()
@@ -415,11 +417,11 @@ class Engine:
         long that the slice is over before the next look.
         """
         core, flags, take = self.core, self.core.flags, group.take
-        until = core.until = self.now() + _SLICE_S
+        until = core.until = self.now() + self.slice_s
         group.give_turns(_SLICE_STEPS)
         while True:
             if ready_groups:
-                ready_groups.popleft().dispatch()
+                group.give_turns(max(group.turns - ready_groups.popleft().dispatch(), 1))
             if policy:
                 worker = take()
                 step = worker.step  # what is called as a field is looked up the slow way

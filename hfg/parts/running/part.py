@@ -32,7 +32,7 @@ __all__ = ["Incoming", "Outgoing", "Part"]
 
 _MOST_SAID: Final = 1000  # words that wait for tokens which were sent before them
 _REST_S: Final = 0.002  # how long nothing has moved before that is said to others; in virtual time it is said at once
-_LOSSY_S: Final = 0.001  # how long at most a signal that may be lost lies before an outlet while the loop is busy
+_LOSSY_SLICE_S: Final = 0.001  # nobody holds back who sends what may be lost: else one would leave in each long slice
 
 
 class Outgoing(Protocol):
@@ -107,13 +107,7 @@ class Part:
         engine = self.engine
         keeps = {edge.label: edge.guarantee == "exact" for edge in edges}
         self.outlets: dict[str, Outlet] = {
-            one.port_name: Outlet(
-                engine,
-                one,
-                keeps=keeps[one.port_name],
-                wake=self._wake if keeps[one.port_name] else self._wake_for_lossy,
-                drains=not inherits,
-            )
+            one.port_name: Outlet(engine, one, keeps=keeps[one.port_name], wake=self._wake, drains=not inherits)
             for one in engine.core.outlets
         }
         self.inlets: dict[str, Inlet] = {
@@ -138,9 +132,10 @@ class Part:
         self._before: dict[Any, int] = {}  # what the ends had done when the part was edited last
         self._cleared: asyncio.Future[None] | None = None  # somebody waits until nothing is in it
         self._leaving = False
-        self._leave_by = 0.0  # on the run's clock: what lies before a lossy outlet by then is to leave
         engine.leave_quiet_to(self._nothing_moves)
         engine.callbacks.pumped.append(self._pumped)
+        if not all(keeps[label] for label in self.outlets):
+            engine.slice_s = _LOSSY_SLICE_S
 
     @property
     def engine(self) -> Engine:
@@ -431,14 +426,6 @@ class Part:
             self._leaving = True
             self.engine.soon(self._leave)
 
-    def _wake_for_lossy(self) -> None:
-        """The same where nobody is held back: a source that is never done would replace what lies there for a slice."""
-        engine = self.engine
-        if not engine.core.pumping:
-            self._wake()
-        elif engine.now() >= self._leave_by:
-            engine.core.flags.append("leaving")
-
     def _leave(self) -> None:
         self._leaving = False
         if not self.engine.core.over:
@@ -456,8 +443,6 @@ class Part:
             if self.keeper is None and not self.inherits:
                 self._settle_at(inlet, inlet.taken)
         self.send()
-        if self._lossy:
-            self._leave_by = self.engine.now() + _LOSSY_S
         if self.inherits:
             self._settle()
             self._look_whether_clear()
