@@ -184,21 +184,42 @@ def test_the_next_run_removes_what_runs_have_left_that_were_killed_and_nothing_e
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    left, lives, young, other = MeetingPlace(), MeetingPlace(), MeetingPlace(), tmp_path / "hfg-something"
-    other.mkdir()
+    left, lives, young = MeetingPlace(), MeetingPlace(), MeetingPlace()
+    others = [tmp_path / "hfg-something", tmp_path / "hfg-meet-notes", tmp_path / f"{left.folder.name}-of-mine"]
+    for other in others:
+        other.mkdir()
+        (other / "meet").touch()
     for place in (left, young):
         (place.folder / "meet").touch()
         assert place._lock is not None
         os.close(place._lock)  # as the end of a process does
         place._lock = None
-    for folder in (left.folder, lives.folder, other):
+    for folder in (left.folder, lives.folder, *others):
         os.utime(folder, (0, 0))
     following = MeetingPlace()
     found = {folder.name for folder in tmp_path.iterdir()}
-    assert found == {one.name for one in (lives.folder, young.folder, following.folder, other)}
+    assert found == {one.name for one in (lives.folder, young.folder, following.folder, *others)}
     for place in (left, lives, young, following):
         place.leave()
-    assert list(tmp_path.iterdir()) == [other]
+    assert sorted(tmp_path.iterdir()) == sorted(others)
+    assert all((other / "meet").exists() for other in others)
+
+
+def test_a_process_that_is_forked_from_a_run_leaves_its_folder_alone(tmp_path: Path) -> None:
+    forks = """
+        import os, sys
+        from hfg.parts.processes.meeting import MeetingPlace
+        place = MeetingPlace()
+        if not os.fork():
+            sys.exit()
+        os.wait()
+        assert place.folder.exists()
+    """
+    left = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(forks)], env=os.environ | {"TMPDIR": str(tmp_path)}, timeout=60
+    )
+    assert left.returncode == 0
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.rule("L2", "L3")

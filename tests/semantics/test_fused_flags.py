@@ -1,7 +1,8 @@
-"""A wave ends behind the call in which somebody raises a flag, and what it has done stays done (R2, R4)."""
+"""What comes amid a wave: a flag ends it behind the call under way, and what it has done stays done (R2, R4)."""
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import threading
 from collections.abc import Callable
@@ -90,3 +91,51 @@ def test_a_wave_that_begins_with_a_flag_up_ends_behind_its_first_call(
 
     assert _amid_a_call(meddle, None) == list(range(2, 42, 2))
     assert left[0] == ("numbers", 8)
+
+
+@pytest.mark.rule("X1", "F3")
+@pytest.mark.parametrize("then", ["fail", "give way and fail", "give way and wait"])
+@pytest.mark.parametrize("fast", [True, False])
+def test_statistics_that_are_read_amid_a_wave_leave_it_as_it_is(
+    monkeypatch: pytest.MonkeyPatch, then: str, fast: bool
+) -> None:
+    """The first reading has waves measured; by the second they are plain again, and measured ones would be next."""
+    monkeypatch.setattr(settings, "FUSE_AFTER", 0)
+    readings: list[Callable[[], object]] = []
+
+    @hfg.node
+    def plain(value: int) -> int:
+        if value in {5, 80}:
+            readings[0]()
+            if value == 80:
+                raise ValueError("eighty")
+        return value
+
+    @hfg.node
+    async def polite(value: int) -> int:
+        if value == 5:
+            readings[0]()
+        await asyncio.sleep(0)
+        if value == 80:
+            asyncio.get_running_loop().call_soon(readings[0])
+            for _ in range(5):
+                await asyncio.sleep(0)
+            if then.endswith("fail"):
+                raise ValueError("eighty")
+            await asyncio.sleep(0.1)
+        return value
+
+    async def main() -> list[int]:
+        graph, keep = hfg.Graph(), Keep()
+        source, before = graph.add(numbers(count=90)), graph.add(forward())
+        behind = graph.add(plain() if then == "fail" else polite(), on_error="skip", name="behind")
+        graph.connect(source.out, before.value)
+        graph.connect(before.out, behind.value)
+        graph.connect(behind.out, graph.add(keep).value)
+        async with hfg.running(graph, fast=fast, clock="virtual" if then == "fail" else "real") as run:
+            readings.append(run.statistics)
+            await run.wait_finished()
+        return keep.values
+
+    values = drive(main) if then == "fail" else asyncio.run(main())
+    assert values == [value for value in range(1, 91) if value != 80 or then.endswith("wait")]

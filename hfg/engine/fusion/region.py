@@ -68,6 +68,7 @@ class Region:
       amid: "", or "firing" while the wave under way has given way to others and all members are busy.
       called_off: the wave that has given way ends behind its present call; the flags are cleared meanwhile.
       flags: not empty: the wave under way ends behind its present call.
+      measures_next: somebody has read what was measured while a wave was under way: the next ones are measured anew.
       ending: some producer before the head sends END as soon as its outputs are free.
     """
 
@@ -85,6 +86,7 @@ class Region:
         self.armed = False
         self.running = False
         self.doomed = False
+        self.measures_next = False
         self.amid = ""
         self.called_off = False
         self.detached = False  # the call under way waits, and goes on as a firing like any other
@@ -258,10 +260,10 @@ class Region:
             self._let_go(head)
         if self.doomed:
             self.dissolve()
+        elif self.measures_next:
+            self.measure_on()
         elif self._wave is self._measured and all(worker.meter.left <= 0 for worker in self.order):
-            self._wave = self._plain
-            self.step = self._plain.step
-            head.go_by(self.step)
+            self._go_by(self._plain)
         if gave_way:
             agenda.idle_again(head)
             self._go_on(called_off)
@@ -282,10 +284,14 @@ class Region:
 
     def measure_on(self) -> None:
         """What was measured has been read: measure the next waves."""
-        if self._measured is not None and self._wave is not self._measured and self.head.step is self.step:
-            self._wave = self._measured
-            self.step = self._measured.step
-            self.head.go_by(self.step)
+        self.measures_next = self.running  # whose lines say which call is under way
+        if self._measured is not None and not self.running and self.head.step is self.step:
+            self._go_by(self._measured)
+
+    def _go_by(self, wave: Wave) -> None:
+        self._wave = wave
+        self.step = wave.step
+        self.head.go_by(wave.step)
 
     def _let_follow(self, candidates: Sequence[Worker]) -> None:
         """Those outside whom the wave has enabled go next, in the order R2 prescribes."""
@@ -353,6 +359,8 @@ class Region:
     def _left(self, gave_way: bool = False) -> None:
         if self.doomed:
             self.dissolve()
+        elif self.measures_next:
+            self.measure_on()
         if gave_way and not self.core.over:
             self._go_on(called_off=True)
 

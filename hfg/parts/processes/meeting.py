@@ -2,15 +2,16 @@
 
 However a run ends, its folder goes: by `leave`, or `leave_all` where the process ends without a teardown; by the end of
 the interpreter where nobody comes to either; by a part that sees that the main one was killed, and if that had no
-other process yet, by the next run. Who lives holds a lock on the folder, so that no other run takes it for one that
-was left.
+other process yet, by the next run on this machine. Who lives holds a lock on the folder, so that no other run takes it
+for one that was left. Stands on `clocks`.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
-import shutil
+import re
 import sys
 import tempfile
 import time
@@ -18,12 +19,17 @@ import weakref
 from pathlib import Path
 from typing import ClassVar, Final
 
+from hfg.parts.model.clocks import machine
+
 if sys.platform != "win32":
     import fcntl
 
 __all__ = ["MeetingPlace"]
 
-_PREFIX: Final = "hfg-meet-"
+_MACHINE: Final = hashlib.blake2b(machine().encode(), digest_size=4).hexdigest()
+_PREFIX: Final = f"hfg-meet-{_MACHINE}-"  # a lock may be of one machine, and the directory of several
+_NAME: Final = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")
+_HOLDS: Final = ("meet", "meet.lock")  # Zenoh's socket, and what it keeps beside
 _YOUNG_S: Final = 60.0  # a folder so young may belong to who has not come to lock it yet
 
 
@@ -43,8 +49,8 @@ class MeetingPlace:
           OSError: there is no room for it.
         """
         _sweep(Path(tempfile.gettempdir()))
-        self._kept = tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
-        self.folder = Path(self._kept.name)
+        self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX))
+        self._left = weakref.finalize(self, _remove, self.folder, os.getpid())
         self._lock = _lock(self.folder)
         self._of_this_process.add(self)
 
@@ -55,10 +61,10 @@ class MeetingPlace:
 
     def leave(self) -> None:
         """Remove it."""
-        self._kept.cleanup()
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._left()
+        lock, self._lock = self._lock, None
+        if lock is not None:
+            os.close(lock)
 
     @classmethod
     def leave_all(cls) -> None:
@@ -67,21 +73,36 @@ class MeetingPlace:
             place.leave()
 
 
+def _remove(folder: Path, process: int) -> None:
+    """Remove what is ours in it, and it, if nothing else is; a process that was forked from ours leaves it alone."""
+    if os.getpid() != process:
+        return
+    for name in _HOLDS:
+        with contextlib.suppress(OSError):
+            (folder / name).unlink()
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
 def _sweep(place: Path) -> None:
     """Remove the folders in `place` whose runs are over; what cannot be looked at is not ours."""
-    for folder in place.glob(f"{_PREFIX}*"):
+    if sys.platform == "win32":
+        return  # where such sockets are not, nor locks of folders
+    for folder in place.iterdir():
+        if _NAME.fullmatch(folder.name) is None:
+            continue
         with contextlib.suppress(OSError):
             found = folder.lstat()
             if found.st_uid != os.geteuid() or time.time() - found.st_mtime < _YOUNG_S:
                 continue
             lock = _lock(folder)
             if lock is not None:
-                shutil.rmtree(folder, ignore_errors=True)
+                _remove(folder, os.getpid())
                 os.close(lock)
 
 
 def _lock(folder: Path) -> int | None:
-    """Lock a folder for as long as what is given stays open; None if somebody has, or the system has no such locks."""
+    """Lock a folder for as long as what is given stays open; None if somebody has, or there are no such locks there."""
     if sys.platform == "win32":
         return None
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
