@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.engine.runtime import engine
 from hfg.parts.model.agreement import Account, Agreement, Answer, Question, Rest
 from hfg.parts.processes import launching
-from hfg.parts.running import part as running_part
 from hfg.trace import TokenSent, TraceEvent
 from hfg_transports.memory import Faults, Network
 from tests.parts.test_deaths import LastWord
@@ -134,7 +134,7 @@ def test_more_signals_at_once_than_a_queue_holds_are_dropped_by_its_own_policy(o
 
 @pytest.mark.rule("P5")
 def test_a_flood_of_signals_does_not_wait_until_the_loop_has_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running_part, "_LOSSY_SLICE_S", 0.0)  # else it were for the machine to say how many leave
+    monkeypatch.setattr(engine, "_SHORT_SLICE_S", 0.0)  # else it were for the machine to say how many leave
     monkeypatch.setattr(launching, "ProcessLauncher", lambda: launching.LoopLauncher(network=Network()))
     graph = hfg.Graph()
     graph.group("far", process=True)

@@ -68,7 +68,6 @@ class Region:
       amid: "", or "firing" while the wave under way has given way to others and all members are busy.
       called_off: the wave that has given way ends behind its present call; the flags are cleared meanwhile.
       flags: not empty: the wave under way ends behind its present call.
-      measures_next: somebody has read what was measured while a wave was under way: the next ones are measured anew.
       ending: some producer before the head sends END as soon as its outputs are free.
     """
 
@@ -86,7 +85,6 @@ class Region:
         self.armed = False
         self.running = False
         self.doomed = False
-        self.measures_next = False
         self.amid = ""
         self.called_off = False
         self.detached = False  # the call under way waits, and goes on as a firing like any other
@@ -260,8 +258,6 @@ class Region:
             self._let_go(head)
         if self.doomed:
             self.dissolve()
-        elif self.measures_next:
-            self.measure_on()
         elif self._wave is self._measured and all(worker.meter.left <= 0 for worker in self.order):
             self._go_by(self._plain)
         if gave_way:
@@ -283,9 +279,8 @@ class Region:
             release(self.held_entries)
 
     def measure_on(self) -> None:
-        """What was measured has been read: measure the next waves."""
-        self.measures_next = self.running  # whose lines say which call is under way
-        if self._measured is not None and not self.running and self.head.step is self.step:
+        """What was measured has been read: measure the next waves; one may be under way."""
+        if self._measured is not None and self.head.step is self.step:
             self._go_by(self._measured)
 
     def _go_by(self, wave: Wave) -> None:
@@ -340,7 +335,7 @@ class Region:
         gave_way = bool(self.amid)
         self._rest()
         traceback: Any = error.__traceback__
-        k = self._wave.calls.get(traceback.tb_lineno)
+        k = self.called_at(traceback.tb_frame.f_code, traceback.tb_lineno)
         if k is None:
             self.running = False
             raise error  # a fault of ours
@@ -359,8 +354,6 @@ class Region:
     def _left(self, gave_way: bool = False) -> None:
         if self.doomed:
             self.dissolve()
-        elif self.measures_next:
-            self.measure_on()
         if gave_way and not self.core.over:
             self._go_on(called_off=True)
 
@@ -509,7 +502,9 @@ class Region:
     def _place(self) -> tuple[int, dict[str, Any]]:
         """The member in whose call the wave waits, and what its locals hold."""
         frame = self._coroutine.cr_frame
-        return self._wave.calls[frame.f_lineno], dict(frame.f_locals)
+        k = self.called_at(frame.f_code, frame.f_lineno)
+        assert k is not None
+        return k, dict(frame.f_locals)
 
     def _rest(self) -> None:
         """The wave does not give way any more: nobody's code is under way but that of the present call, if any."""
@@ -537,12 +532,19 @@ class Region:
 
     def at_work(self, frame: FrameType | None) -> Worker | None:
         """Whose call a running wave is in, by the line it is at; None if the frames are of something else."""
-        codes: tuple[CodeType | None, ...] = (self._plain.code, self._measured.code if self._measured else None)
+        codes = [wave.code for wave in self._waves()]
         while frame is not None:
             if frame.f_code in codes:
-                return self.order[self._wave.calls.get(frame.f_lineno, 0)]
+                return self.order[self.called_at(frame.f_code, frame.f_lineno) or 0]
             frame = frame.f_back
         return None
+
+    def called_at(self, code: CodeType, line: int) -> int | None:
+        """Which member a line calls. The wave under way need not be the one that is next, see `measure_on`."""
+        return next((wave.calls.get(line) for wave in self._waves() if wave.code is code), None)
+
+    def _waves(self) -> list[Wave]:
+        return [wave for wave in (self._plain, self._measured) if wave is not None]
 
     def is_calling(self, worker: Worker) -> bool:
         """Whether the call of this member is the one under way in a running wave."""

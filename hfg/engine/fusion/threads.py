@@ -83,7 +83,8 @@ class _InThread:
     def caught(self, error: BaseException, found: dict[str, Any]) -> _Left:
         """Which call has raised is told by its line."""
         traceback: Any = error.__traceback__
-        return _Left(self._region.called_at(traceback.tb_lineno), found, None, error)
+        k = self._region.called_at(traceback.tb_frame.f_code, traceback.tb_lineno)
+        return _Left(k, found, None, error)
 
 
 class ThreadRegion(Region):
@@ -109,10 +110,6 @@ class ThreadRegion(Region):
             self.flags = Flags()
             self._thread = _InThread(self)
         return write_wave(self, _ThreadWriter(self, measured), to=self._thread)
-
-    def called_at(self, line: int) -> int | None:
-        """Which member the line of the wave calls."""
-        return self._wave.calls.get(line)
 
     # --- a wave -----------------------------------------------------------------------------------------------------
 

@@ -557,8 +557,7 @@ class Writer:
     def _go_on_at_once(self) -> None:
         """Where nothing unusual has come the source has its next turn: what `over` would find, without a call."""
         say = self.say
-        odd = ["flags", "worker.blocked", "worker.placed", "region.doomed", "region.measures_next", "core.followers"]
-        say(f"if not ({' or '.join(odd)}):")
+        say("if not (flags or worker.blocked or worker.placed or region.doomed or core.followers):")
         self.indent += 1
         say("region.running = False")
         say("region.waves += done")

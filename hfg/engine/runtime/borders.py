@@ -57,6 +57,8 @@ class Outlet:
         self._engine = engine
         self._worker = worker
         self._keeps = keeps
+        if not keeps:
+            engine.look_round_often()  # nobody holds its producer back: of all that it sends in a slice one would leave
         self._drains = drains
         (self._edge,) = worker.in_edges
         self._waiting = 0  # tokens that have left and still lie here

@@ -39,7 +39,8 @@ from hfg.ports import EventPort
 
 __all__ = ["Engine"]
 
-_SLICE_S = 0.005
+_SLICE_S = 0.005  # how long the pump may keep the loop to itself on the real clock
+_SHORT_SLICE_S = 0.001  # the same where what waits at the border of a part is replaced meanwhile
 _SLICE_STEPS = 64  # how many steps it makes between two looks at the clock
 _MOST_CHECKED = 200  # nodes, of which all invariants are asked for after every step
 _VIRTUAL_SLICE_WAVES = 2048  # in virtual time a slice must not depend on how fast the machine is
@@ -101,7 +102,6 @@ class Engine:
       holds: people outside who may still bring something (R5).
       readers: the graph outputs that somebody outside reads now; what lies before them will be taken.
       read_out: those whose END somebody has read.
-      slice_s: how long the pump may keep the loop to itself on the real clock.
       clock_within_s: tells by how much the clock here may differ from that of the run of which this is a part.
     """
 
@@ -126,7 +126,7 @@ class Engine:
         self.core.seed = settings.seed or 0
         self.core.fuse_after = settings.fuse_after
         self.graph: Graph = flat.graph
-        self.slice_s = _SLICE_S
+        self._slice_s = _SLICE_S
         self.holds = 0
         self.readers: list[Worker] = []
         self.read_out: set[Worker] = set()
@@ -296,6 +296,10 @@ class Engine:
             self._scheduled = True
             self.loop.call_soon(self._pump, context=self.context)
 
+    def look_round_often(self) -> None:
+        """Have short slices from now on."""
+        self._slice_s = _SHORT_SLICE_S
+
     def at_once(self, call: Callable[[], None]) -> None:
         """In a callback of the loop that is not the engine's: do this and pump then, which saves a pass of the loop.
 
@@ -417,7 +421,7 @@ class Engine:
         long that the slice is over before the next look.
         """
         core, flags, take = self.core, self.core.flags, group.take
-        until = core.until = self.now() + self.slice_s
+        until = core.until = self.now() + self._slice_s
         group.give_turns(_SLICE_STEPS)
         while True:
             if ready_groups:

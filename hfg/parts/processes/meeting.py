@@ -24,7 +24,7 @@ from hfg.parts.model.clocks import machine
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["MeetingPlace"]
+__all__ = ["MeetingPlace", "remove"]
 
 _MACHINE: Final = hashlib.blake2b(machine().encode(), digest_size=4).hexdigest()
 _PREFIX: Final = f"hfg-meet-{_MACHINE}-"  # a lock may be of one machine, and the directory of several
@@ -50,7 +50,7 @@ class MeetingPlace:
         """
         _sweep(Path(tempfile.gettempdir()))
         self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX))
-        self._left = weakref.finalize(self, _remove, self.folder, os.getpid())
+        self._left = weakref.finalize(self, _leave, self.folder, os.getpid())
         self._lock = _lock(self.folder)
         self._of_this_process.add(self)
 
@@ -73,10 +73,14 @@ class MeetingPlace:
             place.leave()
 
 
-def _remove(folder: Path, process: int) -> None:
-    """Remove what is ours in it, and it, if nothing else is; a process that was forked from ours leaves it alone."""
-    if os.getpid() != process:
-        return
+def _leave(folder: Path, process: int) -> None:
+    """Remove it; a process that was forked from ours leaves it alone."""
+    if os.getpid() == process:
+        remove(folder)
+
+
+def remove(folder: Path) -> None:
+    """Remove what is ours in it, and it, if nothing else is."""
     for name in _HOLDS:
         with contextlib.suppress(OSError):
             (folder / name).unlink()
@@ -97,7 +101,7 @@ def _sweep(place: Path) -> None:
                 continue
             lock = _lock(folder)
             if lock is not None:
-                _remove(folder, os.getpid())
+                remove(folder)
                 os.close(lock)
 
 

@@ -14,7 +14,6 @@ import io
 import logging
 import os
 import runpy
-import shutil
 import signal
 import sys
 import threading
@@ -30,6 +29,7 @@ from hfg.engine import PunctualLoop
 from hfg.errors import HfgError, RunError, TransportError, in_words
 from hfg.graph import Graph
 from hfg.parts.model.messages import Logged, Open
+from hfg.parts.processes import meeting
 from hfg.parts.processes.launching import BEAT_S, Begun, build_graph
 from hfg.parts.processes.spares import SPARE
 from hfg.parts.processes.worker import Worker
@@ -78,7 +78,7 @@ def _be_called(part: str) -> None:
 def _sweep(begun: Begun) -> None:
     """Remove what a main part that was killed has left behind; one that lives does so itself."""
     if begun.folder and os.getppid() != begun.parent:
-        shutil.rmtree(begun.folder, ignore_errors=True)
+        meeting.remove(Path(begun.folder))
 
 
 def _import(begun: Begun) -> RunError | None:

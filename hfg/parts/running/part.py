@@ -32,7 +32,6 @@ __all__ = ["Incoming", "Outgoing", "Part"]
 
 _MOST_SAID: Final = 1000  # words that wait for tokens which were sent before them
 _REST_S: Final = 0.002  # how long nothing has moved before that is said to others; in virtual time it is said at once
-_LOSSY_SLICE_S: Final = 0.001  # nobody holds back who sends what may be lost: else one would leave in each long slice
 
 
 class Outgoing(Protocol):
@@ -134,8 +133,6 @@ class Part:
         self._leaving = False
         engine.leave_quiet_to(self._nothing_moves)
         engine.callbacks.pumped.append(self._pumped)
-        if not all(keeps[label] for label in self.outlets):
-            engine.slice_s = _LOSSY_SLICE_S
 
     @property
     def engine(self) -> Engine:
