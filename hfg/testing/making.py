@@ -99,6 +99,7 @@ class Allowed:
     sources: bool = True
     start: bool = True
     failing_calls: bool = True
+    sending: bool = False  # nodes send in every way there is, from plain code and async, which pauses or not
     plain: bool = False  # mostly functions close to each other: the shapes of which regions are fused
 
 
@@ -141,6 +142,11 @@ _INNER_WHERE: list[tuple[Callable[[Allowed], bool], list[str]]] = [
     (lambda allowed: allowed.readiness, ["OnlyTwice"]),
     (lambda allowed: allowed.retries, ["Unsteady"] * 3 + ["Stubborn"] * 2),
     (lambda allowed: allowed.tasks, ["Tends"] * 4 + ["Beats"] * 3),
+    (lambda allowed: allowed.sending, ["Speaks", "SpeaksTwice", "Lends", "Passing"]),
+    (lambda allowed: allowed.sending and allowed.waiting, ["SpeaksLater", "SpeaksTwiceLater", "LendsLater"]),
+    (lambda allowed: allowed.sending and allowed.waiting, ["PassingLater"]),
+    (lambda allowed: allowed.sending and allowed.events and allowed.failing_calls, ["Utters", "Utters"]),
+    (lambda allowed: allowed.sending and allowed.waiting and allowed.events and allowed.failing_calls, ["UttersLater"]),
     (lambda allowed: allowed.endings and not allowed.plain, ["LastWord", "LastWord", "Hums"]),
     (lambda allowed: allowed.iteration and not allowed.plain, ["EachOfEach"]),
     (lambda allowed: allowed.tuned, ["Tuned"] * 6),
@@ -149,26 +155,46 @@ _INNER_WHERE: list[tuple[Callable[[Allowed], bool], list[str]]] = [
 """More of them; a kind that stands there several times is chosen as often."""
 
 _BEFORE = {"EachOfEach": "listed"}
-_BEHIND = {"EachOfEach": "summed", "Hums": "add", "LastWord": "add"}
+_BEHIND = {"EachOfEach": "summed", "Hums": "add", "LastWord": "add", "Lends": "unlent", "LendsLater": "unlent"}
 """What such a node is made with: it needs a consumer, or a producer, of its own."""
 
 _PLAIN = ["double", "add", "add", "some", "some", "sink", "either", "with_default", "parted", "Sends", "mood", "calm"]
 _PLAIN_WHERE_CODE_WAITS = ["restless", "calling"]
 _PLAIN_WHERE_CODE_FAILS = ["picky", "picky", "gives_up"]
 _PLAIN_WHERE_ACTIVITY_MOVES = ["handing"]
+_PLAIN_SENDING = ["Speaks", "Speaks", "SpeaksTwice", "Lends"]
+_PLAIN_SENDING_LATER = ["SpeaksLater", "SpeaksLater", "SpeaksTwiceLater", "LendsLater"]
+_SPEAKING_SOURCES = ["Talks", "Draws"]
+_SPEAKING_SOURCES_LATER = ["TalksLater"]
+_SPEAKING = ("Speaks", "SpeaksLater", "SpeaksTwice", "SpeaksTwiceLater", *_SPEAKING_SOURCES, *_SPEAKING_SOURCES_LATER)
+"""Whose way to answer is a parameter."""
+
+_PAUSING = ("SpeaksLater", "SpeaksTwiceLater", "LendsLater", "PassingLater", "UttersLater", *_SPEAKING_SOURCES_LATER)
+"""What their async code does before it answers is a parameter, too."""
 FEEDS = ("red", "blue")
 """The inputs of graphs that are fed from outside."""
 
 _TENDING = ("Tends", "Beats")
 """Whose code starts tasks."""
 
-_WAITING = {"ascript", "slow_double", "Waiting", "AsyncRelay", "calm", "restless", "calling", "Unsteady", *_TENDING}
+_WAITING = {
+    "ascript",
+    "slow_double",
+    "Waiting",
+    "AsyncRelay",
+    "calm",
+    "restless",
+    "calling",
+    "Unsteady",
+    *_TENDING,
+    *_PAUSING,
+}
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
-_BOUNDED_SLOTS = {"say", "hand_on", "hear"}
+_BOUNDED_SLOTS = {"say", "hand_on", "hear", "utter"}
 _TURNED = {"Scaled": "factor", "Pulse": "most", "Script": "count", "Hums": "tone"}
 """Parameters that edges set; a source with such an edge waits for it."""
 
-_WIRED = ("listed", "EachOfEach", "Hums", "LastWord")
+_WIRED = ("listed", "EachOfEach", "Hums", "LastWord", "Lends", "LendsLater")
 """Whose outputs lead where they were made for, and nowhere else."""
 
 _LEFT_ALONE = ("EachOfEach", "Clings")
@@ -186,7 +212,7 @@ _OPERATORS: list[tuple[str, list[float]]] = [
     ("throttle_first", [0.005]),
     ("beside_a_timer", [0.002, 0.02]),
 ]
-_SEVERAL = ("slow_double", "Waiting", "restless", "calm", "Unsteady")
+_SEVERAL = ("slow_double", "Waiting", "restless", "calm", "Unsteady", "SpeaksLater", "SpeaksTwiceLater")
 _TRIED_AGAIN = ("Unsteady", "Stubborn")
 
 _TUNED: dict[str, list[Any]] = {
@@ -222,6 +248,8 @@ class _Making:
     def make_nodes(self) -> None:
         choose, allowed = self.choose, self.allowed
         sources = ["script", "Script"] + (["ascript"] if allowed.waiting else [])
+        if allowed.sending:
+            sources += _SPEAKING_SOURCES + (_SPEAKING_SOURCES_LATER if allowed.waiting else [])
         count = choose.number(2, allowed.max_nodes)
         inner, plain = self._inner_kinds(), self._plain_kinds()
         for number in range(count):
@@ -247,6 +275,8 @@ class _Making:
         kinds += _PLAIN_WHERE_CODE_WAITS if allowed.waiting else []
         kinds += _PLAIN_WHERE_CODE_FAILS if allowed.failures else []
         kinds += _PLAIN_WHERE_ACTIVITY_MOVES if allowed.activity else []
+        kinds += _PLAIN_SENDING if allowed.sending else []
+        kinds += _PLAIN_SENDING_LATER if allowed.sending and allowed.waiting else []
         return kinds
 
     def _seldom(self, percent: int) -> int:
@@ -265,6 +295,8 @@ class _Making:
                 return given
             case "Script":
                 return {"count": choose.number(0, 12 if self.allowed.plain else 5)}
+            case _ if kind in (*_SPEAKING, *_PAUSING):
+                return self._speaking(kind)
             case "some":
                 return {"modulus": choose.number(2, 3)}
             case "Failing" | "picky" | "gives_up":
@@ -276,6 +308,21 @@ class _Making:
             case "Tuned":
                 return {name: choose.one_of(values) for name, values in _TUNED.items() if choose.chance(40)}
         return {}
+
+    def _speaking(self, kind: str) -> dict[str, Any]:
+        """How a node answers, and what it does before."""
+        choose, allowed = self.choose, self.allowed
+        given: dict[str, Any] = {}
+        if kind in _SPEAKING:
+            ways = [way for way in types.WAYS if allowed.activity or way != "held"]
+            given["way"] = choose.one_of([*ways, "both"] if allowed.failures and choose.chance(10) else ways)
+        if kind in _PAUSING:
+            given["pause"] = choose.one_of(types.PAUSES)
+        if kind in (*_SPEAKING_SOURCES, *_SPEAKING_SOURCES_LATER):
+            given["count"] = choose.number(0, 12 if allowed.plain else 5)
+        if kind == "SpeaksLater" and choose.chance(25):
+            given["by_task"] = True
+        return given
 
     def _options(self, kind: str) -> dict[str, Any]:
         choose, allowed = self.choose, self.allowed
@@ -290,7 +337,9 @@ class _Making:
             options["max_rate_hz"] = 100.0
         if kind == "Clings":
             return options
-        if kind in ("Failing", "picky", "gives_up", *_TENDING) or (allowed.failures and choose.chance(5)):
+        if kind in ("Failing", "picky", "gives_up", "Utters", "UttersLater", *_TENDING, *_SPEAKING) or (
+            allowed.failures and choose.chance(5)
+        ):
             options["on_error"] = choose.one_of(
                 ["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"]
             )

@@ -17,6 +17,7 @@ from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
 import hfg
+from hfg.ports.outputs import OutputPort
 from hfg.types import Shape
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Clings",
     "Counter",
     "Doubter",
+    "Draws",
     "EachOfEach",
     "EachOfThose",
     "Effort",
@@ -34,22 +36,33 @@ __all__ = [
     "Hums",
     "LastWord",
     "Latch",
+    "Lends",
+    "LendsLater",
     "Merge",
     "OnlyTwice",
     "Parts",
     "Passing",
+    "PassingLater",
     "Pulse",
     "Relay",
     "Scaled",
     "Script",
     "Sends",
     "Sieve",
+    "Speaks",
+    "SpeaksLater",
+    "SpeaksTwice",
+    "SpeaksTwiceLater",
     "Stateful",
     "Stubborn",
+    "Talks",
+    "TalksLater",
     "Tally",
     "Tends",
     "Tuned",
     "Unsteady",
+    "Utters",
+    "UttersLater",
     "Waiting",
     "add",
     "ascript",
@@ -69,6 +82,7 @@ __all__ = [
     "slow_double",
     "some",
     "summed",
+    "unlent",
     "with_default",
 ]
 
@@ -215,6 +229,244 @@ class Sends(hfg.Node):
             self.rest.send(value)
 
 
+def _say(port: OutputPort[int], way: str, value: int) -> int | None:
+    """Answer by an output in one of the ways there are; what is given back is to be returned."""
+    match way:
+        case "return":
+            return value
+        case "either" if value % 2:
+            return value
+        case "stamped":
+            port.send(value, stamp=float(value))
+        case "held":
+            port.send(value, activity=0)
+        case "token":
+            port.send(hfg.Token(value, 0, 0.5))
+        case "both":  # an error: once is enough
+            port.send(value)
+            return value
+        case "seldom" if value % 3:
+            pass
+        case _:
+            port.send(value)
+    return None
+
+
+WAYS = ("send", "return", "either", "seldom", "stamped", "held", "token")
+"""How a node may answer: by `send`, by what it returns, by one or the other, with a stamp, with a token ..."""
+
+PAUSES = ("none", "turn", "wait", "mixed")
+"""What async code does before it answers: nothing, let others have a turn, wait, or one and then the other."""
+
+
+async def _pause(pause: str, value: int) -> None:
+    if pause == "turn" or (pause == "mixed" and value % 3 == 1):
+        await asyncio.sleep(0)
+    elif pause == "wait" or (pause == "mixed" and value % 3 == 2):
+        await asyncio.sleep(0.002)
+
+
+class Speaks(hfg.Node):
+    """Answers by its one output, in the way that it is given."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    way = hfg.Parameter("send")
+
+    def process(self, value: int) -> int | None:
+        """Leave it to a function beside."""
+        return _say(self.out, self.way, value)
+
+
+class SpeaksLater(hfg.Node):
+    """The same from async code, before or behind a pause; or by a task of its own."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    way = hfg.Parameter("send")
+    pause = hfg.Parameter("turn")
+    by_task = hfg.Parameter(False)
+
+    async def process(self, value: int) -> int | None:
+        """Leave it to a function beside."""
+        if self.by_task:
+            task = asyncio.create_task(self.answer(value))
+            await _pause(self.pause, value)
+            return await task
+        return await self.answer(value)
+
+    async def answer(self, value: int) -> int | None:
+        """Pause, then answer; four comes before the pause."""
+        if value == 4:
+            answer = _say(self.out, self.way, value)
+            await _pause(self.pause, value)
+            return answer
+        await _pause(self.pause, value)
+        return _say(self.out, self.way, value)
+
+
+class SpeaksTwice(hfg.Node):
+    """Answers by two outputs: by one as it is given, by the other mostly by what it returns."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    rest = hfg.Output(int)
+    way = hfg.Parameter("send")
+
+    def process(self, value: int) -> tuple[int | None, int | None] | None:
+        """Send and return."""
+        answer = _say(self.out, self.way, value)
+        if value % 2:
+            self.rest.send(-value)
+            return None if answer is None else (answer, None)
+        return answer, value
+
+
+class SpeaksTwiceLater(hfg.Node):
+    """The same from async code."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    rest = hfg.Output(int)
+    way = hfg.Parameter("send")
+    pause = hfg.Parameter("turn")
+
+    async def process(self, value: int) -> tuple[int | None, int | None] | None:
+        """Send by one, pause, then send by the other and return."""
+        if value % 2:
+            self.rest.send(-value)
+        await _pause(self.pause, value)
+        answer = _say(self.out, self.way, value)
+        if value % 2:
+            return None if answer is None else (answer, None)
+        return answer, value
+
+
+class Talks(hfg.Node):
+    """A source as a class that answers in the way that it is given."""
+
+    out = hfg.Output(int)
+    count = hfg.Parameter(3)
+    way = hfg.Parameter("send")
+    at = hfg.State(0)
+
+    def process(self) -> int | None:
+        """Give the next number."""
+        if self.at >= self.count:
+            raise hfg.EndOfStream
+        self.at += 1
+        return _say(self.out, self.way, self.at)
+
+
+class TalksLater(hfg.Node):
+    """The same from async code."""
+
+    out = hfg.Output(int)
+    count = hfg.Parameter(3)
+    way = hfg.Parameter("send")
+    pause = hfg.Parameter("turn")
+    at = hfg.State(0)
+
+    async def process(self) -> int | None:
+        """Give the next number."""
+        if self.at >= self.count:
+            raise hfg.EndOfStream
+        self.at += 1
+        await _pause(self.pause, self.at)
+        return _say(self.out, self.way, self.at)
+
+
+class Draws(hfg.Node):
+    """The same as a generator: what it sends before it yields leaves with that."""
+
+    out = hfg.Output(int)
+    count = hfg.Parameter(3)
+    way = hfg.Parameter("send")
+
+    def process(self) -> Iterator[int | None]:
+        """Give the numbers."""
+        for number in range(1, self.count + 1):
+            yield _say(self.out, self.way, number)
+
+
+class Lends(hfg.Node):
+    """Fills an array that its output lends, and sends it."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(NDArray[np.int64])
+
+    def process(self, value: int) -> None:
+        """Fill it."""
+        array = self.out.loan(2, np.int64)
+        array[:] = value
+        self.out.send(array)
+
+
+class LendsLater(hfg.Node):
+    """The same from async code: it borrows before a pause and sends behind it."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(NDArray[np.int64])
+    pause = hfg.Parameter("turn")
+
+    async def process(self, value: int) -> None:
+        """Fill it, late."""
+        array = self.out.loan(2, np.int64)
+        await _pause(self.pause, value)
+        array[:] = value
+        self.out.send(array)
+
+
+@hfg.node
+def unlent(array: NDArray[np.int64]) -> int:
+    """Give what is in an array that was lent."""
+    return int(array[0])
+
+
+class Utters(hfg.Node):
+    """Lives by its slot, whose helper triggers; every third value it would send, which is not for a slot (F9)."""
+
+    said = hfg.Event(int)
+    out = hfg.Output(int)
+    calls = hfg.State(0)
+
+    @hfg.slot
+    def utter(self, value: int) -> None:
+        """Leave it to the helper; a few times, so that rings end."""
+        self.calls += 1
+        if self.calls <= 12:
+            self.help(value)
+
+    def help(self, value: int) -> None:
+        """Trigger, or try to send."""
+        if value % 3 == 2:
+            self.out.send(value)
+        self.said.trigger(value)
+
+
+class UttersLater(hfg.Node):
+    """The same from async code."""
+
+    said = hfg.Event(int)
+    out = hfg.Output(int)
+    pause = hfg.Parameter("turn")
+    calls = hfg.State(0)
+
+    @hfg.slot
+    async def utter(self, value: int) -> None:
+        """Pause, then leave it to the helper; a few times, so that rings end."""
+        self.calls += 1
+        if self.calls <= 8:
+            await _pause(self.pause, value)
+            await self.help(value)
+
+    async def help(self, value: int) -> None:
+        """Trigger, or try to send."""
+        if value % 3 == 2:
+            self.out.send(value)
+        self.said.trigger(value)
+
+
 class Script(hfg.Node):
     """A source as a class: numbers up to `count`, then the end; every `every`th is also an event."""
 
@@ -245,6 +497,22 @@ class Passing(hfg.Node):
         """Pass it on twice."""
         self.passed.trigger(value)
         self.out.send(value)
+
+
+class PassingLater(hfg.Node):
+    """Passes tokens on, behind a pause, or again with the next."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    pause = hfg.Parameter("turn")
+
+    async def process(self, value: hfg.Token[int]) -> hfg.Token[int] | None:
+        """Send it or return it."""
+        await _pause(self.pause, value.value)
+        if value.value % 2:
+            return value
+        self.out.send(value)
+        return None
 
 
 class Merge(hfg.Node):

@@ -59,7 +59,7 @@ class Calls(list[tuple[str, str]]):
 
 def plain_shapes(seed: int) -> Allowed:
     """What is fused, and now and then what splits it."""
-    return Allowed(plain=True, max_nodes=4 + seed % 9)
+    return Allowed(plain=True, max_nodes=4 + seed % 9, sending=seed % 2 == 1)
 
 
 def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
@@ -188,6 +188,85 @@ def fused_order(graph: hfg.Graph, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         orders.append(calls.take()[0])
     assert orders[0] == orders[1]
     return [path for path, _ in orders[0]]
+
+
+class SendsBehindAnAwait(hfg.Node):
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    async def process(self, value: int) -> None:
+        await asyncio.sleep(0)
+        self.out.send(value)
+
+
+class Gathers(hfg.Node):
+    """Takes pairs."""
+
+    first = hfg.Input(int)
+    second = hfg.Input(int, optional=True, default=-1)
+    pairs: Any = None
+
+    def setup(self) -> None:
+        self.pairs = []
+
+    def process(self, first: int, second: int) -> None:
+        self.pairs.append((first, second))
+
+
+@pytest.mark.rule("F3", "R2")
+@pytest.mark.parametrize("clock", ["virtual", "real"])
+def test_what_async_code_sends_behind_an_await_leaves_with_its_firing(clock: Any) -> None:
+    graph, pairs = hfg.Graph(), Gathers()
+    source, sends = graph.add(nodes.script(values=tuple(range(20)))), graph.add(SendsBehindAnAwait())
+    graph.add(pairs)
+    graph.connect(source.out, sends.value)
+    graph.connect(sends.out, pairs.second)
+    graph.connect(source.out, pairs.first)
+    hfg.run(graph, clock=clock)
+    assert pairs.pairs == [(number, number) for number in range(20)]
+
+
+class SendsForAnother(hfg.Node):
+    """Amid its own firing it writes to the output of another node, whose call is not under way."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    other: Any = None
+
+    async def process(self, value: int) -> int:
+        await asyncio.sleep(0)
+        try:
+            self.other.out.send(-1)
+        except hfg.errors.UsageError as error:
+            self.refused = str(error)
+        return value
+
+
+@pytest.mark.rule("F3")
+def test_what_is_sent_by_a_node_whose_call_is_not_under_way_is_refused_amid_a_wave_too() -> None:
+    graph, meddles, pairs = hfg.Graph(), SendsForAnother(), Gathers()
+    source, other = graph.add(nodes.script(values=(1, 2, 3))), graph.add(nodes.Speaks(), name="other")
+    graph.add(meddles)
+    graph.add(pairs)
+    meddles.other = other
+    graph.connect(source.out, meddles.value)
+    graph.connect(meddles.out, other.value)
+    graph.connect(source.out, pairs.first)
+    graph.connect(other.out, pairs.second)
+    hfg.run(graph, clock="virtual")
+    assert pairs.pairs == [(1, 1), (2, 2), (3, 3)]
+    assert 'output "other.out" was written outside a firing' in meddles.refused
+
+
+@pytest.mark.rule("F9")
+@pytest.mark.parametrize("by", ["event", "output"])
+def test_a_slot_handler_whose_helper_sends_is_told_so_by_the_fast_path_too(by: str) -> None:
+    graph = hfg.Graph()
+    source, utters = graph.add(nodes.Script(every=1)), graph.add(nodes.Utters(), name="utters", on_error="skip")
+    graph.connect(source.seen if by == "event" else source.out, utters.utter)
+    report = hfg.run(graph, clock="virtual")
+    assert report.nodes["utters"].failed == 1
+    assert 'output "utters.out" was written in a slot handler' in str(report.errors[0])
 
 
 @pytest.mark.rule("F4")

@@ -28,6 +28,7 @@ EVERYTHING = Allowed()
 SEVERAL_AT_ONCE = Allowed(concurrency=True)
 TRIED_AGAIN = Allowed(concurrency=True, retries=True)
 TENDING = Allowed(tasks=True, max_nodes=6)
+SENDING = Allowed(sending=True)
 THREADS = Allowed(threads=True, lossy=False, gates=False)
 
 
@@ -138,6 +139,17 @@ def test_so_it_does_where_nodes_start_tasks_beside_their_firings(block: int) -> 
         plan = random_plan(seed, replace(TENDING, concurrency=seed % 5 == 0, retries=seed % 5 == 0))
         if any(node.type in ("Tends", "Beats") for node in plan.nodes) and reference(plan, seed) is not None:
             check(plan, seed)
+
+
+@pytest.mark.rule("F3", "F9", "T5", "A4")
+@pytest.mark.parametrize("block", range(4))
+def test_so_it_does_where_nodes_send_in_every_way_there_is(block: int) -> None:
+    """By `send`, return, both, helpers, tokens, loans and tasks, from plain and async code; watched and not."""
+    for seed in range(20 * block, 20 * block + 20):
+        plan = random_plan(seed, replace(SENDING, concurrency=seed % 3 == 0, retries=seed % 5 == 0))
+        if reference(plan, seed) is not None:
+            check(plan, seed)
+            check(plan, seed, short_ways_differ)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

@@ -43,7 +43,8 @@ def test_the_engine_does_what_the_oracle_permits(block: int) -> None:
     print(f"seeds {first} to {first + GRAPHS // BLOCKS - 1}")
     for seed in range(first, first + GRAPHS // BLOCKS):
         base = WIDE if seed % 2 else Allowed()
-        allowed = replace(base, threads=seed % 10 == 0, max_nodes=5 + seed % 6, tasks=seed % 7 == 1)
+        allowed = replace(base, threads=seed % 10 == 0, max_nodes=5 + seed % 6)
+        allowed = replace(allowed, tasks=seed % 7 == 1, sending=seed % 3 == 0)
         plan = random_plan(seed, allowed)
         if suite.reference(plan, seed) is not None:
             suite.check(plan, seed)

@@ -65,7 +65,7 @@ class Region:
       step: what the head's step is while the region lasts.
       armed: everything inside rests, or a wave runs.
       running: a wave is under way.
-      amid: "", or "firing" while the wave under way has given way to others and all members are busy.
+      amid: "", or "wave" while the wave under way has given way to others and all members are busy.
       called_off: the wave that has given way ends behind its present call; the flags are cleared meanwhile.
       flags: not empty: the wave under way ends behind its present call.
       ending: some producer before the head sends END as soon as its outputs are free.
@@ -458,9 +458,10 @@ class Region:
     def _give_way(self) -> None:
         """The wave has given way to others: its members are busy until it is over."""
         lender: Any = self._lender
-        self.amid = "firing"
+        self.amid = "wave"
         for worker in self.order:
-            worker.be_in_wave()
+            if worker.busy != "firing":  # else its call, under way, was announced
+                worker.be_in_wave(self.amid)
         code = self.core.code
         lender.set_out()
         self._after = code.late(lender, _nothing_more)
@@ -548,6 +549,10 @@ class Region:
 
     def is_calling(self, worker: Worker) -> bool:
         """Whether the call of this member is the one under way in a running wave."""
+        if self.amid:  # its own tasks may ask while it waits for its turn
+            frame = self._coroutine.cr_frame
+            k = None if frame is None else self.called_at(frame.f_code, frame.f_lineno)
+            return k is not None and self.order[k] is worker
         return self.running and self.at_work(sys._getframe(1)) is worker  # noqa: SLF001 - of frames nobody else knows
 
     def speaks(self, worker: Worker) -> bool:
@@ -559,7 +564,7 @@ class Region:
             return False
         worker.speak_by_itself()
         self.doomed = True
-        self.flags.append("speaks")
+        self._call_off("speaks")
         return True
 
 

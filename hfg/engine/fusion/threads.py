@@ -125,7 +125,7 @@ class ThreadRegion(Region):
             arguments[edge.position] = token.value
         stamp = self.core.now() if head.is_source else max(token.stamp for _, token in tokens)
         for worker in self.order:
-            worker.be_in_wave()
+            worker.be_in_wave("firing")  # each may be the one whose call is under way: only the thread could tell
         for worker in self._speaking:
             worker.stamp_with(stamp)
         for edge in self.entries:

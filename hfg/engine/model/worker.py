@@ -87,7 +87,7 @@ class Worker(Vertex):
       queued: it stands in its group's run queue.
       follows: what a sequential edge has enabled goes next when the call is over for which it stands there (R2).
       busy: "" or what is under way: "firing", "call", "asking", "ending", "setup"; "edit": an edit holds it;
-        "over": what was under way is over, but for what it releases.
+        "wave": its region's wave has given way to others; "over": what was under way is over, but for what it releases.
       special: something about the next firing is not ordinary (a marker lies on an input ...): the fast step steps
         aside.
       step: runs its next piece of work; chosen for its shape by `specialise`.
@@ -661,9 +661,12 @@ class Worker(Vertex):
         """Its code sends amid its calls, so a region says before each of them that it runs."""
         self.speaks = True
 
-    def be_in_wave(self) -> None:
-        """It is busy for as long as the wave of its region is under way; that disturbs no region."""
-        self.busy = "firing"
+    def be_in_wave(self, doing: str = "wave") -> None:
+        """It is busy for as long as the wave of its region is under way; that disturbs no region.
+
+        Only the member whose call is under way fires, and what it may do, others may not.
+        """
+        self.busy = doing
 
     def stamp_with(self, stamp: float) -> None:
         """What its code sends by itself in a wave is of this time."""
@@ -862,7 +865,10 @@ class Worker(Vertex):
 
     def firings_under_way(self) -> int:
         """How many of its firings are under way, those included that are over and wait for their turn (F14)."""
-        return int(self.busy in ("firing", "ending")) if self.flights is None else len(self.flights)
+        if self.flights is not None:
+            return len(self.flights)
+        in_wave = self.busy == "wave" and self.region is not None and self.region.is_calling(self)
+        return int(in_wave or self.busy in ("firing", "ending"))
 
     def most_under_way(self) -> int:
         """How many there ever were at once."""

@@ -454,7 +454,8 @@ def write(worker: Worker, position: int, value: object, activity: int | None, st
       UsageError: outside a firing (also in a slot handler, F9), or twice in one firing.
     """
     if worker.busy not in ("firing", "ending") and (worker.region is None or not worker.region.speaks(worker)):
-        where = "in a slot handler" if worker.busy == "call" else "outside a firing"
+        called = worker.busy == "call" or (not worker.busy and worker.stamp is not None)  # the fast path of calls
+        where = "in a slot handler" if called else "outside a firing"
         raise UsageError(
             f'output "{worker.path}.{worker.out_names[position]}" was written {where}: outputs belong to process() and '
             "end(); trigger an event instead"

@@ -111,12 +111,12 @@ class Firing(RunningCode):
             return "end"
         values = {line.edge.label: lying.token.value for line, lying in taken}
         mandatory = [values[line.edge.label] for line, _ in taken if not self.is_optional(line)]
-        if END in mandatory:
+        if any(value is END for value in mandatory):  # of values it is not known what `==` does
             return "end"
         real = [line for line in joined if not line.delay]
         if real and all(line.ended for line in real):
             return "end"
-        if NO_MESSAGE in mandatory:
+        if any(value is NO_MESSAGE for value in mandatory):
             return "silent"
         if joined and not mandatory and all(value is NO_MESSAGE or value is END for value in values.values()):
             return "silent"
