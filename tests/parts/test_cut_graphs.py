@@ -12,9 +12,12 @@ import hfg
 from hfg.engine.runtime import settings
 from hfg.graph import Graph
 from hfg.graph.structure.level import level_of
+from hfg.parts.processes import launching
 from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
 from hfg.trace import NodeEnded, TokenSent, TokenTaken, TraceEvent
+from hfg_transports.memory import Faults, Network
+from tests.parts.lit import lit
 from tests.semantics.test_random_graphs import reference
 
 Sequences = dict[str, list[tuple[Any, int]]]
@@ -85,6 +88,23 @@ def test_what_runs_over_every_edge_does_not_depend_on_where_a_graph_is_cut(
     for seed in range(25 * block, 25 * block + 25):
         plan = random_plan(seed, SYNCHRONOUS)
         monkeypatch.setattr(settings, "FUSE_AFTER", 0 if seed % 2 else 25)
+        found = difference(plan, seed)
+        assert found is None, f"{found}\n{plan}"
+
+
+@pytest.mark.rule("A10", "F7", "L1")
+@pytest.mark.parametrize("block", range(4))
+def test_nothing_overtakes_start_on_its_way_to_another_part(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Data and the word to begin come at different times, over a network with delays."""
+    seed = 0
+
+    class Delayed(launching.LoopLauncher):
+        def __init__(self) -> None:
+            super().__init__(network=Network(Faults(loss=0.3, delay_s=(0.0, 0.004)), seed=seed))
+
+    monkeypatch.setattr(launching, "LoopLauncher", Delayed)
+    for seed in range(4000 + 25 * block, 4000 + 25 * block + 25):
+        plan = lit(random_plan(seed, SYNCHRONOUS), seed)
         found = difference(plan, seed)
         assert found is None, f"{found}\n{plan}"
 

@@ -295,8 +295,12 @@ class Inlet:
         self._engine.kick()
 
     def lay(self) -> None:
-        """Lay what has come on the edge, as far as there is room; say what was taken since the last time."""
-        if self._engine.core.over:
+        """Lay what has come on the edge, as far as there is room; say what was taken since the last time.
+
+        What comes before this part has begun waits here: `start` is on its edges first (A10), wherever data comes from.
+        """
+        core = self._engine.core
+        if core.over or not core.started:
             return
         if not reaches(self._edge):
             while self._inbox:  # what lies where it comes from goes back from there (A8)

@@ -35,6 +35,7 @@ class Callbacks:
     """What is called, in the order in which it was put in.
 
     Attributes:
+      begun: the nodes are set up, `start` is on its edges and the sources may fire, but nothing has moved yet (A10).
       pumped: a slice of the pump is over.
       rested: the pump would go on now, but the run is paused.
       finished: the run is over; nothing is torn down yet.
@@ -42,9 +43,10 @@ class Callbacks:
       joined: an edge by which signals come from outside was made.
     """
 
-    __slots__ = ("edited", "finished", "joined", "pumped", "rested")
+    __slots__ = ("begun", "edited", "finished", "joined", "pumped", "rested")
 
     def __init__(self) -> None:
+        self.begun: list[Callable[[], None]] = []
         self.pumped: list[Callable[[], None]] = []
         self.rested: list[Callable[[], None]] = []
         self.finished: list[Callable[[], None]] = []

@@ -94,6 +94,8 @@ class Lifetime:
         self._open_sources(core)
         for source, edge, operators in core.observables:
             self.feed(source, edge, operators)
+        for told in engine.callbacks.begun:
+            told()
         engine.kick()
 
     async def _set_up_all(self, core: Core) -> bool:

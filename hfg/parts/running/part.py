@@ -132,6 +132,7 @@ class Part:
         self._cleared: asyncio.Future[None] | None = None  # somebody waits until nothing is in it
         self._leaving = False
         engine.leave_quiet_to(self._nothing_moves)
+        engine.callbacks.begun.append(self._begun)
         engine.callbacks.pumped.append(self._pumped)
 
     @property
@@ -200,8 +201,13 @@ class Part:
     def begin(self) -> None:
         """All parts are set up: go."""
         self.composition.lifetime.begin()
+
+    def _begun(self) -> None:
+        """The signals of `start` are on their edges: now comes what has come from other parts meanwhile."""
         if self.keeper is not None:
             self.engine.guard(self.keeper.go_on)
+        for inlet in self.inlets.values():
+            self.engine.guard(inlet.lay)
 
     def be_kept(self, number: int) -> None:
         """What was asked to be kept is kept: producers may hear of it, and what waited for it has left."""
