@@ -19,6 +19,7 @@ __all__ = [
     "SettingsOption",
     "TargetArgument",
     "UntilOption",
+    "VerboseOption",
 ]
 
 
@@ -75,3 +76,4 @@ SettingsOption = Annotated[
 DebugOption = Annotated[
     bool, typer.Option("--debug", help="Check values against port types; show hfg's own frames in tracebacks.")
 ]
+VerboseOption = Annotated[int, typer.Option("-v", "--verbose", count=True, help="Report each node; twice, each edge.")]

@@ -14,7 +14,7 @@ from hfg.cli import show
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.live import live_table
-from hfg.cli.options import ArgOption, Clock, ClockOption, DebugOption, ParamOption, UntilOption
+from hfg.cli.options import ArgOption, Clock, ClockOption, DebugOption, ParamOption, UntilOption, VerboseOption
 from hfg.cli.record import told
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
@@ -34,7 +34,7 @@ def play(
         typer.Option(
             "--map",
             metavar="FROM=TO",
-            help="Feed a port by another than that of its path, as in camera.out=detect.image; several times.",
+            help="Play a recorded port as another of the graph, as in camera.out=front.image; several times.",
         ),
     ] = None,
     speed: Annotated[str, typer.Option(help="How much faster than it was recorded; max: as fast as can be.")] = "1",
@@ -47,10 +47,11 @@ def play(
     arg: ArgOption = None,
     table: Annotated[bool, typer.Option(help="On a terminal and the real clock, a live table of nodes.")] = True,
     debug: DebugOption = False,
+    verbose: VerboseOption = 0,
 ) -> int:
     """Play a recording into a graph, in the place of the sources that were recorded."""
     show.set_debug(debug)
-    records = show.Records(0, debug, virtual=clock is Clock.virtual)
+    records = show.Records(verbose, debug, virtual=clock is Clock.virtual)
     ports = dict(_pair(one) for one in mapped or [])
     graph = load_graph(into, arg or [])
     records.loaded()
@@ -59,8 +60,6 @@ def play(
     except (UsageError, GraphError) as wrong:
         raise TargetError(str(wrong)) from None
     set_parameters(graph, param or [])
-    for path in playing.silent:
-        show.sentence(f'"{path}" was not recorded, so it is silent')
     for path in playing.rest:
         show.sentence(f'"{path}" rests: all that it sends went to what is played')
     interrupt = Interrupt.current or Interrupt()
@@ -80,7 +79,7 @@ def play(
     if interrupt.count:
         show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
     elif report is not None and error is None:
-        show.report(graph.name, report, 0)
+        show.report(graph.name, report, verbose)
     return 1 if error is not None or interrupt.count else code
 
 

@@ -30,6 +30,7 @@ from hfg.cli.options import (
     SettingsOption,
     TargetArgument,
     UntilOption,
+    VerboseOption,
 )
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
@@ -79,9 +80,7 @@ def run(
         bool, typer.Option("--json", help="Write the report as JSON; what nodes print goes to standard error.")
     ] = False,
     debug: DebugOption = False,
-    verbose: Annotated[
-        int, typer.Option("-v", "--verbose", count=True, help="Report each node; twice, each edge.")
-    ] = 0,
+    verbose: VerboseOption = 0,
 ) -> int:
     """Run a graph to its end; Ctrl-C ends it earlier, twice at once."""
     show.set_debug(debug)

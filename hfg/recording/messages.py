@@ -25,6 +25,7 @@ from hfg.types import describe, describe_value
 __all__ = [
     "EVENTS",
     "MARKERS",
+    "Firings",
     "Images",
     "Marked",
     "PlainToken",
@@ -42,11 +43,41 @@ EVENTS: Final = "hfg/events"
 
 Images = Literal["raw", "png", "jpeg"]
 
-_TOLD: Final = ("began", "call", "beside", "silent", "last", "waited")
+_TOLD: Final = ("began", "call", "beside", "silent", "last", "waited", "refused")
+
+
+class Firings:
+    """Numbers the firings of a node that has several outputs, so that each is played as one.
+
+    A firing puts one token on each live output (F3), and which are live changes only with the structure of the graph.
+    So a firing is over when one of its outputs sends again, or when the structure has changed.
+    """
+
+    def __init__(self) -> None:
+        self._number = 0
+        self._sent: set[str] = set()
+        self.end()
+
+    def end(self) -> None:
+        """Start the next firing with the next token."""
+        self._number += bool(self._sent) or not self._number
+        self._sent.clear()
+
+    def number(self, path: str) -> int:
+        """Return the number of the firing in which an output sends its next token, from 1."""
+        if path in self._sent:
+            self.end()
+        self._sent.add(path)
+        return self._number
 
 
 class _Circumstances(msgspec.Struct, omit_defaults=True, kw_only=True):
-    """How it came to be sent, as far as the token itself does not say that; see `recorder.Told`."""
+    """How a token was sent, as far as the token does not say so itself; see `recorder.Told`.
+
+    Attributes:
+      firing: number of the firing among those of its node; 0: the node has one output, so each token is a firing.
+      refused: the value could not be recorded, and silence stands in its place.
+    """
 
     time: float | None = None
     began: float | None = None
@@ -55,6 +86,8 @@ class _Circumstances(msgspec.Struct, omit_defaults=True, kw_only=True):
     silent: bool = False
     last: bool = False
     waited: bool = False
+    firing: int = 0
+    refused: bool = False
 
 
 class Marked(_Circumstances, omit_defaults=True):
@@ -116,9 +149,9 @@ class _Compressed(_Circumstances, omit_defaults=True):
     sequence: int = 0
 
 
-def circumstances(token: Token[Any], time: float | None) -> dict[str, Any]:
+def circumstances(token: Token[Any], time: float | None, firing: int) -> dict[str, Any]:
     """What is written of how a token came to be sent; `time`: when it passed, if that is to be written."""
-    found: dict[str, Any] = {} if time is None else {"time": time}
+    found: dict[str, Any] = {"firing": firing} if time is None else {"time": time, "firing": firing}
     if type(token) is Told:
         found |= {name: getattr(token, name) for name in _TOLD}
     return found
@@ -136,6 +169,7 @@ class TokenWriter:
       markers: how many.
       left_out: how many tokens there was no time for.
       refused: how many values are no data.
+      firings: numbers the firings of its node; None: the port is the node's only output, or no output.
       schema_name: of its channel.
       schema: of its channel.
     """
@@ -147,6 +181,7 @@ class TokenWriter:
         self.markers = 0
         self.left_out = 0
         self.refused = 0
+        self.firings: Firings | None = None
         self.images = images
         self.is_image = schemas.is_image(hint)
         codec = Codec(hint, may_pickle=may_pickle)
@@ -174,20 +209,20 @@ class TokenWriter:
             raise CannotKeep(f"{describe_value(value)} is no image")
         return np.array(value, order="C", copy=True), value.nbytes
 
-    def message(self, token: Token[Any], time: float | None) -> Any:
+    def message(self, token: Token[Any], time: float | None, firing: int = 0) -> Any:
         """Give what is to be encoded; `time`: when it passed, if that is to be written."""
         if self.is_image:
-            return self._image(token, time)
+            return self._image(token, time, firing)
         value = token.value
         kind = type(value)
         if self.keep is None and (kind is str or (kind is float and not isfinite(value))):
             value = self._codec.encode(value)
             token = msgspec.structs.replace(token, value=value)
-        if time is None and type(token) is Token:
+        if time is None and not firing and type(token) is Token:
             return token
-        return Timed(value, token.activity, token.stamp, token.sequence, **circumstances(token, time))
+        return Timed(value, token.activity, token.stamp, token.sequence, **circumstances(token, time, firing))
 
-    def _image(self, token: Token[Any], time: float | None) -> Any:
+    def _image(self, token: Token[Any], time: float | None, firing: int) -> Any:
         value = token.value
         height, width = value.shape[:2]
         seconds = max(token.stamp, 0.0)
@@ -197,7 +232,7 @@ class TokenWriter:
             "stamp": token.stamp,
             "activity": token.activity,
             "sequence": token.sequence,
-            **circumstances(token, time),
+            **circumstances(token, time, firing),
         }
         if self.images == "raw":
             step = value.nbytes // height if height else 0

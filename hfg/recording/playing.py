@@ -15,8 +15,8 @@ import sys
 import types
 from collections.abc import Mapping, Set
 from pathlib import Path
-from typing import Any, Final
-from weakref import WeakKeyDictionary
+from typing import Any, Final, NamedTuple
+from weakref import WeakKeyDictionary, WeakSet
 
 import msgspec
 
@@ -25,6 +25,7 @@ from hfg.graph import Graph, commands
 from hfg.graph.flat import flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
+from hfg.logs import Log
 from hfg.nodetype import Node, NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
 from hfg.recording.messages import MARKERS
@@ -34,6 +35,7 @@ from hfg.recording.tracks import Track, recorded_ports
 
 __all__ = ["Playing", "play_into"]
 
+_LOGGER = Log("hfg.recording")
 _BESIDE: Final = b'"beside":true'
 _PLAYBACK: Final = "hfg.nodes.recordings:Playback"
 
@@ -121,6 +123,7 @@ def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any]
         self._player = Player(self, track, names, how.speed)
         if engine is not None:
             players[engine] = self._recording, self._player
+            how.playing.tell(engine)
 
     body = {
         "__module__": __name__,
@@ -136,11 +139,6 @@ def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any]
     return f"{__name__}:{qualname}"
 
 
-class _How(msgspec.Struct, frozen=True):
-    speed: float | None
-    pickle: bool
-
-
 class Playing(msgspec.Struct):
     """What `play_into` has done to a graph.
 
@@ -149,12 +147,41 @@ class Playing(msgspec.Struct):
       recomputed: recorded ports that the graph makes itself from what is played.
       silent: connected outputs of played nodes that were not recorded.
       rest: nodes that are disabled, for all that they send went to nodes that are played.
+      missing: recorded ports that the graph does not have.
+      live: sources of the graph that were not recorded, so they run their own code.
+      gaps: what the recording itself lacks, as sentences.
     """
 
     played: dict[str, str] = {}
     recomputed: list[str] = []
     silent: list[str] = []
     rest: list[str] = []
+    missing: list[str] = []
+    live: list[str] = []
+    gaps: list[str] = []
+    _told: WeakSet[Any] = msgspec.field(default_factory=WeakSet)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is not as it was recorded, as sentences; the report of the run has them among its errors."""
+        return [
+            *self.gaps,
+            *(f'"{port}" was recorded, but the graph has no such port, so it is not played' for port in self.missing),
+            *(f'"{port}" was not recorded, so it is silent' for port in self.silent),
+            *(f'source "{path}" was not recorded, so its own code runs' for path in self.live),
+        ]
+
+    def tell(self, engine: Any) -> None:
+        """Put the warnings into the report of a run that plays, once."""
+        if engine not in self._told:
+            self._told.add(engine)
+            engine.core.errors += map(UsageError, self.warnings)
+
+
+class _How(NamedTuple):
+    speed: float | None
+    pickle: bool
+    playing: Playing
 
 
 def play_into(
@@ -168,13 +195,16 @@ def play_into(
     """Let a graph at rest play a recording when it is run, in the place of the nodes that were recorded.
 
     Of the nodes that were recorded those are played that come first, above all sources; what others have sent the graph
-    makes itself again. What fed only played nodes is disabled.
+    makes itself again. What fed only played nodes is disabled. What is not as it was recorded is logged, and listed in
+    the report of the run.
 
     Args:
       graph: is changed, as by an edit; `graph.undo()` takes it back.
       file: the recording.
-      ports: which recorded ports feed which ports of the graph, {"camera.out": "detect.image"}; by default those of
-        the same path are played.
+      ports: which recorded ports stand for which ports of the graph. An output or event of the graph,
+        {"camera.out": "front.image"}, sends what was recorded of the other port, and all other ports are played under
+        their own paths. An input or slot, {"camera.out": "detect.image"}, is fed; with inputs and slots only, nothing
+        else is played.
       speed: how many recorded seconds pass in one second on the run's clock; None: as fast as can be.
       pickle: read values that were pickled, which runs code.
 
@@ -184,27 +214,66 @@ def play_into(
     if speed is not None and not speed > 0:
         raise UsageError(f"speed= says how much faster than recorded it is played, above 0, or None; got {speed!r}")
     path = os.fspath(Path(file).resolve())
+    playing = Playing()
     with File(path) as recording:
         recorded = recorded_ports(recording)
         spoke, beside = _spoke(recording)
-    if ports:
-        return _feed(graph, path, recorded, ports, speed)
-    return _replace(graph, path, recorded, spoke, beside, _How(speed, pickle))
+        playing.gaps = _gaps(recording)
+    sending, fed = _sorted(graph, path, recorded, ports or {})
+    edit = _feed(graph, path, recorded, fed, speed, playing)
+    if sending or not fed:
+        own = {port: channel for port, channel in recorded.items() if port not in fed}
+        how = _How(speed, pickle, playing)
+        edit += _replace(graph, path, _Recorded(own, spoke, beside, sending), how)
+    graph.edit(*edit)
+    for sentence in playing.warnings:
+        _LOGGER.warning("%s", sentence)
+    return playing
 
 
-def _feed(graph: Graph, file: str, recorded: dict[str, Any], ports: Mapping[str, str], speed: float | None) -> Playing:
-    done = Playing()
-    edit: list[commands.Command] = []
-    drawn = {edge.target.path: edge for edge in _edges_within(graph)}
+def _gaps(recording: File) -> list[str]:
+    """What the recording does not hold, though it passed."""
+    info = recording.info()
+    found = [] if info.whole else [f"the recording {info.path} was cut off; it is played up to its last whole chunk"]
+    left_out = [(port, count, "there was no time for them") for port, count in info.left_out.items()]
+    refused = [(port, count, "their values are no data") for port, count in info.refused.items()]
+    return found + [
+        f'{count} tokens of "{port}" are not in the recording: {why}' for port, count, why in left_out + refused
+    ]
+
+
+def _sorted(
+    graph: Graph, file: str, recorded: Mapping[str, Any], ports: Mapping[str, str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Tell mappings to ports that send from those to ports that take.
+
+    Raises:
+      UsageError: there is no such recorded port, or no such port of the graph.
+    """
+    sending: dict[str, str] = {}
+    fed: dict[str, str] = {}
     for source, target in ports.items():
         if source not in recorded:
             raise UsageError(f'no port "{source}" was recorded in {file}; {suggest(source, recorded)}')
         try:
-            graph[target]
+            port: Any = graph[target]
         except Exception as error:  # whatever is wrong with the path
             raise UsageError(f'the graph lacks "{target}", to which "{source}" is to be played: {error}') from None
+        kind = getattr(port, "kind", "")
+        if kind not in ("output", "event", "input", "slot", "parameter"):
+            raise UsageError(f'"{source}" is to be played to a port, and "{target}" is none; name one of its ports')
+        (sending if kind in ("output", "event") else fed)[source] = target
+    return sending, fed
+
+
+def _feed(
+    graph: Graph, file: str, recorded: Mapping[str, Any], ports: Mapping[str, str], speed: float | None, done: Playing
+) -> list[commands.Command]:
+    edit: list[commands.Command] = []
+    drawn = {edge.target.path: edge for edge in _edges_within(graph)}
+    for number, (source, target) in enumerate(ports.items()):
         around = target.rpartition("/")[0]
-        name = f"{around}/playback_{len(edit)}" if around else f"playback_{len(edit)}"
+        name = f"{around}/playback_{number}" if around else f"playback_{number}"
         edge = drawn.get(target)
         options: dict[str, Any] = {}
         if edge is not None and getattr(edge.target, "kind", "") != "slot":
@@ -214,27 +283,41 @@ def _feed(graph: Graph, file: str, recorded: dict[str, Any], ports: Mapping[str,
         port = "signal" if recorded[source].metadata.get("kind") == "event" else "out"
         edit.append(commands.Connect(f"{name}.{port}", target, **options))
         done.played[source] = target
-    graph.edit(*edit)
-    return done
+    return edit
 
 
-def _replace(
-    graph: Graph, file: str, recorded: dict[str, Any], spoke: Set[str], beside: Set[str], how: _How
-) -> Playing:
+class _Recorded(NamedTuple):
+    """What was recorded.
+
+    Attributes:
+      ports: channels, by path of the port.
+      spoke: ports that something has passed.
+      beside: those where it did in no firing and no slot call.
+      mapped: ports that are played as others of the graph.
+    """
+
+    ports: dict[str, Any]
+    spoke: Set[str]
+    beside: Set[str]
+    mapped: dict[str, str]
+
+
+def _replace(graph: Graph, file: str, recorded: _Recorded, how: _How) -> list[commands.Command]:
     flat = flatten(graph)
+    done = how.playing
     nodes = {node.path: node for node in flat.nodes}
-    of_node, missing = _ports_of_nodes(recorded, nodes)
+    of_node, done.missing = _ports_of_nodes(recorded, nodes)
     if not of_node:
         raise UsageError(
-            f'graph "{graph.name}" has none of the ports that were recorded in {file} ({_listed(recorded)}): say which '
-            'feeds which, as in --map "camera.out=detect.image" or ports={"camera.out": "detect.image"}'
+            f'graph "{graph.name}" has none of the ports that were recorded in {file} ({_listed(recorded.ports)}): say '
+            'which stands for which, as in --map "camera.out=front.image" or ports={"camera.out": "front.image"}'
         )
     choice = _Choice(of_node, nodes, flat)
-    chosen = choice.choose(spoke, beside)
+    chosen = choice.choose(recorded)
     if not chosen:
         raise UsageError(f"nothing passed the ports that were recorded in {file}, so there is nothing to play")
     kept = choice.kept()
-    done = Playing(rest=_idle(chosen, flat, kept))
+    done.rest = _idle(chosen, flat, kept)
     edit: list[commands.Command] = []
     for path, names in of_node.items():
         ports = [port for port, name in names.items() if name]
@@ -242,22 +325,20 @@ def _replace(
             done.recomputed += ports
             continue
         node = nodes[path].node
-        hints = {port: _hint(node._type, recorded[port].metadata) for port in names}
         edit += [
             commands.Disconnect(edge.source.path, edge.target.path)
             for edge in _edges_into(node)
             if edge.target.path not in kept
         ]
+        hints = {port: _hint(node._type, name) for port, name in names.items()}
         edit.append(commands.Replace(path, _stand_in(node, file, names, hints, how)))
-        done.played |= dict(zip(ports, ports, strict=True))
+        done.played |= {port: recorded.mapped.get(port, port) for port in ports}
         done.silent += _silent(path, node, names, flat)
-    edit += [commands.Disable(path) for path in done.rest]
-    graph.edit(*edit)
-    done.silent += [port for port in missing if port.rpartition(".")[0] in chosen]
-    return done
+    done.live = [path for path, one in nodes.items() if one.node._type.is_source and path not in (*chosen, *done.rest)]
+    return edit + [commands.Disable(path) for path in done.rest]
 
 
-def _ports_of_nodes(recorded: dict[str, Any], nodes: Mapping[str, Any]) -> tuple[dict[str, dict[str, str]], list[str]]:
+def _ports_of_nodes(recorded: _Recorded, nodes: Mapping[str, Any]) -> tuple[dict[str, dict[str, str]], list[str]]:
     """Which port of which node each recorded port is; "" for what says that a source has fired.
 
     Returns:
@@ -265,17 +346,33 @@ def _ports_of_nodes(recorded: dict[str, Any], nodes: Mapping[str, Any]) -> tuple
     """
     of_node: dict[str, dict[str, str]] = {}
     missing: list[str] = []
-    for port, channel in recorded.items():
+    origins: dict[str, str] = {}  # the recorded node that each node plays
+    for port, channel in recorded.ports.items():
         about = channel.metadata
-        path, name = about.get("node", port.rpartition(".")[0]), about.get("port", "")
         if about.get("kind", "output") not in ("output", "event"):
             continue
+        origin, name = about.get("node", port.rpartition(".")[0]), about.get("port", "")
+        path, place = origin, "" if about.get("source") == "true" and name == "processed" else sent_of(name) or name
+        if port in recorded.mapped:
+            path, _, place = recorded.mapped[port].rpartition(".")
         there = nodes.get(path)
-        place = "" if about.get("source") == "true" and name == "processed" else sent_of(name) or name
         if there is None or (place and place not in there.node._type.outputs and place not in there.node._type.events):
             missing.append(port)
+        elif origins.setdefault(path, origin) != origin:
+            if port not in recorded.mapped:
+                missing.append(port)
+                continue
+            raise UsageError(
+                f'"{port}" cannot be played as "{recorded.mapped[port]}": "{path}" plays "{origins[path]}" already, '
+                "and the firings of one node come from one recorded node"
+            )
         else:
             of_node.setdefault(path, {})[port] = place
+    for port in recorded.mapped.keys() & set(missing):
+        raise UsageError(
+            f'"{port}" cannot be played as "{recorded.mapped[port]}", which is a port of a subgraph or sent by every '
+            "node; name an output or event that a node inside declares"
+        )
     return of_node, missing
 
 
@@ -288,11 +385,9 @@ def _silent(path: str, node: Node, names: Mapping[str, str], flat: Any) -> list[
     ]
 
 
-def _hint(kind: NodeType, about: Mapping[str, str]) -> Any:
-    """The type of what a recorded port of a node sends."""
-    name = about.get("port", "")
-    output = sent_of(name) or name
-    spec: Any = kind.outputs.get(output) if about.get("kind") != "event" or output != name else kind.events.get(name)
+def _hint(kind: NodeType, name: str) -> Any:
+    """The type of what a port of a node sends."""
+    spec: Any = kind.outputs.get(name) or kind.events.get(name)
     return Any if spec is None or spec.type is None else spec.type
 
 
@@ -322,23 +417,20 @@ class _Choice:
         kind: NodeType = self._nodes[path].node._type
         return kind
 
-    def choose(self, spoke: Set[str], beside: Set[str]) -> list[str]:
-        """Give their paths, in the order of the recording.
-
-        Args:
-          spoke: recorded ports that something has passed.
-          beside: those that something has passed in no firing and no slot call.
-        """
+    def choose(self, recorded: _Recorded) -> list[str]:
+        """Give their paths, in the order of the recording."""
+        mapped = {target.rpartition(".")[0] for target in recorded.mapped.values()}
         for path, names in self._of_node.items():
             kind = self._kind(path)
-            if kind.is_source or (kind.process_kind == "none" and beside & set(names)):
+            speaks = kind.process_kind == "none" and recorded.beside & set(names)
+            if kind.is_source or speaks or path in mapped:
                 self._chosen.add(path)
         unknown = self._unknown_from_the_beginning()
         while unknown:
             edge = unknown.pop()
             if edge.index not in self._tainted:
                 self._tainted.add(edge.index)
-                unknown += self._unknown_behind(self._path(edge.target), spoke)
+                unknown += self._unknown_behind(self._path(edge.target), recorded.spoke)
         return [path for path in self._of_node if path in self._chosen]
 
     def _unknown_from_the_beginning(self) -> list[Any]:

@@ -22,7 +22,7 @@ from hfg.logs import Log
 from hfg.ports import Port
 from hfg.ports.automatic import sent_name
 from hfg.recording.forms import reference
-from hfg.recording.messages import Images, TokenWriter
+from hfg.recording.messages import Firings, Images, TokenWriter
 from hfg.recording.writing import RecordingWriter, open_new
 from hfg.types import describe
 
@@ -30,7 +30,8 @@ __all__ = ["Recording", "ports_of", "record"]
 
 _LOGGER = Log("hfg.recording")
 _PATTERN: Final = frozenset("*?[")
-VERSION: Final = 1
+VERSION: Final = 2
+"""2: tokens of nodes with several outputs have the number of their firing."""
 
 
 class Recording:
@@ -49,6 +50,7 @@ class Recording:
         self._select = select
         self._how = how
         self._places: dict[Any, TokenWriter] = {}
+        self._firings: dict[Any, Firings] = {}  # of nodes with several outputs
         self._told: set[TokenWriter] = set()
         self.when_failed: Callable[[], None] | None = None
         recorder.on_structure = self._look_again
@@ -159,6 +161,8 @@ class Recording:
             "node_type": (kind.reference or "") if kind is not None else "",
             "source": str(kind is not None and kind.is_source).lower(),
         }
+        if kind is not None and port.kind == "output" and len(kind.outputs) > 1:
+            place.firings = self._firings.setdefault(node, Firings())
         typed: Place = place
         self._recorder.look_at(port, typed)
         self._writer.places.append(place)

@@ -1,7 +1,8 @@
 """What a node did, step by step, read from a recording as it is needed: firings, slot calls, signals beside both.
 
-A recording holds tokens; which of them belong together follows from their order. The outputs of a firing leave
-together, behind the signals that it has triggered; what is otherwise is written beside the token (`recorder.Told`).
+A recording holds tokens. Those that left in one firing have its number; where a node has one output, or the recording
+is of version 1, an output that sends again begins the next firing. The signals of a firing come before its outputs.
+What is otherwise is written beside the token (`recorder.Told`).
 Stands on `reading` and `messages`.
 """
 
@@ -56,6 +57,7 @@ class Step(msgspec.Struct):
       waits: it is over later than it begins, if only in the same moment.
       call: the number of the slot call that it is; 0: none.
       told: `processed` has told of it.
+      number: of the firing, as its tokens say; 0: they do not.
 
     Methods named `take_` say whether a record belongs to it, which has it by that.
     """
@@ -71,6 +73,7 @@ class Step(msgspec.Struct):
     waits: bool = False
     call: int = 0
     told: bool = False
+    number: int = 0
 
     @property
     def _is_last_word(self) -> bool:
@@ -102,8 +105,8 @@ class Step(msgspec.Struct):
         self.told = True
         return True
 
-    def take_output(self, record: Record) -> bool:
-        """A token has left by an output."""
+    def take_output(self, record: Record, *, at_once: bool) -> bool:
+        """A token has left by an output; `at_once`: those of one firing have the same time."""
         if not self.fires or self.told:
             return False
         if record.token.value is END and self._is_last_word:
@@ -111,7 +114,9 @@ class Step(msgspec.Struct):
                 self.when, self.waits = record.when, True
             self.ends = True
             return True
-        if record.port in self.sent or record.when != self.when or self.ends:
+        if record.port in self.sent or record.told.get("firing", 0) != self.number or self.ends:
+            return False
+        if at_once and record.when != self.when:
             return False
         self.sent[record.port] = record.token
         return True
@@ -196,7 +201,7 @@ class Track:
         if amid:
             return False
         if kind == "output":
-            return step.take_output(record)
+            return step.take_output(record, at_once=self.exact)
         return self._has_outputs and (step.take_sent(record) if kind == "sent" else step.take_processed())
 
     def _firing(
@@ -226,6 +231,7 @@ class Track:
             silent=bool(told.get("silent")),
             told=told_of,
             waits=waits,
+            number=told.get("firing", 0),
         )
 
     def _records(self) -> Iterator[Record]:

@@ -22,11 +22,12 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from hfg.engine.observing.recorder import ITEM
+from hfg.engine.observing.recorder import ITEM, TokensLeftOut
 from hfg.errors import UsageError
 from hfg.recording.mcap import Writer
 from hfg.recording.messages import EVENTS, MARKERS, Marked, PlainToken, TokenWriter, circumstances
 from hfg.token import NO_MESSAGE, Marker, Token
+from hfg.trace import NodeEnabled, StructureChanged
 
 __all__ = ["PROFILE", "RecordingWriter", "open_new"]
 
@@ -38,6 +39,7 @@ _LOOK_S: Final = 0.3
 _BATCH: Final = 1024
 _NUMBERS: Final = frozenset({int, float, bool})
 _PLAIN: Final = {Token}
+_BETWEEN_FIRINGS: Final = frozenset({StructureChanged, NodeEnabled, TokensLeftOut})
 _MARKED_SCHEMA: Final = b'{"title":"hfg marker","type":"object"}'
 _EVENT_SCHEMA: Final = b'{"title":"hfg event","type":"object"}'
 
@@ -178,7 +180,7 @@ class RecordingWriter:
         """Where all are finite numbers, they need not be looked at one by one; None: there is something else."""
         places, bodies, stamps, sequences, whens = batch
         counts = Counter(places)
-        if None in counts or any(place.keep is not None for place in counts):
+        if None in counts or any(place.keep is not None or place.firings is not None for place in counts):
             return None
         values = bodies
         if {*map(type, bodies)} == _PLAIN:
@@ -200,12 +202,15 @@ class RecordingWriter:
             if place is None:
                 bodies.append(token)
                 rest.append((self._own_channel(EVENTS), 0, when))
+                if type(token) in _BETWEEN_FIRINGS:
+                    self._end_firings()
                 continue
+            firing = 0 if place.firings is None else place.firings.number(place.path)
             if not isinstance(token, Token):  # it has passed in a wave
                 token = Token(NO_MESSAGE if token is None else token, 0, stamp, sequence)
             late = when if self._exact and when != token.stamp else None
             if type(token.value) is Marker:
-                told = circumstances(token, late)
+                told = circumstances(token, late, firing)
                 bodies.append(
                     Marked(place.path, token.value.value, token.stamp, token.activity, token.sequence, **told)
                 )
@@ -214,10 +219,15 @@ class RecordingWriter:
                 continue
             if place.keep is not None:
                 self.bytes_taken += self.sizes.popleft()
-            bodies.append(place.message(token, late))
+            bodies.append(place.message(token, late, firing))
             place.values += 1
             rest.append((place.channel, token.sequence, token.stamp))
         return bodies, *zip(*rest, strict=True)
+
+    def _end_firings(self) -> None:
+        for place in self.places:
+            if place.firings is not None:
+                place.firings.end()
 
     def _own_channel(self, topic: str) -> int:
         number = self._own.get(topic)

@@ -97,6 +97,7 @@ class Allowed:
     threads: bool = False
     feeds: bool = False
     sources: bool = True
+    pairs: bool = False  # sources with several outputs
     start: bool = True
     failing_calls: bool = True
     sending: bool = False  # nodes send in every way there is, from plain code and async, which pauses or not
@@ -250,6 +251,7 @@ class _Making:
         sources = ["script", "Script"] + (["ascript"] if allowed.waiting else [])
         if allowed.sending:
             sources += _SPEAKING_SOURCES + (_SPEAKING_SOURCES_LATER if allowed.waiting else [])
+        sources += ["Pairs"] * 2 * allowed.pairs
         count = choose.number(2, allowed.max_nodes)
         inner, plain = self._inner_kinds(), self._plain_kinds()
         for number in range(count):
@@ -293,7 +295,7 @@ class _Making:
                 if kind == "ascript":
                     given["pause_s"] = choose.one_of([0.0, 0.004, 0.01])
                 return given
-            case "Script":
+            case "Script" | "Pairs":
                 return {"count": choose.number(0, 12 if self.allowed.plain else 5)}
             case _ if kind in (*_SPEAKING, *_PAUSING):
                 return self._speaking(kind)

@@ -40,6 +40,7 @@ __all__ = [
     "LendsLater",
     "Merge",
     "OnlyTwice",
+    "Pairs",
     "Parts",
     "Passing",
     "PassingLater",
@@ -484,6 +485,24 @@ class Script(hfg.Node):
         if self.at % self.every == 0:
             self.seen.trigger(self.at)
         self.out.send(self.at)
+
+
+class Pairs(hfg.Node):
+    """A source with two outputs: numbers up to `count` by one, their opposites by the other but for every third."""
+
+    out = hfg.Output(int)
+    rest = hfg.Output(int)
+    count = hfg.Parameter(3)
+    at = hfg.State(0)
+
+    def process(self) -> None:
+        """Send the next pair."""
+        if self.at >= self.count:
+            raise hfg.EndOfStream
+        self.at += 1
+        self.rest.send(-self.at)
+        if self.at % 3:
+            self.out.send(self.at)
 
 
 class Passing(hfg.Node):

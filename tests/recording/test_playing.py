@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +15,7 @@ from hfg.errors import UsageError
 from hfg.graph.flat import flatten
 from hfg.nodes.recordings import Playback
 from hfg.recording import play_into, record
+from hfg.recording.messages import Firings
 from hfg.testing import Recorder
 from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.nodes import Script, Tally, ascript, double, sink
@@ -52,12 +55,12 @@ def test_a_run_played_into_its_graph_is_the_same_on_every_edge(tmp_path: Path) -
     assert second.activity() == first.activity()
 
 
-def _outcome(graph: hfg.Graph, file: Path | None = None) -> tuple[Recorder, str]:
+def _outcome(graph: hfg.Graph, file: Path | None = None, clock: Any = "virtual") -> tuple[Recorder, str]:
     """Run it, and say how that went; a stall and an error are to be the same again, too."""
     seen = Recorder()
     begin = None if file is None else (lambda run: record(run, file, force=True))
     try:
-        hfg.run(graph, clock="virtual", trace=seen, begin=begin)
+        hfg.run(graph, clock=clock, trace=seen, begin=begin)
     except (hfg.errors.Stalled, hfg.errors.NodeError) as error:
         return seen, type(error).__name__
     return seen, "done"
@@ -94,6 +97,40 @@ def test_a_hundred_random_graphs_are_the_same_on_every_edge_when_they_are_played
     finally:
         logging.disable(logging.NOTSET)
     assert {seed: differs for seed, differs in found.items() if differs} == {}
+
+
+@pytest.mark.rule("F3", "F7")
+@pytest.mark.parametrize("speed", [None, 1.0], ids=["as fast as can be", "in its time"])
+def test_random_graphs_recorded_on_the_real_clock_send_the_same_when_they_are_played_back(
+    tmp_path: Path, speed: float | None
+) -> None:
+    logging.disable(logging.CRITICAL)
+    try:
+        found = {seed: _differs_on_the_real_clock(seed, tmp_path / "run.mcap", speed) for seed in range(60)}
+    finally:
+        logging.disable(logging.NOTSET)
+    assert {seed: differs for seed, differs in found.items() if differs} == {}
+
+
+def _differs_on_the_real_clock(seed: int, file: Path, speed: float | None) -> list[str]:
+    """Record a graph on the real clock and play it back; the edges that differ, but for stamps."""
+    plan = random_plan(seed, replace(SYNCHRONOUS, pairs=True, rates=False))
+    first, how = _outcome(plan.build(), file, clock="real")
+    graph = plan.build()
+    play_into(graph, file, speed=speed)
+    second, how_again = _outcome(graph)
+    found = [edge for edge in second.edges() if not _begin_alike(_sent(first, edge), _sent(second, edge))]
+    return [*found, *([] if how == how_again else [f"{how}, then {how_again}"])]
+
+
+def _begin_alike(first: list[Any], second: list[Any]) -> bool:
+    """A source that is given up, and one in a graph that stalls, may have come further once than again (F7)."""
+    both = min(len(first), len(second))
+    return first[:both] == second[:both]
+
+
+def _sent(seen: Recorder, edge: str) -> list[tuple[Any, int]]:
+    return [(token.value, token.activity) for token in seen.tokens(edge)]
 
 
 def test_silence_stamps_and_the_end_are_played_at_their_times(tmp_path: Path) -> None:
@@ -232,3 +269,163 @@ def test_a_type_that_no_longer_fits_names_port_and_value(tmp_path: Path) -> None
     play_into(graph, tmp_path / "run.mcap")
     with pytest.raises(hfg.errors.NodeError, match='"camera.out" in .* has the value 0, which is no str'):
         hfg.run(graph, clock="virtual")
+
+
+# --- firings ----------------------------------------------------------------------------------------------------------
+
+
+class Camera(hfg.Node):
+    """Sends a picture and its number; every third picture is silence, and the fifth is the last."""
+
+    image = hfg.Output(int)
+    number = hfg.Output(int)
+    count = hfg.State(0)
+
+    def process(self) -> None:
+        """Take one."""
+        if self.count == 5:
+            raise hfg.EndOfStream
+        self.count += 1
+        self.number.send(self.count)
+        if self.count % 3:
+            self.image.send(-self.count)
+
+
+@hfg.node
+def pair(image: int, number: int) -> str:
+    """Join the two."""
+    return f"{image} {number}"
+
+
+def two_outputs(name: str = "camera", kind: type[hfg.Node] = Camera) -> hfg.Graph:
+    """A source with two outputs and a join behind it."""
+    graph = hfg.Graph("two")
+    source, join = graph.add(kind(), name=name), graph.add(pair(), name="pair")
+    first, second = source.ports.outputs.values()
+    graph.connect(first, join.ports.inputs["image"])
+    graph.connect(second, join.ports.inputs["number"])
+    graph.connect(join.ports.outputs["out"], graph.output("out", str))
+    return graph
+
+
+PAIRS = ["-1 1", "-2 2", "-4 4", "-5 5"]
+
+
+@pytest.mark.rule("F3")
+@pytest.mark.parametrize("clock", ["real", "virtual"])
+@pytest.mark.parametrize("select", ["*", "camera"])
+def test_a_firing_of_a_source_with_two_outputs_is_one_firing_again(tmp_path: Path, clock: Any, select: str) -> None:
+    file = tmp_path / "run.mcap"
+    first = hfg.run(two_outputs(), clock=clock, begin=lambda run: record(run, file, select=select))
+    graph = two_outputs()
+    play_into(graph, file, speed=None)
+    second = hfg.run(graph)
+    assert first.outputs["out"] == second.outputs["out"] == PAIRS
+    assert second.nodes["camera"].firings == first.nodes["camera"].firings
+
+
+@pytest.mark.rule("F3")
+def test_a_recording_without_numbers_of_firings_is_played_by_the_order_of_its_tokens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "run.mcap"
+    monkeypatch.setattr("hfg.recording.messages.Firings.number", lambda self, path: 0)  # as version 1 had it
+    hfg.run(two_outputs(), begin=lambda run: record(run, file))
+    graph = two_outputs()
+    play_into(graph, file, speed=None)
+    assert hfg.run(graph).outputs["out"] == PAIRS
+
+
+class Mixed(Camera):
+    """A camera whose second picture is no data."""
+
+    image = hfg.Output(Any)
+
+    def process(self) -> None:
+        """Take one."""
+        if self.count == 5:
+            raise hfg.EndOfStream
+        self.count += 1
+        self.image.send(object() if self.count == 2 else -self.count)
+        self.number.send(self.count)
+
+
+@pytest.mark.rule("F3", "L2")
+def test_silence_stands_in_for_a_value_that_cannot_be_recorded_so_that_joins_stay_aligned(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = tmp_path / "run.mcap"
+    hfg.run(two_outputs(kind=Mixed), begin=lambda run: record(run, file, select="camera"))
+    graph = two_outputs()
+    playing = play_into(graph, file, speed=None)
+    report = hfg.run(graph)
+    assert report.outputs["out"] == ["-1 1", "-3 3", "-4 4", "-5 5"]
+    assert playing.gaps == ['1 tokens of "camera.image" are not in the recording: their values are no data']
+    assert report.errors == playing.warnings
+    assert playing.gaps[0] in caplog.text
+
+
+def test_firings_between_which_tokens_were_left_out_are_not_put_together() -> None:
+    firings = Firings()
+    assert [firings.number(port) for port in ("a", "b", "a", "b", "a")] == [1, 1, 2, 2, 3]
+    firings.end()  # there was no room for the rest of the third and the beginning of the fourth
+    assert [firings.number(port) for port in ("b", "a")] == [4, 4]
+    firings.end()
+    firings.end()
+    assert firings.number("a") == 5
+
+
+# --- other graphs -----------------------------------------------------------------------------------------------------
+
+
+class Webcam(hfg.Node):
+    """Another camera: its ports have other names."""
+
+    frame = hfg.Output(int)
+    index = hfg.Output(int)
+
+    def process(self) -> None:
+        """Open the device."""
+        raise AssertionError("the device is opened")
+
+
+def test_outputs_are_played_as_those_that_a_map_names(tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    hfg.run(two_outputs(), clock="virtual", begin=lambda run: record(run, file))
+    graph = two_outputs("front", Webcam)
+    playing = play_into(graph, file, ports={"camera.image": "front.frame", "camera.number": "front.index"})
+    assert playing.played == {"camera.image": "front.frame", "camera.number": "front.index"}
+    assert playing.recomputed == ["pair.out"]
+    assert playing.warnings == []
+    assert hfg.run(graph, clock="virtual").outputs["out"] == PAIRS
+
+
+def test_recorded_ports_and_sources_that_have_no_counterpart_are_reported(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file = tmp_path / "run.mcap"
+    hfg.run(two_outputs(), clock="virtual", begin=lambda run: record(run, file))
+    graph = two_outputs("front", Webcam)
+    graph.add(texts()) >> graph.add(read())
+    playing = play_into(graph, file, ports={"camera.image": "front.frame"})
+    assert playing.warnings == [
+        '"camera.number" was recorded, but the graph has no such port, so it is not played',
+        '"front.index" was not recorded, so it is silent',
+        'source "texts" was not recorded, so its own code runs',
+    ]
+    assert hfg.run(graph, clock="virtual").errors == playing.warnings
+    assert all(sentence in caplog.text for sentence in playing.warnings)
+    assert hfg.run(two_outputs(), clock="virtual").errors == []
+
+
+def test_ports_of_two_recorded_nodes_cannot_be_played_by_one(tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    graph = two_outputs()
+    graph.add(camera(), name="other") >> graph.add(show())
+    hfg.run(graph, clock="virtual", begin=lambda run: record(run, file))
+    with pytest.raises(UsageError, match='"camera" already, and the firings of one node come from one recorded node'):
+        play_into(two_outputs("front", Webcam), file, ports={"camera.image": "front.frame", "other.out": "front.index"})
+    with pytest.raises(UsageError, match='"camera.image" cannot be played as "pair.processed"'):
+        play_into(two_outputs(), file, ports={"camera.image": "pair.processed"})
+    with pytest.raises(UsageError, match='played to a port, and "pair" is none'):
+        play_into(two_outputs(), file, ports={"camera.image": "pair"})

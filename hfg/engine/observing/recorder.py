@@ -28,10 +28,20 @@ from hfg.engine.observing.taps import Taps
 from hfg.engine.rules.agenda import unblock
 from hfg.engine.runtime.engine import Engine
 from hfg.logs import Log
-from hfg.token import END, Marker, Token
+from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import TraceEvent
 
-__all__ = ["ITEM", "MOST_BYTES", "MOST_ITEMS", "Place", "Recorder", "RecordingThread", "RunRecording", "Told"]
+__all__ = [
+    "ITEM",
+    "MOST_BYTES",
+    "MOST_ITEMS",
+    "Place",
+    "Recorder",
+    "RecordingThread",
+    "RunRecording",
+    "TokensLeftOut",
+    "Told",
+]
 
 _LOGGER = Log("hfg.engine")
 
@@ -152,6 +162,7 @@ class Told(Token[Any], frozen=True):
       silent: the function was not run in this firing.
       last: `end()` has written it, or triggered it.
       waited: the firing waited, though no time passed.
+      refused: it stands in the place of a value that cannot be recorded, so that firings stay aligned.
     """
 
     began: float | None = None
@@ -160,6 +171,11 @@ class Told(Token[Any], frozen=True):
     silent: bool = False
     last: bool = False
     waited: bool = False
+    refused: bool = False
+
+
+class TokensLeftOut(TraceEvent, frozen=True):
+    """There was no room for the tokens that passed here."""
 
 
 class _Looker:
@@ -201,6 +217,7 @@ class Recorder(Listener):
         self._bytes_put = 0
         self._mark = _WAKE_AFTER
         self._full = False
+        self._left_out = False  # and nothing has been put since
         self._held: list[Worker] = []
         self._held_since: float | None = None
         self._room = threading.Event()
@@ -226,7 +243,7 @@ class Recorder(Listener):
           GraphError: there is no such path.
         """
         looker = _Looker(place)
-        put = self._look(place)
+        put = self._look(place, answers=getattr(what, "kind", "") == "output")
         if getattr(what, "kind", "") == "event":
             put = partial(self._signal, looker, put)
         elif getattr(getattr(what, "node", None), "_type", _NO_SOURCE).is_source:
@@ -280,13 +297,22 @@ class Recorder(Listener):
         """What has passed in a wave of a fused region."""
         if self._full:
             for place in items[::ITEM]:
-                place.left_out += 1
+                self._leave_out(place)
             return
         self._items.extend(items)
         if len(self._items) > self._mark:
             self._crowded()
 
-    def _look(self, place: Place) -> Callable[[Token[Any]], None]:
+    def _leave_out(self, place: Place) -> None:
+        """There is no room for a token."""
+        place.left_out += 1
+        if not self._left_out:
+            self._left_out = True
+            now = self._engine.now()
+            self._items.extend((None, TokensLeftOut(now), 0.0, 0, now))
+
+    def _look(self, place: Place, *, answers: bool) -> Callable[[Token[Any]], None]:
+        """Make what is called with each token; `answers`: each is a firing's, so silence stands in for one refused."""
         extend, items, sizes = self._items.extend, self._items, self._thread.sizes
         now = self._engine.now
         real = self._engine.epoch is not None
@@ -300,13 +326,13 @@ class Recorder(Listener):
 
         def put_if_there_is_room(token: Token[Any]) -> None:
             if self._full:
-                place.left_out += 1
+                self._leave_out(place)
             else:
                 put(token)
 
         def keep_and_put(token: Token[Any]) -> None:
             if self._full:
-                place.left_out += 1
+                self._leave_out(place)
                 return
             value = token.value
             if type(value) is not Marker:
@@ -315,10 +341,13 @@ class Recorder(Listener):
                 except Exception as error:
                     place.refused += 1
                     self.on_refused(place, error)
-                    return
-                token = replace(token, value=kept)
-                self._bytes_put += size
-                sizes.append(size)
+                    if not answers:
+                        return
+                    token = _told(replace(token, value=NO_MESSAGE), refused=True)
+                else:
+                    token = replace(token, value=kept)
+                    self._bytes_put += size
+                    sizes.append(size)
             extend((place, token, 0.0, 0, now()))
             if len(items) > self._mark or self._bytes_put - self._thread.bytes_taken > MOST_BYTES:
                 self._crowded()
@@ -384,7 +413,7 @@ class Recorder(Listener):
         """From the thread: it has taken something."""
         self._mark = _WAKE_AFTER
         if self._full and self._has_room():
-            self._full = False
+            self._full = self._left_out = False
         self._room.set()
         if self._held_since is not None and (self._has_room() or not self._thread.is_alive()):
             self._engine.from_any_thread(self._let_go)
