@@ -1,4 +1,4 @@
-"""Examples and the robot are recorded on the real clock for a short while and played back: their sources send the same."""
+"""Examples and the robot are recorded on the real clock for a short while and played back: sources send the same."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from hfg.cli.target import load_graph
 from hfg.recording import File, Playing, play_into
 
 ROOT = Path(__file__).resolve().parents[2]
-OF_SOUND_TIME = {"began", "call", "last", "sequence", "silent", "stamp", "time", "timestamp", "waited"}
+OF_TIME = {"began", "call", "last", "sequence", "silent", "stamp", "time", "timestamp", "waited"}
 DETERMINISTIC = ("hello", "word_count", "many_requests")
-"""Examples whose graphs are synchronous and whose nodes depend on their inputs alone: all that passes is the same (F7)."""
+"""Examples with synchronous graphs whose nodes depend on their inputs alone: everything that passes is the same (F7)."""
 
 EXAMPLES = (
     *DETERMINISTIC,
@@ -48,7 +48,7 @@ def passed(file: Path) -> dict[str, list[Any]]:
             message = json.loads(data)
             topic = recording.channels[number].topic
             if topic != "hfg/events":
-                what = {name: value for name, value in message.items() if name not in OF_SOUND_TIME}
+                what = {name: value for name, value in message.items() if name not in OF_TIME}
                 found.setdefault(message.get("port", topic), []).append(what)
     return found
 
