@@ -37,6 +37,14 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
     return report
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _caches_are_their_own(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, None]:
+    """Nothing is read from, or written to, the user's folder for caches."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 _LOGGERS = tuple(logging.getLogger(name) for name in (None, "hfg", "hfg.node", "hfg.graph"))
 
 

@@ -5,10 +5,12 @@
     offers          where node types may be: the standard library, installed packages, the project
     finding         imports those places and lists their types; what is broken is told and stops nobody
     searching       by words, by name, by category
+    keeping         the index of what is installed, in a file, so that a search imports nothing
     page            docs/nodes, written from the catalogue
 
 Stands on the node types' floor; knows neither graphs, runs nor the command line. Nothing is imported before it is asked
-for: `installed()` imports every place, `hfg.registry.find` one module.
+for: `installed()` imports every place, `installed_index()` only if something has changed, and `hfg.registry.find` one
+module.
 """
 
 from __future__ import annotations
@@ -22,21 +24,29 @@ from hfg.catalogue.describing import (
     undocumented,
 )
 from hfg.catalogue.finding import Catalogue, installed, types_of
+from hfg.catalogue.keeping import Kept, installed_index
 from hfg.catalogue.offers import Offer, offers
-from hfg.catalogue.searching import categories, named, search
+from hfg.catalogue.searching import Entry, Index, categories, index_of, named, near_words, ranked, search
 
 __all__ = [
     "Catalogue",
+    "Entry",
     "ErrorDescription",
+    "Index",
+    "Kept",
     "Offer",
     "ParameterDescription",
     "PortDescription",
     "TypeDescription",
     "categories",
     "describe_type",
+    "index_of",
     "installed",
+    "installed_index",
     "named",
+    "near_words",
     "offers",
+    "ranked",
     "search",
     "types_of",
     "undocumented",

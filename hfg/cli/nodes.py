@@ -1,6 +1,7 @@
 """`hfg nodes [WHAT]`: shows the catalogue of node types: a list by category, or a page for one type.
 
-Stands on the catalogue, `target` and `show`; what there is and what it is, the catalogue knows.
+Installed types are listed and searched by their index, which is kept in a file; for pages and JSON they are imported.
+Depends on the catalogue, `target` and `show`.
 """
 
 from __future__ import annotations
@@ -12,17 +13,19 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
 from hfg import catalogue
-from hfg.catalogue import Catalogue, ParameterDescription, TypeDescription
+from hfg.catalogue import Catalogue, Entry, Index, ParameterDescription, TypeDescription
 from hfg.cli import show
 from hfg.cli.target import import_from_here, load_module
 from hfg.errors import TargetError
 
 __all__ = ["nodes"]
+
+Listed = TypeVar("Listed", Entry, TypeDescription)
 
 _LIBRARY = "hfg.nodes"
 _WIDEST_NAME = 30
@@ -36,7 +39,7 @@ def nodes(
         typer.Argument(help="a module, a file.py, a family of the library, or one node type; without it, all there is"),
     ] = None,
     search: Annotated[
-        str | None, typer.Option("--search", "-s", help="Only those that speak of all these words, nearest first.")
+        str | None, typer.Option("--search", "-s", help="Only those that these words describe, best first.")
     ] = None,
     category: Annotated[str | None, typer.Option("--category", "-c", help="Only those of this category.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write all that is known of them as JSON.")] = False,
@@ -44,26 +47,56 @@ def nodes(
 ) -> int:
     """List node types, of a module or of all that is installed; of one type show its ports, parameters and text."""
     show.set_debug(debug)
+    if what is None and not json:
+        return _installed(search, category)
     found, is_one = _meant(what)
     for problem in found.problems:
         show.sentence(problem)
-    types = list(found.types)
-    if category is not None:
-        types = _of_category(types, category)
+    types = list(found.types) if category is None else _of_category(found.types, category)
     if search is not None:
-        types = catalogue.search(types, search)
+        chosen = catalogue.search(types, search)
+        if not chosen and not json:
+            return _nothing(catalogue.index_of(types), search)
+        types = chosen
     if json:
         show.json(types)
     elif is_one and types:
         sys.stdout.write("\n\n".join("\n".join(_page(one)) for one in types) + "\n")
     elif types:
         sys.stdout.write("\n".join(_list(types, by_category=search is None)) + "\n")
-    elif search is not None:
-        sys.stdout.write(f'no node type speaks of "{search}"\n')
-    elif what is None:
-        sys.stdout.write("no node types are installed; name a module or a file: hfg nodes robot.py\n")
     else:
         sys.stdout.write(f"no node types in {what}\n")
+    return 0
+
+
+def _installed(search: str | None, category: str | None) -> int:
+    """List what is installed, from its index: nothing has to be imported."""
+    kept = catalogue.installed_index()
+    for problem in kept.problems:
+        show.sentence(problem)
+    entries = kept.index.entries
+    if search is not None:
+        found = [entries[number] for number in catalogue.ranked(kept.index, search)]
+        if not found:
+            return _nothing(kept.index, search)
+        # a category that does not exist is reported by what exists, not by what was found
+        known = entries if category is None else _of_category(entries, category)
+        entries = [one for one in found if one in known]
+    elif category is not None:
+        entries = _of_category(entries, category)
+    if entries:
+        sys.stdout.write("\n".join(_list(entries, by_category=search is None)) + "\n")
+    elif search is not None:
+        sys.stdout.write(f'no node type of the category "{category}" matches "{search}"\n')
+    else:
+        sys.stdout.write("no node types are installed; name a module or a file: hfg nodes robot.py\n")
+    return 0
+
+
+def _nothing(index: Index, search: str) -> int:
+    near = catalogue.near_words(index, search)
+    hint = f"; search for {' or '.join(near)}?" if near else "; hfg nodes lists all"
+    sys.stdout.write(f'no node type matches "{search}"{hint}\n')
     return 0
 
 
@@ -131,7 +164,7 @@ def _only_named(found: Catalogue, what: str, name: str) -> Catalogue:
     return Catalogue(tuple(types))
 
 
-def _of_category(types: Sequence[TypeDescription], category: str) -> list[TypeDescription]:
+def _of_category(types: Iterable[Listed], category: str) -> list[Listed]:
     found = catalogue.categories(types)
     wanted = next((name for name in found if name.lower() == category.lower()), None)
     if wanted is None:
@@ -148,7 +181,7 @@ def _width() -> int:
     return max(_NARROWEST, min(columns, _WIDEST) if sys.stdout.isatty() else _WIDEST)
 
 
-def _list(types: Iterable[TypeDescription], *, by_category: bool) -> Iterator[str]:
+def _list(types: Iterable[Listed], *, by_category: bool) -> Iterator[str]:
     """Show a line for each type; what was searched for is in the order of how near it is."""
     if not by_category:
         yield from _rows([(one.reference, one.summary) for one in types], "")
@@ -162,7 +195,7 @@ def _list(types: Iterable[TypeDescription], *, by_category: bool) -> Iterator[st
         yield from _rows(group, "  ")
 
 
-def _title(category: str, described: TypeDescription) -> str:
+def _title(category: str, described: Entry | TypeDescription) -> str:
     """Name a type in the list of its category; what is not of the library by its reference."""
     in_family = described.module == f"{_LIBRARY}.{category}" or described.module.startswith(f"{_LIBRARY}.{category}.")
     return described.title if in_family else described.reference

@@ -29,13 +29,13 @@ import msgspec
 from hfg import catalogue
 from hfg.testing.trying import NotUsable, Trial, try_type
 
-__all__ = ["main", "try_all"]
+__all__ = ["HEAP", "death", "main", "references_of", "try_all"]
 
 _MEMORY_BYTES: Final = 12 << 30  # of addresses, most of which libraries only reserve
 _FILE_BYTES: Final = 64 << 20
 _SUSPECTS: Final = 20
 _STOPPED: Final = "did not come back within"
-_HEAP: Final = (
+HEAP: Final = (
     {"MALLOC_CHECK_": "3", "LD_PRELOAD": "libc_malloc_debug.so.0"} if platform.libc_ver()[0] == "glibc" else {}
 )
 """Lets glibc look after each block that is given back, so that who writes beyond one is stopped while it does it."""
@@ -126,7 +126,7 @@ def _process(references: Sequence[str], how: _How) -> tuple[list[Trial], str]:
         subprocess.Popen(
             command,
             cwd=folder,
-            env={**os.environ, **_HEAP, "PYTHONPATH": os.pathsep.join(one or os.getcwd() for one in sys.path)},  # noqa: PTH109
+            env={**os.environ, **HEAP, "PYTHONPATH": os.pathsep.join(one or os.getcwd() for one in sys.path)},  # noqa: PTH109
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=told,
@@ -159,7 +159,7 @@ def _process(references: Sequence[str], how: _How) -> tuple[list[Trial], str]:
 def _end(code: int, told: str, how: _How) -> str:
     if code == -signal.SIGXCPU:
         return f"{_STOPPED} {how.limit_s:g} s of processor time"
-    return _death(code, told)
+    return death(code, told)
 
 
 def _read(process: subprocess.Popen[str], lines: queue.Queue[str]) -> None:
@@ -169,7 +169,8 @@ def _read(process: subprocess.Popen[str], lines: queue.Queue[str]) -> None:
     lines.put("")
 
 
-def _death(code: int, told: str) -> str:
+def death(code: int, told: str) -> str:
+    """Say how a process ended, by its exit code and the last line that it wrote."""
     last = next((line for line in reversed(told.splitlines()) if line.strip()), "")
     if code < 0:
         name = signal.Signals(-code).name if -code in {one.value for one in signal.Signals} else str(-code)
@@ -216,7 +217,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.worker:
         _work(_How(given.firings, given.seed, given.limit))
         return 0
-    references, problems = _references(given.what)
+    references, problems = references_of(given.what)
     trials = try_all(references, firings=given.firings, seed=given.seed, limit_s=given.limit, processes=given.processes)
     if given.json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(trials), indent=2).decode() + "\n")
@@ -228,7 +229,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(bool(problems) or usable < len(trials))
 
 
-def _references(what: Sequence[str]) -> tuple[list[str], list[str]]:
+def references_of(what: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the references of what is named, else of all that is installed; and a sentence for each broken place."""
     found = [catalogue.installed()] if not what else []
     found += [catalogue.types_of(one) for one in what if ":" not in one]
     references: dict[str, Any] = dict.fromkeys(one.reference for each in found for one in each.types)

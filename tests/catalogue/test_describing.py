@@ -10,7 +10,7 @@ import pytest
 from annotated_types import Interval, Len, MultipleOf, Predicate, Unit
 
 import hfg
-from hfg.catalogue import TypeDescription, categories, describe_type, named, search, undocumented
+from hfg.catalogue import TypeDescription, categories, describe_type, named, undocumented
 from hfg.catalogue.documentation import read_documentation
 
 
@@ -160,28 +160,6 @@ def test_limits_of_all_kinds_have_words() -> None:
 @pytest.fixture
 def types() -> list[TypeDescription]:
     return [describe_type(one) for one in (scale, Door)]
-
-
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        ("scale", ["scale"]),
-        ("MULTIPLY factor", ["scale"]),
-        ("csapex::scale", ["scale"]),
-        ("arithmetic", ["scale"]),
-        ("how", ["scale", "door"]),
-        ("door", ["door"]),
-        ("stands open", ["door"]),
-        ("nowhere", []),
-        ("scale nowhere", []),
-    ],
-)
-def test_types_are_found_by_words(types: list[TypeDescription], words: str, names: list[str]) -> None:
-    assert [one.name for one in search(types, words)] == names
-
-
-def test_a_word_in_the_name_is_nearer_than_one_in_the_text(types: list[TypeDescription]) -> None:
-    assert next(one.name for one in search(reversed(types), "a")) == "scale"
 
 
 @pytest.mark.parametrize(

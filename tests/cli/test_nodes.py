@@ -131,9 +131,22 @@ def test_words_and_categories_choose(lamps: Command) -> None:
         "the",
         "light.",
     ]
-    assert lamps("nodes", "lamps", "-s", "nothing like it").out == 'no node type speaks of "nothing like it"\n'
+    assert lamps("nodes", "lamps", "-s", "lght").out == 'no node type matches "lght"; search for light?\n'
+    assert lamps("nodes", "lamps", "-s", "xyzzy").out == 'no node type matches "xyzzy"; hfg nodes lists all\n'
     assert lamps("nodes", "lamps", "--category", "LAMPS").out == lamps("nodes", "lamps").out
     assert json.loads(lamps("nodes", "lamps", "--json", "-s", "zebra").out) == []
+
+
+def test_a_search_of_all_that_is_installed_lists_the_best_first(command: Command) -> None:
+    shown = command("nodes", "--search", "webcam")
+    assert (shown.code, shown.err) == (0, "")
+    assert shown.out.startswith("hfg.nodes.video:Camera ")
+    assert command("nodes", "--search", "webcam", "-c", "VIDEO").out.startswith("hfg.nodes.video:Camera ")
+    assert command("nodes", "--search", "webcam", "-c", "logic").out == (
+        'no node type of the category "logic" matches "webcam"\n'
+    )
+    assert command("nodes", "--search", "xylofone").out.startswith('no node type matches "xylofone"')
+    assert command("nodes", "--search", "webcam", "-c", "zebra").code == 2
 
 
 def test_a_family_and_a_type_of_the_library_have_short_names(command: Command) -> None:
@@ -152,12 +165,13 @@ def test_without_a_module_all_that_is_installed_is_listed_and_what_is_broken_tol
 ) -> None:
     Path("here.py").write_text(LAMPS, encoding="utf-8")
     monkeypatch.syspath_prepend(Path.cwd())
-    monkeypatch.setattr("hfg.catalogue.finding.offers", lambda: ())
+    offered: list[catalogue.Offer] = []
+    for module in ("finding", "keeping"):
+        monkeypatch.setattr(f"hfg.catalogue.{module}.offers", lambda: tuple(offered))
     assert command("nodes") == Shown(
         0, "no node types are installed; name a module or a file: hfg nodes robot.py\n", ""
     )
-    two = (catalogue.Offer("nowhere", "", "somebody"), catalogue.Offer("here"))
-    monkeypatch.setattr("hfg.catalogue.finding.offers", lambda: two)
+    offered += [catalogue.Offer("nowhere", "", "somebody"), catalogue.Offer("here")]
     shown = command("nodes")
     assert shown.code == 0
     assert "here:dim" in shown.out
