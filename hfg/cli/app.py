@@ -16,7 +16,24 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hfg.cli import agent, check, convert, draw, info, keys, new, nodes, play, record, run, runs, show, tap, top
+from hfg.cli import (
+    agent,
+    check,
+    convert,
+    draw,
+    info,
+    keys,
+    new,
+    nodes,
+    play,
+    record,
+    recover,
+    run,
+    runs,
+    show,
+    tap,
+    top,
+)
 from hfg.cli.interrupt import Interrupt
 from hfg.errors import FileError, HfgError, TargetError
 
@@ -38,6 +55,7 @@ app.command("tap")(tap.tap)
 app.command("record")(record.record)
 app.command("play")(play.play)
 app.command("info")(info.info)
+app.command("recover")(recover.recover)
 app.command("top")(top.top)
 app.command("agent")(agent.agent)
 app.command("deploy")(runs.deploy)

@@ -11,9 +11,9 @@ import typer
 from hfg.cli import show
 from hfg.engine.observing.tables import table
 from hfg.errors import TargetError, UsageError
-from hfg.recording import File, RecordingInfo
+from hfg.recording import File, Loss, RecordingInfo
 
-__all__ = ["info"]
+__all__ = ["info", "told_losses"]
 
 
 def info(
@@ -34,7 +34,7 @@ def info(
 
 
 def _lines(found: RecordingInfo) -> list[str]:
-    whole = "whole" if found.whole else "cut off: what came behind its last chunk is lost"
+    whole = _state(found)
     lines = [f"{found.path}: {found.bytes / 1e6:.3f} MB, {found.duration_s:.3f} s, {whole}"]
     if found.graph:
         outcome = f", {found.outcome}" if found.outcome else ""
@@ -53,4 +53,20 @@ def _lines(found: RecordingInfo) -> list[str]:
     ]
     if found.held_s:
         lines.append(f"nodes waited {found.held_s:.3f} s for the recording")
+    return lines + told_losses(found.losses)
+
+
+def _state(found: RecordingInfo) -> str:
+    if not found.whole:
+        return "cut off, or its end is damaged: hfg recover makes a complete file of what is there"
+    return "damaged, see below" if found.losses else "whole"
+
+
+def told_losses(losses: list[Loss]) -> list[str]:
+    """Say what is lost, in lines; the last one sums it up if there are several."""
+    lines = [f"damaged: {one}" for one in losses]
+    if len(losses) > 1:
+        known = sum(one.messages or 0 for one in losses)
+        least = "at least " if any(one.messages is None for one in losses) else ""
+        lines.append(f"lost in all: {least}{known:,} message{'s' * (known != 1)}")
     return lines

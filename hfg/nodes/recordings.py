@@ -14,7 +14,7 @@ from hfg.errors import UsageError
 from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node
 from hfg.ports import Event, Output, Parameter
-from hfg.recording.players import Player
+from hfg.recording.players import Player, tell_losses
 from hfg.recording.reading import File
 from hfg.recording.tracks import Track, recorded_ports
 
@@ -56,6 +56,7 @@ class Playback(Node):
         names = {port: "signal" if known[port].metadata.get("kind") == "event" else "out"}
         track = Track(self._recording, {port: Any}, may_pickle=False)
         self._player = Player(self, track, names, self.speed or None)
+        tell_losses(self._player, self._recording)
 
     def ready(self) -> bool:
         """Whether the next token is due."""

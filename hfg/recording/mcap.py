@@ -68,6 +68,7 @@ class Writer:
 
     def __init__(self, stream: BinaryIO, *, library: str, profile: str = "") -> None:
         self._stream = stream
+        self._checksum = 0
         self.bytes_written = 0
         self.chunk_bytes = 0
         self.chunk_messages = 0
@@ -175,7 +176,7 @@ class Writer:
         if self._new:  # channels on which nothing passed
             self._write(b"".join(self._new))
             self._new.clear()
-        self._write(_record(_DATA_END, struct.pack("<I", 0)))
+        self._write(_record(_DATA_END, struct.pack("<I", self._checksum)))
         start = self.bytes_written
         groups = (
             (_SCHEMA, self._schemas),
@@ -225,6 +226,7 @@ class Writer:
 
     def _write(self, data: bytes) -> None:
         self._stream.write(data)
+        self._checksum = zlib.crc32(data, self._checksum)
         self.bytes_written += len(data)
 
 

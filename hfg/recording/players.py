@@ -15,15 +15,18 @@ import msgspec
 
 from hfg.engine.model.worker import UNREADY
 from hfg.engine.rules.agenda import unblock
-from hfg.errors import EndOfStream
+from hfg.errors import EndOfStream, HfgError, UsageError
 from hfg.graph.structure.level import level_of
+from hfg.logs import Log
 from hfg.nodetype import Node
+from hfg.recording.reading import File, Loss
 from hfg.recording.tracks import Record, Step, Track
 from hfg.token import NO_MESSAGE
 
-__all__ = ["Player"]
+__all__ = ["Player", "tell_losses"]
 
 _SAME_MOMENT_S: Final = 1e-9
+_LOGGER: Final = Log("hfg.recording")
 
 
 class Player:
@@ -220,6 +223,21 @@ class Player:
         token = signal.token
         port = self._node._port("event", self._outputs[signal.port])
         port.trigger(token.value, activity=token.activity, stamp=token.stamp)
+
+
+def tell_losses(player: Player, file: File) -> None:
+    """Log what of a recording cannot be read, when it is met, and put it into the report of the run: each once."""
+    told: list[HfgError] = [] if player.engine is None else player.engine.core.errors
+
+    def tell(loss: Loss) -> None:
+        error = UsageError(f"{file.path} is damaged: {loss}")
+        if all(str(one) != str(error) for one in told):
+            told.append(error)
+            _LOGGER.warning("%s", error)
+
+    for loss in file.losses_met():
+        tell(loss)
+    file.when_lost = tell
 
 
 _GRACE_S: Final = 2e-9

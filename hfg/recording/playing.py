@@ -70,8 +70,8 @@ def _spoke(file: File) -> tuple[set[str], set[str]]:
             found.add(file.channels[number].topic)
             if _BESIDE in data:
                 beside.add(file.channels[number].topic)
-        elif file.channels:
-            found.add(msgspec.json.decode(data)["port"])
+        else:
+            found.add(str(file.object_in(data).get("port")))
     return found, beside
 
 
@@ -234,7 +234,7 @@ def play_into(
 def _gaps(recording: File) -> list[str]:
     """What the recording does not hold, though it passed."""
     info = recording.info()
-    found = [] if info.whole else [f"the recording {info.path} was cut off; it is played up to its last whole chunk"]
+    found = [f"{info.path} is damaged: {loss}" for loss in info.losses]
     left_out = [(port, count, "there was no time for them") for port, count in info.left_out.items()]
     refused = [(port, count, "their values are no data") for port, count in info.refused.items()]
     return found + [

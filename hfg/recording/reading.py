@@ -1,39 +1,59 @@
-"""Reading recordings, also those that were cut off: chunk by chunk, so that no file is too long.
+"""Reading recordings, also those that are damaged or were cut off: chunk by chunk, so that no file is too long.
 
-A file that its writer has not finished has no summary; it is read up to the last chunk that is whole. Stands on the
-package `mcap` for the format's records.
+A chunk that cannot be read costs what was in it, and nothing else; what that was is told (rule L4). Stands on `layout`
+and `chunks`.
 """
 
 from __future__ import annotations
 
 import os
-import struct
-from collections import Counter
-from collections.abc import Iterator, Mapping
-from functools import lru_cache
-from io import BytesIO
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Any, BinaryIO, Final
 
 import msgspec
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, Metadata, Schema
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Channel, Schema
 
 from hfg.errors import UsageError
+from hfg.recording.chunks import Content, Damaged, content_of, unpacked
+from hfg.recording.layout import Layout, read_record
 from hfg.recording.mcap import MAGIC
 from hfg.recording.messages import EVENTS, MARKERS
 
-__all__ = ["File", "PortInfo", "RawMessage", "RecordingInfo"]
+__all__ = ["RECOVERED", "File", "Loss", "PortInfo", "RawMessage", "RecordingInfo", "number_in"]
 
-_HEAD: Final = struct.Struct("<BQ")
-_MESSAGE: Final = struct.Struct("<HIQQ")
 _KEPT_CHUNKS: Final = 8
-_LONGEST: Final = 4 * 2**30
+_KEPT_BYTES: Final = 64 * 2**20
+_MOST_TOLD: Final = 100
+RECOVERED: Final = "hfg:recovered"
+"""The metadata in which a recovered file says what it lacks."""
 
 RawMessage = tuple[int, int, bytes]
 """Channel, nanoseconds, data."""
+
+
+class Loss(msgspec.Struct):
+    """What of a recording cannot be read.
+
+    Attributes:
+      what: and why, as a sentence without an end.
+      messages: how many are lost; None: nobody knows.
+      first_s: time of the first of them; None: nobody knows.
+      last_s: time of the last.
+    """
+
+    what: str
+    messages: int | None = 0
+    first_s: float | None = None
+    last_s: float | None = None
+
+    def __str__(self) -> str:
+        """Say it."""
+        if self.messages is None:
+            return f"{self.what}; how many messages are lost by that is not known"
+        when = "" if self.first_s is None else f", from {self.first_s:.3f} s to {self.last_s:.3f} s"
+        return f"{self.what}; {_messages(self.messages)} lost{when}" if self.messages else self.what
 
 
 class PortInfo(msgspec.Struct):
@@ -61,6 +81,7 @@ class RecordingInfo(msgspec.Struct):
 
     Attributes:
       whole: its writer has finished it; else it was cut off, and ends with its last whole chunk.
+      losses: what in it cannot be read, and what a file that was recovered has lost before.
       graph: the name of the graph; empty if hfg did not write it.
       clock: "real" or "virtual".
       began: of the run, on its clock.
@@ -90,6 +111,7 @@ class RecordingInfo(msgspec.Struct):
     refused: dict[str, int]
     ports: list[PortInfo]
     commands: str
+    losses: list[Loss] = []
 
 
 class File:
@@ -101,6 +123,7 @@ class File:
       channels: by number.
       schemas: by number.
       metadata: by name; of several of one name the last.
+      when_lost: is told of each chunk that cannot be read, when it is met.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -110,24 +133,32 @@ class File:
           UsageError: there is no such file, or it is no MCAP file.
         """
         self.path = Path(path)
-        self.whole = False
-        self.library = ""
-        self.channels: dict[int, Channel] = {}
-        self.schemas: dict[int, Schema] = {}
-        self.metadata: dict[str, Mapping[str, str]] = {}
-        self._chunks: list[tuple[int, int]] = []  # where each lies, and how long it is
+        self._kept: OrderedDict[int, Content] = OrderedDict()
+        self._lost: dict[int, Loss] = {}  # by number of the piece
+        self.when_lost: Callable[[Loss], object] = _nobody
         try:
             self._stream: BinaryIO = self.path.open("rb")
-        except OSError as error:
-            raise UsageError(f"the recording {path} cannot be opened: {error.strerror}") from None
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise UsageError(f"the recording {path} cannot be opened: {why}") from None
         try:
             if self._stream.read(len(MAGIC)) != MAGIC:
                 raise UsageError(f"{path} is no MCAP file: hfg record writes them, and so do many other programs")
-            self._scan()
+            self.layout = Layout(self._stream, os.fstat(self._stream.fileno()).st_size)
+        except OSError as error:
+            self._stream.close()
+            raise UsageError(f"the recording {path} cannot be read: {error.strerror}") from None
         except BaseException:
             self._stream.close()
             raise
-        self._read_chunk = lru_cache(_KEPT_CHUNKS)(self._read_chunk_now)
+        self.whole = self.layout.whole
+        self.library = self.layout.library
+        self.channels: dict[int, Channel] = self.layout.channels
+        self.schemas: dict[int, Schema] = self.layout.schemas
+        self.metadata: dict[str, dict[str, str]] = self.layout.metadata
+        if self.layout.statistics is None:  # what chunks declare is to be read
+            for number in range(len(self.layout.pieces)):
+                self._content(number)
 
     def close(self) -> None:
         """Read no more."""
@@ -139,12 +170,23 @@ class File:
     def __exit__(self, *exc_info: object) -> None:
         self.close()
 
+    def contents(self) -> Iterator[Content]:
+        """Go through the chunks that can be read."""
+        for number in range(len(self.layout.pieces)):
+            content = self._content(number)
+            if content is not None:
+                yield content
+
     def messages(self, channels: frozenset[int] | None = None) -> Iterator[RawMessage]:
-        """Go through all messages, or those of some channels, in the order in which they were written."""
-        for number in range(len(self._chunks)):
-            for message in self._read_chunk(number):
-                if channels is None or message[0] in channels:
-                    yield message
+        """Go through all messages, or those of some channels, in the order in which they were written.
+
+        What cannot be read is left out; `losses` tells of it.
+        """
+        wanted = self.channels if channels is None else channels
+        for content in self.contents():
+            for message in content.messages():
+                if message.channel in wanted:
+                    yield message.channel, message.log_time, message.data
 
     def numbers_of(self, topic: str) -> frozenset[int]:
         """Give the channels of one topic."""
@@ -153,23 +195,36 @@ class File:
     def began(self) -> float:
         """When its graph began to move, on its clock; when the recording did if that was later."""
         for _, _, data in self.messages(self.numbers_of(EVENTS)):
-            event = msgspec.json.decode(data)
+            event = self.object_in(data)
             if event.get("type") == "RunStarted":
-                return float(event["time"])
+                return number_in(event.get("time"))
             break
-        return float(self.metadata.get("hfg", {}).get("began", 0.0))
+        return number_in(self._about().get("began", 0.0))
+
+    def object_in(self, data: bytes) -> dict[str, Any]:
+        """Decode a message of hfg's own.
+
+        Raises:
+          UsageError: it is none.
+        """
+        try:
+            found = msgspec.json.decode(data)
+        except (msgspec.DecodeError, RecursionError, ValueError) as error:
+            raise UsageError(f"{self.path} is damaged: a message in it is no JSON ({error})") from None
+        if not isinstance(found, dict):
+            raise UsageError(f"{self.path} is damaged: a message in it is no object but {str(found)[:40]!r}")
+        return found
+
+    def losses(self) -> list[Loss]:
+        """Say what cannot be read; all of the file is looked at."""
+        return self._count()[1]
 
     def info(self) -> RecordingInfo:
         """Say what is known of it; all messages are counted."""
-        counts: Counter[int] = Counter()
-        first = last = None
-        for number in range(len(self._chunks)):
-            for channel, when, _ in self._read_chunk(number):
-                counts[channel] += 1
-                first = when if first is None else min(first, when)
-                last = when if last is None else max(last, when)
-        duration = ((last or 0) - (first or 0)) / 1e9
-        about, ended = self.metadata.get("hfg", {}), self.metadata.get("hfg:end", {})
+        seen, losses = self._count()
+        counts = seen.counts
+        duration = (seen.last - seen.first) / 1e9 if seen.counts else 0.0
+        about, ended = self._about(), self.metadata.get("hfg:end", {})
         return RecordingInfo(
             path=str(self.path),
             bytes=self.path.stat().st_size,
@@ -177,22 +232,26 @@ class File:
             library=self.library,
             graph=about.get("graph", ""),
             clock=about.get("clock", ""),
-            began=self.began() if about else (first or 0) / 1e9,
+            began=self.began() if about else seen.first / 1e9,
             duration_s=duration,
             outcome=ended.get("outcome", ""),
-            chunks=len(self._chunks),
+            chunks=len(self.layout.pieces),
             messages=sum(counts.values()),
             markers=sum(counts[number] for number, one in self.channels.items() if one.topic == MARKERS),
-            held_s=float(ended.get("held_s", 0.0)),
-            left_out=msgspec.json.decode(ended.get("left_out", "{}")),
-            refused=msgspec.json.decode(ended.get("refused", "{}")),
+            held_s=number_in(ended.get("held_s", 0.0)),
+            left_out=_counts(ended.get("left_out", "{}")),
+            refused=_counts(ended.get("refused", "{}")),
             ports=[
                 self._port(number, counts[number], duration)
                 for number, one in self.channels.items()
                 if one.topic not in (MARKERS, EVENTS)
             ],
             commands=about.get("commands", ""),
+            losses=losses,
         )
+
+    def _about(self) -> Mapping[str, str]:
+        return self.metadata.get("hfg", {})
 
     def _port(self, number: int, count: int, duration: float) -> PortInfo:
         channel = self.channels[number]
@@ -202,77 +261,118 @@ class File:
         name = schema.name if schema is not None else ""
         return PortInfo(channel.topic, about.get("kind", ""), about.get("type", ""), name, count, rate)
 
-    # --- the format ---------------------------------------------------------------------------------------------------
+    # --- what cannot be read ------------------------------------------------------------------------------------------
 
-    def _scan(self) -> None:
-        """Find where everything lies; what is not whole at the end does not count."""
-        stream, size = self._stream, self.path.stat().st_size
-        at = len(MAGIC)
-        while at + _HEAD.size <= size:
-            stream.seek(at)
-            opcode, length = _HEAD.unpack(stream.read(_HEAD.size))
-            begin, at = at + _HEAD.size, at + _HEAD.size + length
-            if at > size or length > _LONGEST:
-                break
-            if opcode == Opcode.CHUNK:
-                self._chunks.append((begin, length))
-            elif opcode in _DECLARE:
-                self._declare(opcode, stream.read(length))
-            elif opcode == Opcode.FOOTER:
-                self.whole = stream.read(len(MAGIC) + length)[length:] == MAGIC
-                break
-        if not self.whole:
-            self._use_whole_chunks()
+    def _count(self) -> tuple[_Seen, list[Loss]]:
+        """Look at all of the file."""
+        seen = _Seen()
+        for content in self.contents():
+            for channel, _, when, _, _ in content.messages():
+                if channel in self.channels:
+                    seen.take(channel, when)
+                else:
+                    seen.orphans += 1
+        return seen, self._losses(seen)
 
-    def _use_whole_chunks(self) -> None:
-        """Without a summary, what chunks say themselves is to be read; behind the first that is damaged nothing is."""
-        for number in range(len(self._chunks)):
-            try:
-                self._read_chunk_now(number)
-            except Exception:  # whatever its bytes do to whom
-                del self._chunks[number:]
-                return
-
-    def _declare(self, opcode: int, data: bytes) -> None:
-        stream = ReadDataStream(BytesIO(data))
-        try:
-            if opcode == Opcode.HEADER:
-                self.library = Header.read(stream).library
-            elif opcode == Opcode.SCHEMA:
-                schema = Schema.read(stream)
-                self.schemas[schema.id] = schema
-            elif opcode == Opcode.CHANNEL:
-                channel = Channel.read(stream)
-                self.channels[channel.id] = channel
-            else:
-                found = Metadata.read(stream)
-                self.metadata[found.name] = found.metadata
-        except Exception as error:  # the package raises what its bytes lead it to
-            raise UsageError(f"{self.path} is damaged: a record in it cannot be read ({error})") from None
-
-    def _read_chunk_now(self, number: int) -> list[RawMessage]:
-        begin, length = self._chunks[number]
-        self._stream.seek(begin)
-        chunk = Chunk.read(ReadDataStream(BytesIO(self._stream.read(length))))
-        try:
-            stream, _ = get_chunk_data_stream(chunk, validate_crc=True)
-        except Exception as error:
-            if not self.whole:
-                raise
-            raise UsageError(f"{self.path} is damaged: chunk {number + 1} cannot be read ({error})") from None
-        content = stream._stream.getvalue()  # type: ignore[attr-defined]  # faster than record by record
-        found: list[RawMessage] = []
-        at, end = 0, len(content)
-        while at < end:
-            opcode, size = _HEAD.unpack_from(content, at)
-            at += _HEAD.size
-            if opcode == Opcode.MESSAGE:
-                channel, _, when, _ = _MESSAGE.unpack_from(content, at)
-                found.append((channel, when, content[at + _MESSAGE.size : at + size]))
-            elif opcode in _DECLARE:
-                self._declare(opcode, content[at : at + size])
-            at += size
+    def losses_met(self) -> list[Loss]:
+        """Say what could not be read as far as the file was looked at."""
+        faults = [Loss(f"at byte {at:,}: {why}") for at, why in self.layout.faults]
+        if faults and not self.layout.ended:
+            faults[-1].messages = None
+        found = self._recovered() + faults[-_MOST_TOLD:] + [self._lost[one] for one in sorted(self._lost)]
+        if len(faults) > _MOST_TOLD:
+            found.append(Loss(f"{len(faults) - _MOST_TOLD} more places are damaged"))
         return found
 
+    def _losses(self, seen: _Seen) -> list[Loss]:
+        found = self.losses_met()
+        if seen.orphans:
+            found.append(Loss("the descriptions of some ports cannot be read", seen.orphans))
+        if found:
+            return found
+        statistics = self.layout.statistics
+        if not self.layout.keeps_its_checksum():
+            return [Loss("something outside of its chunks is damaged, so what it says about itself may be wrong")]
+        if statistics is not None and statistics.message_count != sum(seen.counts.values()):
+            found.append(
+                Loss(f"its summary tells of {_messages(statistics.message_count)}, and another number is there")
+            )
+        return found
 
-_DECLARE: Final = frozenset({Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA})
+    def _recovered(self) -> list[Loss]:
+        """What was lost before the file was recovered."""
+        said = self.metadata.get(RECOVERED, {}).get("losses", "[]")
+        try:
+            return msgspec.json.decode(said, type=list[Loss])
+        except (msgspec.DecodeError, RecursionError):
+            return [Loss("what was lost before it was recovered cannot be read", None)]
+
+    def _content(self, number: int) -> Content | None:
+        """Read a chunk; None if it cannot be, which is noted."""
+        if number in self._lost:
+            return None
+        kept = self._kept.get(number)
+        if kept is not None:
+            self._kept.move_to_end(number)
+            return kept
+        piece = self.layout.pieces[number]
+        try:
+            record = self.layout.content(piece.begin, piece.length)
+            content = content_of(unpacked(record) if piece.is_chunk else record, self._declare)
+        except Damaged as error:
+            self._lost[number] = loss = self._loss(number, str(error))
+            self.when_lost(loss)
+            return None
+        self._kept[number] = content
+        while len(self._kept) > _KEPT_CHUNKS or (
+            len(self._kept) > 1 and sum(len(one.data) for one in self._kept.values()) > _KEPT_BYTES
+        ):
+            self._kept.popitem(last=False)
+        return content
+
+    def _loss(self, number: int, why: str) -> Loss:
+        piece = self.layout.pieces[number]
+        count, first, last = self.layout.lost_in(piece)
+        times = (None, None) if first is None or last is None or not count else (first / 1e9, last / 1e9)
+        return Loss(f"chunk {number + 1} of {len(self.layout.pieces)} cannot be read: {why}", count, *times)
+
+    def _declare(self, opcode: int, data: bytes) -> None:
+        self.layout.declare(read_record(opcode, data))
+
+
+class _Seen:
+    """What messages there are."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[int] = Counter()
+        self.first = self.last = 0
+        self.orphans = 0
+
+    def take(self, channel: int, when: int) -> None:
+        if not self.counts:
+            self.first = self.last = when
+        self.counts[channel] += 1
+        self.first, self.last = min(self.first, when), max(self.last, when)
+
+
+def _nobody(_loss: Loss) -> None:
+    pass
+
+
+def _messages(count: int) -> str:
+    return f"{count:,} message{'s' * (count != 1)}"
+
+
+def number_in(said: object) -> float:
+    """Give the number that a file says; 0 where it says something else."""
+    try:
+        return float(said)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return 0.0
+
+
+def _counts(said: str) -> dict[str, int]:
+    try:
+        return msgspec.json.decode(said, type=dict[str, int])
+    except (msgspec.DecodeError, RecursionError):
+        return {}

@@ -9,15 +9,14 @@ Stands on `reading` and `messages`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
-from hfg.errors import UsageError
+from hfg.errors import HfgError, UsageError, in_words
 from hfg.ports.automatic import sent_of
 from hfg.recording.messages import EVENTS, MARKERS, TokenReader
-from hfg.recording.reading import File
-from hfg.recording.values import CannotKeep
+from hfg.recording.reading import File, number_in
 from hfg.token import END, NO_MESSAGE, Token
 from hfg.types import accepts, describe
 
@@ -240,23 +239,26 @@ class Track:
             wanted |= self._events
         node = self._node
         for number, ns, data in self._file.messages(wanted):
-            message = msgspec.json.decode(data)
+            message = self._file.object_in(data)
             if number in self._events:
-                if message.get("type") == "NodeEnded" and message["node"] == node:
-                    yield Record("", float(message["time"]), _END, {})
+                if message.get("type") == "NodeEnded" and message.get("node") == node:
+                    yield Record("", number_in(message.get("time")), _END, {})
                 continue
+            if not _is_sound(message):
+                raise UsageError(f"{self._file.path} is damaged: a message in it is no token ({data[:80]!r})")
             if number in self._markers:
-                if message["port"] in self._kinds:
-                    marker = END if message["marker"] == "END" else NO_MESSAGE
+                if message.get("port") in self._kinds:
+                    marker = END if message.get("marker") == "END" else NO_MESSAGE
                     token: Token[Any] = Token(marker, message.get("activity", 0), message["stamp"])
                     yield Record(message["port"], self._when(ns, message), token, message)
                 continue
             channel, reader, hint = self._readers[number]
             try:
                 token = reader.token(message)
-            except (CannotKeep, KeyError, TypeError, ValueError, AttributeError) as error:
+            except Exception as error:  # whatever the data leads somebody to: numpy, OpenCV, a class of the user's
                 raise UsageError(
-                    f'a value of "{channel.topic}" in {self._file.path} cannot be read as {describe(hint)}: {error}'
+                    f'a value of "{channel.topic}" in {self._file.path} cannot be read as {describe(hint)}: '
+                    f"{error if isinstance(error, HfgError) else in_words(error)}"
                 ) from None
             is_event = channel.metadata.get("kind") == "event"
             if not accepts(token.value, hint) and not (token.value is None and is_event):
@@ -274,6 +276,19 @@ class Track:
 
 
 _END: Token[Any] = Token(END)
+
+
+_NUMBERS: Final = (int, float)
+
+
+def _is_sound(message: dict[str, Any]) -> bool:
+    """Whether what a token needs is there, and what is said of it is of the types that it should be."""
+    return (
+        isinstance(message.get("stamp"), _NUMBERS)
+        and message.get("activity", 0) in (-1, 0, 1)
+        and all(isinstance(message.get(name) or 0, _NUMBERS) for name in ("sequence", "call", "time", "began"))
+        and isinstance(message.get("port", ""), str)
+    )
 
 
 def _kind(about: Mapping[str, str]) -> str:

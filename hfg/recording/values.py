@@ -300,10 +300,10 @@ class Codec:
             case "path":
                 return pathlib.Path(data["value"])
             case "enum":
-                return self._class(data["class"])[data["name"]]  # type: ignore[index]
+                return self._class(data["class"], "enum")[data["name"]]  # type: ignore[index]
             case "object":
                 fields = {key: self._revived(one) for key, one in data["fields"].items()}
-                return _made(self._class(data["class"]), fields)
+                return _made(self._class(data["class"], "fields"), fields)
             case "pickle":
                 return self._unpickled(data)
         read = _READ.get(name)
@@ -317,11 +317,13 @@ class Codec:
             raise CannotKeep("it is pickled, and reading that runs code: allow it, pickle=True, if you trust the file")
         return pickle.loads(base64.b64decode(data["data"]))
 
-    def _class(self, name: str) -> type:
-        """A class that somebody has imported already, never another."""
+    def _class(self, name: str, form: str) -> type:
+        """A class of data that somebody has imported already, never another: any object could run code as it ends."""
         found = self._classes.get(name) or _found(name)
         if found is None:
             raise CannotKeep(f"its type {name} is unknown here: import the module that has it first")
+        if form_of(found).kind != form or hasattr(found, "__del__"):
+            raise CannotKeep(f"its type {name} is no data: only structs, dataclasses, named tuples and enums are")
         return found
 
 

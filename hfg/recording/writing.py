@@ -12,7 +12,7 @@ import threading
 import time
 from array import array
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
@@ -29,7 +29,7 @@ from hfg.recording.messages import EVENTS, MARKERS, Marked, PlainToken, TokenWri
 from hfg.token import NO_MESSAGE, Marker, Token
 from hfg.trace import NodeEnabled, StructureChanged
 
-__all__ = ["PROFILE", "RecordingWriter", "open_new"]
+__all__ = ["PROFILE", "RecordingWriter", "is_there", "open_new"]
 
 PROFILE: Final = "hfg"
 _CHUNK_BYTES: Final = 1024 * 1024
@@ -165,9 +165,11 @@ class RecordingWriter:
         lines.pop()  # behind the last line
         times = np.maximum.accumulate(np.maximum(_nanoseconds(columns.whens), self._last_ns))
         self._last_ns = times[-1]
-        self._file.add_messages(channels, sequences, times, _nanoseconds(stamps), lines)
-        if self._file.chunk_bytes > _CHUNK_BYTES or self._file.chunk_messages > _CHUNK_MESSAGES:
-            self._file.end_chunk()
+        published = _nanoseconds(stamps)
+        for part in _parts(lines):
+            self._file.add_messages(channels[part], sequences[part], times[part], published[part], lines[part])
+            if self._file.chunk_bytes > _CHUNK_BYTES or self._file.chunk_messages > _CHUNK_MESSAGES:
+                self._file.end_chunk()
 
     def _declare_places(self) -> None:
         while self._declared < len(self.places):
@@ -252,11 +254,27 @@ def open_new(path: Path, *, force: bool) -> BinaryIO:
     try:
         return path.open("wb" if force else "xb")
     except FileExistsError:
-        raise UsageError(
-            f"{path} is there already: choose another name, or write over it, --force or force=True"
-        ) from None
+        raise is_there(path) from None
     except OSError as error:
         raise UsageError(f"the recording cannot be written to {path}: {error.strerror}") from None
+
+
+def _parts(lines: Sequence[bytes]) -> Iterator[slice]:
+    """Divide messages so that large ones do not all come into one chunk, which is read as a whole."""
+    if sum(map(len, lines)) <= _CHUNK_BYTES:
+        yield slice(None)
+        return
+    begin = size = 0
+    for number, line in enumerate(lines):
+        size += len(line)
+        if size > _CHUNK_BYTES or number == len(lines) - 1:
+            yield slice(begin, number + 1)
+            begin, size = number + 1, 0
+
+
+def is_there(path: Path) -> UsageError:
+    """Make the error that says that a file which is to be made is there already."""
+    return UsageError(f"{path} is there already: choose another name, or write over it, --force or force=True")
 
 
 def _are_finite(values: Sequence[Any]) -> bool:

@@ -1,0 +1,47 @@
+"""How much what comes from outside may ask for before it is refused: one table, docs/howto/untrusted.md (rule L4).
+
+A file of a few kilobytes can ask for gigabytes of memory. Each reader asks here how much it may spend, and refuses the
+rest with a sentence that names the limit. A limit is raised by an environment variable of its name, so that it holds in
+every process of a run. Stands on nothing.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Final, NamedTuple
+
+__all__ = ["BOUNDS", "CHUNK_BYTES", "FILE_BYTES", "GRAPH_FILE_BYTES", "JSON_DEPTH", "PICTURE_PIXELS", "Bound"]
+
+
+class Bound(NamedTuple):
+    """A limit.
+
+    Attributes:
+      variable: the environment variable that sets another one.
+      usual: what holds without it.
+      what: it limits.
+    """
+
+    variable: str
+    usual: int
+    what: str
+
+    @property
+    def most(self) -> int:
+        """What holds now."""
+        said = os.environ.get(self.variable, "")
+        return int(said) if said.isdecimal() and said.isascii() and len(said) < 20 else self.usual
+
+    @property
+    def remedy(self) -> str:
+        """What to do about something that asks for more."""
+        return f"the limit is {self.most:,}; if you trust it, set {self.variable} to a larger number"
+
+
+CHUNK_BYTES: Final = Bound("HFG_MOST_CHUNK_BYTES", 256 * 2**20, "bytes of one chunk of a recording, unpacked")
+FILE_BYTES: Final = Bound("HFG_MOST_FILE_BYTES", 2**30, "bytes of a file that is read whole, and of an array in one")
+GRAPH_FILE_BYTES: Final = Bound("HFG_MOST_GRAPH_FILE_BYTES", 32 * 2**20, "bytes of a graph file or .apex file")
+JSON_DEPTH: Final = Bound("HFG_MOST_JSON_DEPTH", 200, "levels of lists and objects in JSON")
+PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one picture or of a frame of a video")
+
+BOUNDS: Final = (CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_DEPTH, PICTURE_PIXELS)

@@ -1,0 +1,31 @@
+"""`hfg recover FILE -o OUTPUT`: makes a complete recording of one that is damaged or was cut off. Stands on `show`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hfg.cli.info import told_losses
+from hfg.errors import TargetError, UsageError
+from hfg.recording import recover as recover_recording
+
+__all__ = ["recover"]
+
+
+def recover(
+    file: Annotated[Path, typer.Argument(help="a recording, or any MCAP file")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="Where to write what can be read.")],
+    force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
+) -> int:
+    """Write all that can be read of a damaged recording into a complete one, and say what is lost."""
+    try:
+        count, losses = recover_recording(file, output, force=force)
+    except UsageError as error:
+        raise TargetError(str(error)) from None
+    found = f"{count:,} message{'s' * (count != 1)}"
+    lines = [f"{output}: {found} of {file}", *(told_losses(losses) or ["nothing is lost"])]
+    sys.stdout.write("\n".join(lines) + "\n")
+    return 0

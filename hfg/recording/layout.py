@@ -1,0 +1,349 @@
+"""Finds where everything lies in an MCAP file, also in one that is damaged or was cut off.
+
+A whole file has a summary that says where each chunk is; it is believed if its checksum holds. Records are followed
+from the beginning in any case. Where one cannot be, the next chunk is the one of the summary, or, without a summary,
+the next place that looks like one. Stands on `chunks` and the records of the package `mcap`.
+"""
+
+from __future__ import annotations
+
+import mmap
+import re
+import struct
+import zlib
+from bisect import bisect_right
+from collections.abc import Iterator
+from io import BytesIO
+from typing import Any, BinaryIO, Final, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, ChunkIndex, Footer, Header, Metadata, Schema, Statistics
+
+from hfg.bounds import CHUNK_BYTES
+from hfg.recording.chunks import CHUNK, HEAD, MESSAGE, Damaged, chunk_head
+from hfg.recording.mcap import MAGIC
+
+__all__ = ["Layout", "Piece", "read_record"]
+
+_FOOTER: Final = HEAD.size + 20 + len(MAGIC)
+_LONGEST_RECORD: Final = 64 * 2**20  # of what is no chunk, no message and no attachment
+_PIECE: Final = 4 * 2**20  # bytes of messages outside of chunks that are read at once
+_LOOKS_LIKE_A_CHUNK: Final = re.compile(
+    rb"\x06.{5}\x00{3}.{28}(?:\x03\x00{3}lz4|\x04\x00{3}zstd|\x00{4}).{5}\x00{3}", re.DOTALL
+)
+_HEAD_OF_A_CHUNK: Final = 64
+_MOST_NAMES: Final = 10_000
+_KNOWN: Final = {
+    Opcode.HEADER: Header,
+    Opcode.FOOTER: Footer,
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.STATISTICS: Statistics,
+    Opcode.METADATA: Metadata,
+    Opcode.ATTACHMENT: Attachment,
+}
+_LAST_OPCODE: Final = 0x0F
+_FIRST_PRIVATE: Final = 0x80
+
+
+class Piece(NamedTuple):
+    """Where messages lie: a chunk, or some that follow one another outside of any.
+
+    Attributes:
+      begin: of the chunk's content, or of the first record.
+      length: of it.
+      is_chunk: which of both.
+    """
+
+    begin: int
+    length: int
+    is_chunk: bool
+
+    @property
+    def end(self) -> int:
+        """Where the next record begins."""
+        return self.begin + self.length
+
+
+class _Exact(ReadDataStream):
+    """Reads what a record's lengths ask for, or refuses: the package gives what there is."""
+
+    def read(self, length: int) -> bytes:
+        data: bytes = super().read(length)
+        if len(data) != length:
+            raise Damaged("a length in it is wrong")
+        return data
+
+
+def read_record(opcode: int, data: bytes) -> Any:
+    """Make a record of its bytes; None of a kind that nobody here asks for.
+
+    Raises:
+      Damaged: it cannot be read.
+    """
+    kind: Any = _KNOWN.get(Opcode(opcode)) if 0 < opcode <= _LAST_OPCODE else None
+    if kind is None:
+        return None
+    try:
+        return kind.read(_Exact(BytesIO(data)))
+    except Damaged:
+        raise
+    except Exception as error:  # the package raises what the bytes lead it to
+        raise Damaged(f"a record of kind {Opcode(opcode).name} cannot be read ({error})") from None
+
+
+class Layout:
+    """Where everything lies.
+
+    Attributes:
+      whole: the file is complete up to its end, and so is its summary.
+      ended: nothing was recorded behind what is here; the summary may be damaged.
+      pieces: where messages lie, in order.
+      library: who has written it.
+      schemas: by number.
+      channels: by number.
+      metadata: by name; of several of one name the last.
+      beside: where attachments and metadata lie: what each is, its place and length.
+      faults: what is damaged outside of chunks, and where that begins.
+      statistics: of the summary.
+    """
+
+    def __init__(self, stream: BinaryIO, size: int) -> None:
+        self._stream = stream
+        self._size = size
+        self.whole = self.ended = False
+        self.pieces: list[Piece] = []
+        self.library = self.profile = ""
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.beside: list[tuple[int, int, int]] = []
+        self.faults: list[tuple[int, str]] = []
+        self.statistics: Statistics | None = None
+        self._checksum: tuple[int, int] | None = None  # of all that is before a place, as its writer has said
+        self._indexed: dict[int, int] = {}  # length of each chunk of which the summary tells, by its place
+        self._bare = False  # the last piece is one of messages outside of chunks
+        end = self._read_summary()
+        self._places = sorted(self._indexed)
+        self._follow(len(MAGIC), size if end is None else end)
+
+    # --- the summary --------------------------------------------------------------------------------------------------
+
+    def _read_summary(self) -> int | None:
+        """Read the summary, if there is one that is not damaged; gives where it begins."""
+        if self._size < _FOOTER + len(MAGIC):
+            return None
+        tail = self._at(self._size - _FOOTER, _FOOTER)
+        opcode, length = HEAD.unpack_from(tail)
+        if not tail.endswith(MAGIC) or opcode != Opcode.FOOTER or length != 20:
+            return None
+        footer = read_record(opcode, tail[HEAD.size : -len(MAGIC)])
+        at, end = footer.summary_start, self._size - _FOOTER
+        if at == 0:  # there is none, which is allowed
+            self.whole = self._checks(tail, footer.summary_crc)
+            return None
+        if not len(MAGIC) <= at <= end:
+            return None
+        checksum = self._checksum_of(at, end + HEAD.size + 16) if footer.summary_crc else 0
+        if checksum != footer.summary_crc:
+            return None
+        try:
+            self._take_summary(at, end)
+        except Damaged:
+            self._indexed.clear()
+            self.statistics = None
+            return None
+        self.whole = True
+        return int(at)
+
+    def _checks(self, tail: bytes, checksum: int) -> bool:
+        return checksum in (0, zlib.crc32(tail[: HEAD.size + 16]))
+
+    def _take_summary(self, at: int, end: int) -> None:
+        while at < end:
+            opcode, length = self._head(at, end)
+            at += HEAD.size
+            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX):
+                record = self._record(opcode, at, length)
+                if isinstance(record, ChunkIndex):
+                    self._take_index(record)
+                elif isinstance(record, Statistics):
+                    self.statistics = record
+                else:
+                    self.declare(record)
+            at += length
+
+    def _take_index(self, record: ChunkIndex) -> None:
+        at, length = record.chunk_start_offset, record.chunk_length
+        if at < len(MAGIC) or length < HEAD.size or at + length > self._size:
+            raise Damaged("it tells of a chunk that is not in the file")
+        self._indexed[at] = length
+
+    # --- the data -----------------------------------------------------------------------------------------------------
+
+    def _follow(self, at: int, end: int) -> None:
+        """Go from record to record, over chunks without looking into them."""
+        while at < end and not self.ended:
+            known = self._indexed.get(at)
+            if known is not None:
+                self._add(Piece(at + HEAD.size, known - HEAD.size, is_chunk=True))
+                at += known
+                continue
+            try:
+                opcode, length = self._head(at, self._next_indexed(at, end))
+                self._take(opcode, at + HEAD.size, length)
+                at += HEAD.size + length
+            except Damaged as error:
+                found = self._resume(at + 1, end)
+                if found is None and not self.whole:
+                    break  # it was cut off here
+                self.faults.append((at, str(error)))
+                at = end if found is None else found
+        if not self.whole:
+            behind = "its summary cannot be read, so it is read without" if self.ended else "it was cut off here"
+            self.faults.append((at, behind))
+
+    def _take(self, opcode: int, at: int, length: int) -> None:
+        if opcode == CHUNK:
+            chunk_head(self._at(at, min(length, _HEAD_OF_A_CHUNK)), length)
+            self._add(Piece(at, length, is_chunk=True))
+        elif opcode == MESSAGE:
+            if self._places and self.profile == "hfg":
+                raise Damaged("a message is outside of the chunks, where hfg writes none")
+            self._take_message(at, length)
+        elif opcode == Opcode.ATTACHMENT:
+            self.beside.append((opcode, at, length))
+        elif opcode == Opcode.DATA_END:
+            if length < 4 or (self._places and at <= self._places[-1]):
+                raise Damaged("what looks like the end of the data is none")
+            self.ended = True
+            (checksum,) = struct.unpack("<I", self._at(at, 4))
+            if checksum:
+                self._checksum = at - HEAD.size, checksum
+        elif opcode in (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA):
+            self.declare(self._record(opcode, at, length))
+            if opcode == Opcode.METADATA:
+                self.beside.append((opcode, at, length))
+
+    def _add(self, piece: Piece) -> None:
+        self.pieces.append(piece)
+        self._bare = False
+
+    def _take_message(self, at: int, length: int) -> None:
+        begin, end = at - HEAD.size, at + length
+        last = self.pieces[-1] if self._bare else None
+        if last is not None and last.end == begin and end - last.begin <= _PIECE:
+            self.pieces[-1] = Piece(last.begin, end - last.begin, is_chunk=False)
+            return
+        self.pieces.append(Piece(begin, end - begin, is_chunk=False))
+        self._bare = True
+
+    def declare(self, record: Any) -> None:
+        """Take what says what is in the file."""
+        match record:
+            case Header():
+                self.library, self.profile = record.library, record.profile
+            case Schema():
+                self.schemas[record.id] = record
+            case Channel():
+                self.channels[record.id] = record
+            case Metadata() if record.name in self.metadata or len(self.metadata) < _MOST_NAMES:
+                self.metadata[record.name] = record.metadata
+
+    # --- what is damaged ----------------------------------------------------------------------------------------------
+
+    def _resume(self, at: int, end: int) -> int | None:
+        """Find the next chunk, or the end of the data."""
+        if self._places:
+            found = self._next_indexed(at - 1, end)
+            return None if found >= end else found
+        with mmap.mmap(self._stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            for match in _LOOKS_LIKE_A_CHUNK.finditer(data, at, end):
+                begin = match.start()
+                _, length = HEAD.unpack_from(data, begin)
+                if begin + HEAD.size + length <= end and self._is_chunk(begin + HEAD.size, length):
+                    return begin
+        return None
+
+    def _is_chunk(self, at: int, length: int) -> bool:
+        try:
+            head = chunk_head(self._at(at, min(length, _HEAD_OF_A_CHUNK)), length)
+        except Damaged:
+            return False
+        return head.first <= head.last
+
+    def _next_indexed(self, at: int, end: int) -> int:
+        number = bisect_right(self._places, at)
+        return min(self._places[number], end) if number < len(self._places) else end
+
+    def lost_in(self, piece: Piece) -> tuple[int | None, int | None, int | None]:
+        """Say what was in a chunk that cannot be read: how many messages, and their times, as far as it is known."""
+        count = None
+        for length in self._message_indexes(piece.end):
+            count = (count or 0) + max(length - 6, 0) // 16
+        try:
+            head = chunk_head(self._at(piece.begin, min(piece.length, _HEAD_OF_A_CHUNK)), piece.length)
+        except Damaged:
+            return count, None, None
+        return count, head.first, head.last
+
+    def _message_indexes(self, at: int) -> Iterator[int]:
+        """The lengths of the records behind a chunk that say where its messages are."""
+        while True:
+            try:
+                opcode, length = self._head(at, self._size)
+            except Damaged:
+                return
+            if opcode != Opcode.MESSAGE_INDEX:
+                return
+            yield length
+            at += HEAD.size + length
+
+    def keeps_its_checksum(self) -> bool:
+        """Whether all before the end of the data is as it was written; as far as the file says."""
+        if self._checksum is None:
+            return True
+        end, said = self._checksum
+        return self._checksum_of(0, end) == said
+
+    # --- reading ------------------------------------------------------------------------------------------------------
+
+    def _at(self, place: int, length: int) -> bytes:
+        self._stream.seek(place)
+        return self._stream.read(length)
+
+    def _head(self, at: int, end: int) -> tuple[int, int]:
+        """What a record is, and its length; it ends before `end`."""
+        if at + HEAD.size > end:
+            raise Damaged("a record is not whole")
+        opcode, length = HEAD.unpack(self._at(at, HEAD.size))
+        if opcode == 0 or _LAST_OPCODE < opcode < _FIRST_PRIVATE:
+            raise Damaged("what should be a record is none")
+        if length > end - at - HEAD.size:
+            raise Damaged(f"a record says that it has {length:,} bytes, which are not there")
+        return opcode, length
+
+    def _record(self, opcode: int, at: int, length: int) -> Any:
+        if length > _LONGEST_RECORD:
+            raise Damaged(f"a record has {length:,} bytes, and none that describes may have more than 64 MiB")
+        return read_record(opcode, self._at(at, length))
+
+    def _checksum_of(self, at: int, end: int) -> int:
+        self._stream.seek(at)
+        found, left = 0, end - at
+        while left > 0 and (data := self._stream.read(min(left, 2**20))):
+            found = zlib.crc32(data, found)
+            left -= len(data)
+        return found
+
+    def content(self, begin: int, length: int) -> bytes:
+        """Read a record; of a chunk what is packed.
+
+        Raises:
+          Damaged: it is longer than any may be.
+        """
+        if length > CHUNK_BYTES.most + _HEAD_OF_A_CHUNK:
+            raise Damaged(f"it has {length:,} bytes, {CHUNK_BYTES.remedy}")
+        return self._at(begin, length)

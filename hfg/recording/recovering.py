@@ -1,0 +1,118 @@
+"""Makes a complete recording of one that is damaged or was cut off: with all that can be read, summary and indexes.
+
+What is lost is written into it, so that whoever reads it later knows it too. Stands on `reading`, and on the package
+`mcap`, which writes the file.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib.metadata import version
+from pathlib import Path
+from typing import BinaryIO
+
+import msgspec
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata
+from mcap.writer import CompressionType, Writer
+
+from hfg.errors import UsageError
+from hfg.recording.chunks import Damaged
+from hfg.recording.layout import read_record
+from hfg.recording.reading import RECOVERED, File, Loss
+from hfg.recording.writing import is_there
+
+__all__ = ["recover"]
+
+
+def recover(
+    file: str | os.PathLike[str], output: str | os.PathLike[str], *, force: bool = False
+) -> tuple[int, list[Loss]]:
+    """Write all that can be read of a recording into a new file, which is complete and has a summary.
+
+    Args:
+      file: a recording, also one of another program.
+      output: is written whole, or not at all.
+      force: write over a file that is there.
+
+    Returns:
+      How many messages it has, and what is lost.
+
+    Raises:
+      UsageError: the one cannot be read, or the other not written.
+    """
+    place = Path(output)
+    if place.exists() and Path(file).exists() and place.samefile(file):
+        raise UsageError(f"{output} is the recording itself: name another file, so that nothing more can be lost")
+    if place.exists() and not force:
+        raise is_there(place)
+    part = place.with_name(f"{place.name}.part")
+    try:
+        with File(file) as recording, part.open("wb") as stream:
+            found = _Recovering(recording).write(stream)
+        part.replace(place)
+    except OSError as error:
+        raise UsageError(f"{output} cannot be written: {error.strerror}") from None
+    finally:
+        part.unlink(missing_ok=True)
+    return found
+
+
+class _Recovering:
+    """Copies what can be read."""
+
+    def __init__(self, recording: File) -> None:
+        self._recording = recording
+
+    def write(self, stream: BinaryIO) -> tuple[int, list[Loss]]:
+        recording = self._recording
+        losses = recording.losses()
+        layout = recording.layout
+        writer = Writer(stream, compression=CompressionType.LZ4, enable_data_crcs=True)
+        writer.start(layout.profile, f"hfg {version('hfg')}")
+        losses += self._copy_what_is_beside(writer)
+        if losses:
+            said = {"from": str(recording.path.name), "losses": msgspec.json.encode(losses).decode()}
+            writer.add_metadata(RECOVERED, said)
+        count = self._copy_messages(writer)
+        writer.finish()  # type: ignore[no-untyped-call]
+        stream.flush()
+        os.fsync(stream.fileno())
+        return count, losses
+
+    def _copy_what_is_beside(self, writer: Writer) -> list[Loss]:
+        layout = self._recording.layout
+        lost = []
+        for opcode, begin, length in layout.beside:
+            what = Opcode(opcode).name.lower()
+            try:
+                record = read_record(opcode, layout.content(begin, length))
+            except Damaged as error:
+                lost.append(Loss(f"the {what} at byte {begin:,} cannot be read: {error}"))
+                continue
+            if isinstance(record, Metadata) and record.name != RECOVERED:
+                writer.add_metadata(record.name, record.metadata)
+            elif isinstance(record, Attachment):
+                writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
+        return lost
+
+    def _copy_messages(self, writer: Writer) -> int:
+        recording = self._recording
+        schemas = {0: 0} | {
+            number: writer.register_schema(one.name, one.encoding, one.data)
+            for number, one in sorted(recording.schemas.items())
+        }
+        channels = {
+            number: writer.register_channel(
+                one.topic, one.message_encoding, schemas.get(one.schema_id, 0), one.metadata
+            )
+            for number, one in sorted(recording.channels.items())
+        }
+        count = 0
+        for content in recording.contents():
+            for message in content.messages():
+                channel = channels.get(message.channel)
+                if channel is not None:
+                    writer.add_message(channel, message.log_time, message.data, message.publish_time, message.sequence)
+                    count += 1
+        return count
