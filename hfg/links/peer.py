@@ -28,6 +28,7 @@ class Peer:
       patience_s: how long after that it is probed.
       answers: something was heard of it since it was last probed.
       silent: it was probed again, for it had not answered.
+      unanswered: how often in a row it was probed and did not answer.
     """
 
     __slots__ = (
@@ -46,6 +47,7 @@ class Peer:
         "sent",
         "silent",
         "since",
+        "unanswered",
     )
 
     def __init__(self, name: str, done: int, patience_s: float) -> None:
@@ -58,6 +60,7 @@ class Peer:
         self.owed = True
         self.answers = True
         self.silent = False
+        self.unanswered = 0
         self.since = float("-inf")
         self.patience_s = self._shortest_s = patience_s
 
@@ -121,6 +124,7 @@ class Peer:
     def heard(self) -> None:
         """There was a word of it, whatever it says; after a silence the next one is not taken for a long one."""
         self.answers = True
+        self.unanswered = 0
         if self.silent:
             self.silent = False
             self.ask_soon()
@@ -139,6 +143,7 @@ class Peer:
         """It is asked; if it was silent, the next time later."""
         if not self.owed:
             self.silent = not self.answers
+            self.unanswered += not self.answers
             self.patience_s = min(2 * self.patience_s, slowest_s)
         self.owed = self.answers = False
         self.since = now

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from itertools import islice
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import msgspec
 
@@ -35,6 +35,9 @@ from hfg.links.peer import Peer
 from hfg.transport import Buffer, EncodedToken, Position
 
 __all__ = ["ExactProducer", "Outbox", "ProducerCounts"]
+
+_AWAY: Final = 4
+"""So many probes in a row without an answer, about a second, and a consumer is said to be away."""
 
 
 class Outbox(NamedTuple):
@@ -174,6 +177,11 @@ class ExactProducer:
     def outbox(self) -> Outbox:
         """What another life would need to carry on from here."""
         return Outbox(self._stream, self._next - len(self._kept), tuple(self._kept))
+
+    @property
+    def away(self) -> list[str]:
+        """The consumers that tokens wait for and that have not answered for about a second, by name."""
+        return [peer.name for peer in self._peers.values() if peer.unanswered >= _AWAY]
 
     def is_pressing(self, portion: int) -> bool:
         """Whether what was not sent should leave now: it is enough, or nothing is under way, or nothing can join it."""

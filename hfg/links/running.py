@@ -20,10 +20,12 @@ from hfg.links.bounded import BoundedConsumer, BoundedProducer
 from hfg.links.consumer import ExactConsumer
 from hfg.links.frames import Outgoing
 from hfg.links.producer import ExactProducer
+from hfg.logs import Log
 from hfg.transport import Buffer, Closing, Datagrams, Delivery, EncodedToken, Message, Position, Publisher, Traffic
 
 __all__ = ["BoundedReceiver", "BoundedSender", "LinkReceiver", "LinkSender"]
 
+_LOGGER = Log("hfg.links")
 _HEADROOM = 8192  # bytes of a datagram that are kept for the header
 _TIMER_SLACK_S = 0.01
 _FEWEST = 4  # tokens, or words on tokens, for which a datagram is worth while that could be joined by more
@@ -142,6 +144,7 @@ class LinkSender:
         self._subscription: Closing = session.subscribe(_back(name), self._receive)
         self._timer: asyncio.TimerHandle | None = None
         self._turns = _Turns(self._loop)
+        self._away: dict[str, float] = {}  # consumers that do not answer, and since when that is known
         self._closed = False
 
     @property
@@ -239,6 +242,8 @@ class LinkSender:
 
     def _after(self) -> None:
         """Something was learnt: send what follows from it, and let those go on that have waited for it."""
+        if self._away:
+            self._say_who_is_away()
         self._flush()
         released = self.machine.released
         if released != self._told:
@@ -269,6 +274,23 @@ class LinkSender:
     def _ring(self) -> None:
         self._timer = None
         self._flush(rung=True)
+        self._say_who_is_away()
+
+    def _say_who_is_away(self) -> None:
+        """Log who does not answer any more, and who does again."""
+        away = self.machine.away
+        for name in away:
+            if name not in self._away:
+                self._away[name] = self._loop.time()
+                _LOGGER.info(
+                    'link "%s": "%s" does not answer, and %d tokens wait for it; they will reach it when it is back',
+                    self.name,
+                    name,
+                    self.machine.unfinished,
+                )
+        for name in [name for name in self._away if name not in away]:
+            silent_s = self._loop.time() - self._away.pop(name)
+            _LOGGER.info('link "%s": "%s" answers again after %.1f s', self.name, name, silent_s)
 
     def _put(self, out: list[Outgoing]) -> None:
         for to, header, payload in out:

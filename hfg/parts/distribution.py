@@ -193,8 +193,9 @@ class Distribution:
             await self._launch(other)
             if self._lives[other.name] > self._lives[MAIN]:
                 self._carrier.admit(other.name, self._lives[other.name])
-        for other in self._others.values():
-            await other.opened
+        while waiting := [other for other in self._others.values() if other.state != "running"]:
+            for other in waiting:
+                await other.wait_opened()
 
     def _host(self, part: str) -> str:
         return self._drawing.cutting.parts[part].groups[part].host
@@ -356,21 +357,14 @@ class Distribution:
         """A process has ended that was not told to: another takes its place."""
         self._agreement.leave(other.name)
         self._asking.gone(other.name, RunError(f'the process of group "{other.name}" is gone: {how}'))
-        if not self._has_begun:
-            error = RunError(f'the process of group "{other.name}" is gone before the run has begun: {how}')
-            other.answer(error)
-            self._part.finish("failed", error)
-            self._asking.over(other.name)
-            return
         pause_s = other.died()
         if not self._is_open:
             return
         if pause_s is None:
             often = f"it died {LIMIT + 1} times within {WITHIN_S:g} s and is not begun again"
-            self._part.finish(
-                "failed",
-                RunError(f'the process of group "{other.name}" is gone: {how}; {often}: see what it ended with'),
-            )
+            error = RunError(f'the process of group "{other.name}" is gone: {how}; {often}: see what it ended with')
+            other.answer(error)
+            self._part.finish("failed", error)
             self._asking.over(other.name)
             return
         _LOGGER.warning('the process of group "%s" is gone: %s; another begins in %g s', other.name, how, pause_s)
@@ -407,12 +401,14 @@ class Distribution:
             await self._launch(other)
             assert self._carrier is not None
             self._carrier.admit(name, life)
-            await other.opened
+            await other.wait_opened()
         except HfgError as error:
+            other.answer(error)
             self._part.finish("failed", error)
             self._asking.over(name)
             return
-        other.let_go()
+        if self._has_begun:
+            other.let_go()
         if self._part.engine.core.over:  # meanwhile, when nobody could tell it
             self._say(name, Finish(self._part.engine.outcome))
 

@@ -344,3 +344,33 @@ def test_a_bounded_link_never_waits() -> None:
             sender.send_nowait((b"", b"x"))
 
     virtually(scenario)
+
+
+@pytest.mark.rule("L3")
+def test_a_consumer_that_does_not_answer_and_then_does_is_said_at_level_info(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "hfg.links")
+
+    async def main() -> None:
+        network = Network()
+        one, other = await network.open(), await network.open()
+        sender, receiver = ends(one, other)
+        await sender.send((b"", b"0"))
+        await receiver.take()
+        receiver.done()
+        await sender.wait_finished()
+        network.faults = Faults(loss=1.0)
+        await sender.send((b"", b"1"))
+        await asyncio.sleep(5)
+        network.faults = Faults()
+        await receiver.take()
+        receiver.done()
+        await sender.wait_finished()
+        await one.close()
+        await other.close()
+
+    with asyncio.Runner(loop_factory=hfg.VirtualTimeLoop) as runner:
+        runner.run(main())
+    said = [record.getMessage() for record in caplog.records]
+    assert len(said) == 2
+    assert said[0] == 'link "link": "a" does not answer, and 1 tokens wait for it; they will reach it when it is back'
+    assert said[1].startswith('link "link": "a" answers again after 4.')

@@ -84,7 +84,6 @@ class Other:
 
     Attributes:
       name: of its group.
-      opened: done when it is set up.
       closed: done when it has reported, or is gone.
       report: what it has said at the end.
       deaths: of its processes.
@@ -96,7 +95,7 @@ class Other:
     def __init__(self, name: str) -> None:
         self.name = name
         self._launched: Launched | None = None
-        self.opened: asyncio.Future[None]
+        self._opened: asyncio.Future[None] | None = None
         self.closed: asyncio.Future[None]
         self.report: Closed | None = None
         self.deaths = Deaths()
@@ -111,13 +110,27 @@ class Other:
         self._watching: asyncio.Task[None] | None = None
         self._leaves = False
         self._gone = False
+        self._was_let_go = False
 
     def begin(self, channel: Channel) -> None:
         """By this it is spoken to."""
-        loop = asyncio.get_running_loop()
         self._channel = channel
-        self.opened = loop.create_future()
-        self.closed = loop.create_future()
+        self._not_opened()
+        self.closed = asyncio.get_running_loop().create_future()
+
+    def _not_opened(self) -> None:
+        """Whoever waits until it is set up goes on waiting when another life of it takes the place of one that dies."""
+        if self._opened is None or self._opened.done():
+            self._opened = asyncio.get_running_loop().create_future()
+
+    async def wait_opened(self) -> None:
+        """Wait until a life of it is set up.
+
+        Raises:
+          HfgError: that has failed.
+        """
+        assert self._opened is not None
+        await asyncio.shield(self._opened)
 
     def live(self, launched: Launched, gone: Callable[[str], None]) -> None:
         """Something runs it from now on; `gone` is told when that is gone without having been asked to leave."""
@@ -132,10 +145,12 @@ class Other:
             if not self._leaves:
                 self.is_told = False
                 self.state = "returning"
+                self._not_opened()
                 gone(how)
 
         self._watching = asyncio.create_task(watch(), name=f"hfg process of {self.name}")
         self.is_told = True
+        self._was_let_go = False
 
     @property
     def is_there(self) -> bool:
@@ -180,7 +195,10 @@ class Other:
         await self._launched.end()
 
     def let_go(self) -> None:
-        """Its nodes are set up: they begin."""
+        """Its nodes begin, if they are set up and have not begun."""
+        if self.state != "running" or self._was_let_go:
+            return
+        self._was_let_go = True
         self.say(Begin())
         if self._launched is not None:
             self._launched.begins()
@@ -196,14 +214,15 @@ class Other:
 
     def answer(self, error: HfgError | None) -> None:
         """It is set up, or will not be."""
-        if not self.opened.done():
+        opened = self._opened
+        if opened is not None and not opened.done():
             if error is None:
                 self.restarts += self.state == "returning"
                 self.state = "running"
-                self.opened.set_result(None)
+                opened.set_result(None)
             else:
-                self.opened.set_exception(error)
-                self.opened.exception()  # it may be that nobody waits for it any more
+                opened.set_exception(error)
+                opened.exception()  # it may be that nobody waits for it any more
 
     async def bury(self) -> None:
         """See to it that nothing is left of a life that is over."""

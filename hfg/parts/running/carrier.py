@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hfg.graph.flat import CutEdge
+from hfg.logs import Log
 from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, Untrue
 from hfg.parts.running.channels import name_of
 from hfg.parts.running.ends import IncomingEnd, OutgoingEnd, World
@@ -16,6 +17,8 @@ from hfg.parts.running.ways import Ways
 from hfg.transport import Session
 
 __all__ = ["Carrier"]
+
+_LOGGER = Log("hfg.parts")
 
 
 class Carrier:
@@ -74,6 +77,9 @@ class Carrier:
 
     def admit(self, other: str, life: int) -> None:
         """Another part has died and begins anew, as that life."""
+        _LOGGER.info(
+            "%s: %s is there again, as life %d: its edges go on", name_of(self._part.name), name_of(other), life
+        )
         self._ways.admit(other, life)
         for link in self._links.values():
             if link.other == other:
