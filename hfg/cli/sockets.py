@@ -1,19 +1,23 @@
-"""Looks at runs in other processes, through the sockets that they listen at. Stands on `engine.face.watching`."""
+"""Looks at runs in other processes, through the sockets that they listen at.
+
+Stands on `show` and `engine.face.watching`.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import msgspec
 
+from hfg.cli import show
 from hfg.engine.face.watching import Answer, Question, folder, sockets
 from hfg.engine.observing.encoding import encode
 from hfg.errors import TargetError
 
-__all__ = ["Line", "runs"]
+__all__ = ["Line", "find", "is_process", "runs", "which"]
 
 _LONGEST_ANSWER: Final = 64_000_000
 _PATIENCE_S: Final = 2.0
@@ -104,6 +108,41 @@ def runs() -> list[Answer]:
             answer = line.ask(Question("name")) or Answer(graph="(does not answer)")
             found.append(msgspec.structs.replace(answer, pid=int(name.partition("-")[0]), name=name))
     return found
+
+
+def find(named: str | None) -> list[Answer]:
+    """Find the runs that a user means by a process id, as `hfg top` shows it, or by the name of a graph.
+
+    Raises:
+      TargetError: there is none.
+    """
+    if named is not None and is_process(named):
+        return [Answer(name=named)]
+    found = runs()
+    if not found:
+        raise TargetError(
+            "no graph runs that could be looked at: hfg run begins one, or a program with hfg.run(graph, watch=True) "
+            "or HFG_WATCH=1, on the real clock, as the same user"
+        )
+    if named is None:
+        return found
+    fitting = [one for one in found if one.graph == named]
+    if not fitting:
+        there = ", ".join(f'"{one.graph}" in process {one.name}' for one in found)
+        raise TargetError(f'no graph "{named}" runs that could be looked at; there is {there}')
+    return fitting
+
+
+def is_process(named: str) -> bool:
+    """Whether it is the number of a process, and of which of its runs."""
+    return named.replace("-", "", 1).isdecimal()
+
+
+def which(verb: str, there: Sequence[Answer]) -> int:
+    """List the runs that a user may have meant; gives the exit code."""
+    show.table("", ("process", "graph", "target"), [(one.name, one.graph, one.target) for one in there])
+    show.sentence(f"more than one graph runs: name its process, as in hfg {verb} {there[0].name}")
+    return 2
 
 
 def _nothing_runs(name: str) -> str:

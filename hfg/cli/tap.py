@@ -5,11 +5,13 @@ Stands on `execute`, `sockets`, `target`, `settings`, `interrupt` and `show`.
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Awaitable
 from contextlib import redirect_stdout
 from itertools import islice
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -18,15 +20,16 @@ from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.options import AllowOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
 from hfg.cli.settings import set_parameters
-from hfg.cli.sockets import Line
-from hfg.cli.target import load_graph
+from hfg.cli.sockets import Line, find, is_process, runs, which
+from hfg.cli.target import SUFFIXES, load_graph
 from hfg.engine import Run
-from hfg.engine.face.watching import Question
+from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import line_of
 from hfg.errors import GraphError, TargetError, UsageError
 
 __all__ = ["tap"]
 
+_CODE: Final = (".py", ".yaml", ".yml", *SUFFIXES)
 _KEPT = 10_000  # more than a graph sends between two turns of the loop
 
 
@@ -51,17 +54,19 @@ def tap(
 ) -> int:
     """Print the tokens of a port or an edge, one a line; what nodes print goes to standard error.
 
-    The graph is run for it. If TARGET is the number of a process, as hfg top shows it, look at what runs there.
+    The graph is run for it. If TARGET is the number of a process or the name of a graph, as hfg top shows them, look at
+    what runs there already.
     """
     show.set_debug(debug)
     records = show.Records(0, debug, virtual=clock is Clock.virtual)
-    if target.replace("-", "", 1).isdecimal():
+    if there := _runs_already(target):
         if param or until is not None or clock is not Clock.real:
             raise TargetError(
-                f"the run in process {target} goes on as it is, it is only looked at: leave out --param, --until and "
-                "--clock"
+                f"the run {target} goes on as it is, it is only looked at: leave out --param, --until and --clock"
             )
-        return _look_at(target, Question("tap", path, rate, json), limit)
+        if len(there) > 1:
+            return which("tap", there)
+        return _look_at(there[0].name, Question("tap", path, rate, json), limit)
     graph = load_graph(target, (), allow)
     records.loaded()
     set_parameters(graph, param or [])
@@ -80,6 +85,17 @@ def tap(
     if interrupt.count:
         show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
     return 1 if error is not None or interrupt.count else 0
+
+
+def _runs_already(target: str) -> list[Answer]:
+    """The runs that a target means: a process, or the name of a graph that runs where it names no file or module."""
+    if is_process(target):
+        return find(target)
+    if ":" in target or target.endswith(_CODE) or Path(target).exists() or Path(f"{target}.py").exists():
+        return []
+    with contextlib.suppress(TargetError):
+        return [one for one in runs() if one.graph == target]
+    return []
 
 
 def _look_at(name: str, question: Question, limit: int | None) -> int:
@@ -123,13 +139,13 @@ class _Printer:
             looking = run.tap(self._path, size=_KEPT if self._rate_hz is None else None, max_rate_hz=self._rate_hz)
         except (UsageError, GraphError) as error:
             raise TargetError(str(error)) from None
-        return self._print(run, looking, run.now())
+        return self._print(run, looking)
 
-    async def _print(self, run: Run, looking: Any, began: float) -> None:
+    async def _print(self, run: Run, looking: Any) -> None:
         printed = 0
         try:
             async for token in looking:
-                self._out.write(line_of(token, began, json=self._json))
+                self._out.write(line_of(token, looking.passed_s, json=self._json))
                 self._out.flush()
                 printed += 1
                 if printed == self._limit:

@@ -16,11 +16,11 @@ from hfg.cli import show
 from hfg.cli.live import EVERY_S
 from hfg.cli.options import SettingsOption
 from hfg.cli.runs import RealmLine
-from hfg.cli.sockets import Line, runs
+from hfg.cli.sockets import Line, find, which
 from hfg.cli.table import View
 from hfg.cli.terminal import Foot, is_terminal
 from hfg.engine import Glance
-from hfg.engine.face.watching import Answer, Question
+from hfg.engine.face.watching import Question
 from hfg.errors import TargetError
 
 __all__ = ["top"]
@@ -40,12 +40,9 @@ def top(
     if settings is not None:
         with RealmLine(settings, run) as far:
             return _look(far, json)
-    there = _find(run)
+    there = find(run)
     if len(there) > 1:
-        rows = [(one.name, one.graph, one.target) for one in there]
-        show.table("", ("process", "graph", "target"), rows)
-        show.sentence("more than one graph runs: name its process, as in hfg top " + there[0].name)
-        return 2
+        return which("top", there)
     with Line(there[0].name) as line:
         return _look(line, json)
 
@@ -58,29 +55,6 @@ def _look(line: Line | RealmLine, json: bool) -> int:
     except KeyboardInterrupt:  # how one leaves it
         return 0
     return 0
-
-
-def _find(named: str | None) -> list[Answer]:
-    """The runs that are meant.
-
-    Raises:
-      TargetError: none is.
-    """
-    if named is not None and named.replace("-", "", 1).isdecimal():
-        return [Answer(name=named)]
-    found = runs()
-    if not found:
-        raise TargetError(
-            "no graph runs that could be looked at: hfg run begins one, or a program with hfg.run(graph, watch=True) "
-            "or HFG_WATCH=1, on the real clock, as the same user"
-        )
-    if named is None:
-        return found
-    fitting = [one for one in found if one.graph == named]
-    if not fitting:
-        there = ", ".join(f'"{one.graph}" in process {one.name}' for one in found)
-        raise TargetError(f'no graph "{named}" runs that could be looked at; there is {there}')
-    return fitting
 
 
 def _once(line: Line | RealmLine, json: bool) -> int:

@@ -104,3 +104,46 @@ def failing() -> hfg.Graph:
     graph.connect(graph.add(steps()).out, graph.add(fails()).ports.inputs["step"])
     return graph
 """
+
+
+@pytest.mark.rule("T5")
+def test_the_time_is_that_of_passing_whatever_stamp_a_node_sets(command: Command) -> None:
+    with Path("steps.py").open("a", encoding="utf-8") as file:
+        file.write(STAMPED)
+    shown = command("tap", "steps.py:stamped", "old.out", *VIRTUAL)
+    assert shown.out.splitlines() == ["0.300 s  1", "0.600 s  2", "0.900 s  END"]
+
+
+STAMPED = """
+class Old(hfg.Node):
+    out = hfg.Output(int)
+
+    async def process(self) -> None:
+        import asyncio
+        await asyncio.sleep(0.3)
+        self.count = getattr(self, "count", 0) + 1
+        if self.count == 3:
+            raise hfg.EndOfStream
+        self.out.send(self.count, stamp=-1000.0)
+
+def stamped() -> hfg.Graph:
+    graph = hfg.Graph("stamped")
+    graph.connect(graph.add(Old(), name="old").out, graph.output("out", int))
+    return graph
+"""
+
+
+@pytest.mark.parametrize("edge", ["a -> b.out", "a -> b.out -> a c.step", "a c.out"])
+def test_names_of_nodes_may_hold_blanks_and_arrows(command: Command, edge: str) -> None:
+    with Path("steps.py").open("a", encoding="utf-8") as file:
+        file.write(ARROWS)
+    assert command("tap", "steps.py:arrows", edge, *VIRTUAL, "-n", "1").out == "0.000 s  0\n"
+
+
+ARROWS = """
+def arrows() -> hfg.Graph:
+    graph = hfg.Graph("arrows")
+    graph.add(steps(), name="a -> b") >> graph.add(third(), name="a c")
+    graph.connect(graph["a c"].out, graph.output("out", int))
+    return graph
+"""

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -142,6 +143,25 @@ def test_tap_prints_what_passes_a_port_of_a_run_elsewhere(command: Command, json
     else:
         values = [int(line.split()[-1]) for line in lines]
     assert values == [values[0], values[0] + 1, values[0] + 2]
+
+
+@needs_sockets
+def test_tap_shows_seconds_since_the_run_began_and_finds_a_run_by_its_name(command: Command) -> None:
+    with program(watch=True):
+        time.sleep(0.05)  # the run is older than the tap: that is what is to be seen
+        shown = command("tap", "ticking", "ticks.out", "--limit", "2")
+        with Line(str(os.getpid())) as line:
+            now = line.ask(Question("glance"))
+        several = command("tap", "ticking", "ticks.out", "--until", "1")
+    assert now is not None
+    assert now.glance is not None
+    first, second = (float(line.split()[0]) for line in shown.out.splitlines())
+    assert 0.05 <= first < second <= now.glance.duration_s + 0.001
+    assert "the run ticking goes on as it is" in several.err
+    with program(watch=True), program(watch=True):
+        listed = command("tap", "ticking", "ticks.out")
+    assert listed.code == 2
+    assert f"as in hfg tap {os.getpid()}" in listed.err
 
 
 @needs_sockets

@@ -17,7 +17,7 @@ from hfg.recording import File, Playing, play_into
 ROOT = Path(__file__).resolve().parents[2]
 OF_TIME = {"began", "call", "last", "sequence", "silent", "stamp", "time", "timestamp", "waited"}
 DETERMINISTIC = ("hello", "word_count", "many_requests")
-"""Examples with synchronous graphs whose nodes depend on their inputs alone: everything that passes is the same (F7)."""
+"""Examples with synchronous graphs whose nodes depend on their inputs only: everything that passes is the same (F7)."""
 
 EXAMPLES = (
     *DETERMINISTIC,

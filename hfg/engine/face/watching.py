@@ -280,9 +280,8 @@ class _Guest(asyncio.Protocol):
         return self._door.name
 
     async def _tell(self, looking: Tap, *, json: bool) -> None:
-        began = self._door.run.now()
         with looking:
             async for token in looking:
                 await self._may_write.wait()
-                self._way.write(line_of(token, began, json=json).encode())
+                self._way.write(line_of(token, looking.passed_s, json=json).encode())
         self._way.close()

@@ -51,12 +51,12 @@ def text(value: Any) -> str:
     return " ".join(str(_text(value)).split("\n"))
 
 
-def line_of(token: Token[Any], began: float, *, json: bool) -> str:
-    """Describe a token on one line, for people with the seconds since `began`, or as JSON."""
+def line_of(token: Token[Any], passed_s: float, *, json: bool) -> str:
+    """Describe a token on one line, for people with the seconds at which it passed, or as JSON."""
     if json:
         return encode(token).decode() + "\n"
     modifier = f"  ({token.activity:+d})" if token.activity else ""
-    return f"{token.stamp - began:.3f} s  {text(token.value)}{modifier}\n"
+    return f"{passed_s:.3f} s  {text(token.value)}{modifier}\n"
 
 
 def _writable(value: Any, depth: int) -> Any:

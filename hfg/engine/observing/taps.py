@@ -39,6 +39,9 @@ class Tap:
     """Tokens as they pass a port or an edge of a run, markers too: an async iterator that ends with the run.
 
     It looks from the moment it is made until `close()`, the end of a `with` block, or until nobody holds it any more.
+
+    Attributes:
+      passed_s: when the token that was iterated over last passed, in seconds since the run began.
     """
 
     def __init__(self, buffer: _Buffer, max_rate_hz: float | None, detach: Callable[[], object]) -> None:
@@ -47,6 +50,7 @@ class Tap:
         self._pause_s = 1.0 / max_rate_hz if max_rate_hz else 0.0
         self._next_at = float("-inf")
         self._given = 0
+        self.passed_s = 0.0
 
     @property
     def seen(self) -> int:
@@ -87,7 +91,8 @@ class Tap:
         if self._pause_s:
             await self._pause()
         self._given += 1
-        return buffer.kept.popleft()
+        self.passed_s, token = buffer.kept.popleft()
+        return token
 
     async def _pause(self) -> None:
         """Keep to the rate; meanwhile newer tokens take the place of older ones. At the end of the run, do not wait."""
@@ -119,9 +124,10 @@ class Looker(Protocol):
 class _Buffer:
     """What a tap keeps; held by what it looks at, while the tap is held by whoever reads it."""
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, elapsed: Callable[[], float]) -> None:
         self.size = size
-        self.kept: deque[Token[Any]] = deque(maxlen=size)
+        self.kept: deque[tuple[float, Token[Any]]] = deque(maxlen=size)
+        self._elapsed = elapsed
         self.seen = 0
         self.latest: Token[Any] | None = None
         self.more = asyncio.Event()
@@ -131,7 +137,7 @@ class _Buffer:
         """A token passes."""
         self.seen += 1
         self.latest = token
-        self.kept.append(token)
+        self.kept.append((self._elapsed(), token))
         self.more.set()
 
     def miss(self, count: int) -> None:
@@ -144,8 +150,16 @@ class _Buffer:
         self.more.set()
 
 
-def make_tap(size: int | None, max_rate_hz: Any, detach: Callable[[], object]) -> tuple[Tap, _Buffer]:
+def make_tap(
+    size: int | None, max_rate_hz: Any, elapsed: Callable[[], float], detach: Callable[[], object]
+) -> tuple[Tap, _Buffer]:
     """Make a tap, and the buffer that is to be filled for it; `detach` ends that.
+
+    Args:
+      size: tokens that are kept for the reader.
+      max_rate_hz: at which tokens are given.
+      elapsed: gives the seconds since the run began.
+      detach: is called when nobody reads any more.
 
     Raises:
       UsageError: the size or the rate cannot be.
@@ -154,7 +168,7 @@ def make_tap(size: int | None, max_rate_hz: Any, detach: Callable[[], object]) -
         raise UsageError(f"size is how many tokens a tap keeps, 1 or more, got {size!r}")
     if max_rate_hz is not None and not (isinstance(max_rate_hz, int | float) and max_rate_hz > 0):
         raise UsageError(f"max_rate_hz is how many tokens a second a tap gives at most, got {max_rate_hz!r}")
-    buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1))
+    buffer = _Buffer(size or (_SIZE if max_rate_hz is None else 1), elapsed)
     return Tap(buffer, max_rate_hz, detach), buffer
 
 
@@ -177,7 +191,7 @@ class Taps:
           GraphError: there is no such path.
         """
         found: list[Callable[[], object]] = []
-        tap, buffer = make_tap(size, max_rate_hz, lambda: [end() for end in found])
+        tap, buffer = make_tap(size, max_rate_hz, self._engine.elapsed, lambda: [end() for end in found])
         found.append(self.look(what, buffer))
         return tap
 
@@ -338,9 +352,9 @@ class Taps:
 
 def _with_same_tokens(edges: Iterable[Any]) -> list[tuple[Any, list[Any]]]:
     """Each edge with those that carry the same tokens: of one output; first those that carry activity too."""
-    carrying: dict[str, list[Any]] = {}
+    carrying: dict[Any, list[Any]] = {}
     for edge in sorted(edges, key=lambda edge: not edge.active):
-        carrying.setdefault(edge.label.partition(" -> ")[0], []).append(edge)
+        carrying.setdefault(edge.source_port, []).append(edge)
     return [(edge, group if len(group) > 1 else []) for group in carrying.values() for edge in group]
 
 

@@ -7,7 +7,7 @@ A node and its ports are the same whatever they are called; an edge is known by 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Set
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from hfg.engine.runtime.engine import Engine
 
 __all__ = ["Ends", "behind", "edges_at", "is_gone", "is_near", "place_of"]
+
+_ARROW: Final = " -> "
 
 
 class Ends(msgspec.Struct, frozen=True):
@@ -43,12 +45,15 @@ def place_of(engine: Engine, what: Any) -> Any:
         return Ends(wholes[0].source_port, wholes[0].target_port) if len(wholes) == 1 else what
     if not isinstance(what, str):
         return what
-    if " -> " not in what:
-        return engine.graph[what]
-    labels = {edge.label: edge for edge in _edges(engine)}
-    if what not in labels:
-        raise GraphError(f'there is no edge "{what}" in this run; {suggest(what, labels)}')
-    return Ends(labels[what].source_port, labels[what].target_port)
+    labels = {edge.label: edge for edge in _edges(engine)} if _ARROW in what else {}
+    if what in labels:
+        return Ends(labels[what].source_port, labels[what].target_port)
+    try:
+        return engine.graph[what]  # a node's name may have an arrow in it
+    except GraphError:
+        if _ARROW not in what:
+            raise
+        raise GraphError(f'there is no edge "{what}" in this run; {suggest(what, labels)}') from None
 
 
 def edges_at(engine: Engine, place: Any) -> list[Any]:

@@ -297,7 +297,7 @@ class CutRun(Run):
             return super().tap(what, size=size, max_rate_hz=max_rate_hz)
         crossing = self._asking.crossing
         looking: list[Callable[[], object]] = []
-        tap, buffer = make_tap(size, max_rate_hz, lambda: [end() for end in looking])
+        tap, buffer = make_tap(size, max_rate_hz, self._engine.elapsed, lambda: [end() for end in looking])
 
         def seen(part: str, told: Seen) -> None:
             before = counted.get(part, 0)
