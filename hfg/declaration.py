@@ -40,7 +40,7 @@ __all__ = [
     "snake_case",
 ]
 
-HOOKS: Final = ("setup", "ready", "end", "teardown", "on_activated", "on_deactivated")
+HOOKS: Final = ("setup", "ready", "end", "teardown", "on_activated", "on_deactivated", "do")
 """Methods of a node that a runner calls besides `process`."""
 
 RESERVED: Final = frozenset(
@@ -118,6 +118,7 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
         found = inspect.getattr_static(cls, hook)
         if getattr(cls, hook) is not getattr(base, hook) and inspect.isfunction(found):
             _behind_self(found, hook, where)
+    completes = _do_activity(cls, base, where, is_subgraph)
     result: Result = "none" if not outputs else "single" if len(outputs) == 1 else "fields"
     kind = NodeType(
         name=snake_case(cls.__name__),
@@ -137,12 +138,30 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
         shared=shared_names(inputs, outputs, events, slots),
         declared=declared,
         hooks=frozenset(name for name in HOOKS if getattr(cls, name) is not getattr(base, name)),
+        completes=completes,
         caller=None if signature is None else _caller(signature),
         vectors=types.MappingProxyType(vectors),
     )
     check_names(kind, where, _SUBGRAPH_RESERVED if is_subgraph else RESERVED)
     install_ports(cls, kind, base)
     return kind
+
+
+def _do_activity(cls: Any, base: type, where: str, is_subgraph: bool) -> Any:
+    """What the do-activity of a type returns (rule A15); None, as of one that says nothing, if it has none."""
+    found = cls.do
+    if found is getattr(base, "do") or isinstance(found, _DECLARATIONS):  # noqa: B009 - type checkers know no base but Node
+        return None  # a port of this name is refused as such
+    if is_subgraph:
+        raise DeclarationError(
+            f"{where}: a subgraph runs no code of its own, so it has no do-activity; write do() in a node inside"
+        )
+    if not inspect.iscoroutinefunction(found):
+        raise DeclarationError(
+            f'{where}: "do" is reserved for the do-activity of a node and has to be `async def do(self)`; got '
+            f"{found!r:.80}: choose another name, or make it async"
+        )
+    return hints_of(found, f"{where}.do").get("return", Any)
 
 
 def _of(declared: Mapping[str, Declaration], kind: type[D]) -> dict[str, D]:

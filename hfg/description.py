@@ -96,6 +96,7 @@ class NodeType:
       shared: names that an input side and an output side both use; the short form `node.name` is refused for them.
       declared: the declarations in the class by name; identity tells a method reached by `super()` from the node's own.
       hooks: the hooks it overrides.
+      completes: type of what `do` returns (rule A15).
       caller: makes `node._process_call()`.
       vectors: vectors of ports, whose ports are among the others, "values[0]" ...
       layout: of a type with vectors of outputs, for each declared output how many ports it has, None for no vector.
@@ -120,6 +121,7 @@ class NodeType:
     shared: frozenset[str] = frozenset()
     declared: Mapping[str, Any] = field(default_factory=dict)
     hooks: frozenset[str] = frozenset()
+    completes: Any = None
     caller: Callable[[Any], Callable[..., Any]] | None = None
     vectors: Mapping[str, VectorSpec] = field(default_factory=dict)
     layout: tuple[int | None, ...] = ()

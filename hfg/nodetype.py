@@ -80,6 +80,7 @@ class Node:
         "__weakref__",
         "_active",
         "_options",
+        "_outdated",
         "_parameters",
         "_path_log",
         "_place",
@@ -93,6 +94,7 @@ class Node:
     _path_log: Log | None
     _options: Any  # written by the graph
     _parameters: dict[str, Any]  # the live values; change them by `_set_parameter`
+    _outdated: Callable[[], bool] | None  # whether a do-activity asks that is about to end, while there is one (A15)
     _place: Place | None  # written by the graph
     _start_task: Callable[[Coroutine[Any, Any, Any]], None] | None  # while somebody runs it
 
@@ -101,6 +103,7 @@ class Node:
     processed: Event[None] = automatic_event("processed")
     failed: Event[Failure] = automatic_event("failed")
     timeout: Event[None] = automatic_event("timeout")
+    completed: Event[Any] = automatic_event("completed")
     enable = automatic_slot("enable")
     disable = automatic_slot("disable")
     activate = automatic_slot("activate")
@@ -116,6 +119,7 @@ class Node:
           ValueError: a value breaks the parameter's limits.
         """
         self._active = False
+        self._outdated = None
         self._written_before = None
         self._path_log = None
         self._options = None
@@ -172,6 +176,21 @@ class Node:
 
     def teardown(self) -> Any:
         """Close what `setup` opened; called in any case."""
+
+    async def do(self) -> Any:
+        """Work for as long as the node is active (rule A15).
+
+        Overridden, it starts when A(v) becomes 1, after `on_activated`, and is cancelled when A(v) becomes 0 or the
+        node is disabled or torn down. If it returns first, the event `completed` is triggered with what it returned.
+        It may trigger events and await anything; outputs belong to firings.
+
+        Example:
+          >>> import asyncio
+          >>> class Approach(Node):
+          ...     async def do(self) -> str:
+          ...         await asyncio.sleep(2)
+          ...         return "there"
+        """
 
     def on_activated(self) -> Any:
         """Learn that A(v) became 1."""
@@ -241,9 +260,10 @@ class Node:
     def active(self) -> bool:
         """A(v) of the paper; False outside a run.
 
-        Code in a thread sees each change at once, but under the virtual clock what was when it began (R6).
+        Code in a thread sees each change at once, but under the virtual clock what was when it began (R6). A `do` that
+        was cancelled never sees a later activity than its own (A15).
         """
-        return self._active
+        return self._active and (self._outdated is None or not self._outdated())
 
     @property
     def log(self) -> Logger:
@@ -319,6 +339,13 @@ class Node:
                 return SlotPort(self, name, type_.slots[name].type)
             case "parameter" if name in type_.parameters and type_.parameters[name].is_port:
                 return ParameterPort(self, name, type_.parameters[name])
+            case "event" if name == "completed" and "do" in type_.hooks:
+                return EventPort(self, name, type_.completes)
+            case "event" if name == "completed":
+                raise UsageError(
+                    f'"{_name(self)}" has no event "completed": its type {type_.name} has no do-activity; write '
+                    "`async def do(self)` in its class (rule A15)"
+                )
             case "event" if name in AUTOMATIC_EVENTS and (not type_.is_subgraph or name in SUBGRAPH_EVENTS):
                 return EventPort(self, name, AUTOMATIC_EVENTS[name])
             case "slot" if name in AUTOMATIC_SLOTS and (not type_.is_subgraph or name in SUBGRAPH_SLOTS):

@@ -25,6 +25,9 @@ __all__ = [
     "CallOutcome",
     "CallStarted",
     "Consumer",
+    "DoEnded",
+    "DoOutcome",
+    "DoStarted",
     "DropReason",
     "EditWaits",
     "ErrorRaised",
@@ -63,6 +66,7 @@ Consumer: TypeAlias = Callable[[TraceEvent], Any] | list[TraceEvent] | deque[Tra
 
 FiringKind: TypeAlias = Literal["process", "silent", "end"]
 FiringOutcome: TypeAlias = Literal["done", "silent", "ended", "failed", "abandoned"]
+DoOutcome: TypeAlias = Literal["completed", "cancelled", "failed"]
 CallOutcome: TypeAlias = Literal["done", "failed", "abandoned"]
 DropReason: TypeAlias = Literal["overflow", "disabled", "ended", "removed", "stopped"]
 ActivityCause: TypeAlias = Literal["token", "sent", "slot", "reset", "returned"]
@@ -194,6 +198,22 @@ class ActivityLost(TraceEvent, frozen=True):
     """A +1 that nobody can have (A8): its sender is gone, or a slot of a subgraph took it; or a removed node's path."""
 
     edge: str
+
+
+class DoStarted(TraceEvent, frozen=True):
+    """The code of a node's do-activity starts (A15)."""
+
+    node: str
+
+
+class DoEnded(TraceEvent, frozen=True):
+    """The do-activity has ended: it returned ("completed"), was cancelled, or failed (A15).
+
+    One that the end of the run cuts short is not mentioned.
+    """
+
+    node: str
+    outcome: DoOutcome
 
 
 class NodeEnded(TraceEvent, frozen=True):

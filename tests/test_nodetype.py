@@ -240,8 +240,8 @@ def test_names_are_in_snake_case(name: str, snake: str) -> None:
 def test_the_public_names_of_a_node_are_exactly_the_reserved_ones() -> None:
     assert {name for name in dir(hfg.Node) if not name.startswith("_")} == RESERVED
     words = """
-        setup process ready end teardown on_activated on_deactivated ports place active log inner start_soon
-        activated deactivated processed failed timeout enable disable activate deactivate reset
+        setup process ready end teardown on_activated on_deactivated do ports place active log inner start_soon
+        activated deactivated processed failed timeout completed enable disable activate deactivate reset
     """
     assert set(words.split()) == RESERVED
 

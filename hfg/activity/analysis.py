@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from hfg.activity.explicit import may_give_activity
 from hfg.graph.checks import also
 from hfg.graph.checks.flow import never_fires
-from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, scope_end
+from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat.order import strongly_connected
 from hfg.problem import Problem
 
@@ -118,19 +118,28 @@ class ActivityAnalysis:
         ):
             if item.active_for_s is not None:
                 asks.setdefault(index, []).append("it has active_for_s")
+        for node in self.flat.nodes:
+            if _does(node):
+                asks.setdefault(node.index, []).append("it has a do-activity, which runs only while it is active")
         return asks
 
 
 @also
 def activity_problems(flat: FlatGraph) -> Iterator[Problem]:
     """Who waits for activity that never comes, edges that never carry it, and where one state becomes two."""
-    if not flat.gates and not any(edge.active for edge in flat.edges) and not _has_time_limits(flat):
+    asked = flat.gates or _has_time_limits(flat) or any(map(_does, flat.nodes))
+    if not asked and not any(edge.active for edge in flat.edges):
         return
     found = ActivityAnalysis(flat)
     yield from _never_active(found)
     yield from _idle_edges(found)
     yield from _losing_edges(found)
     yield from _forks(found)
+
+
+def _does(node: FlatNode) -> bool:
+    """Whether it has a do-activity (A15)."""
+    return "do" in node.node._type.hooks
 
 
 def _has_time_limits(flat: FlatGraph) -> bool:

@@ -30,8 +30,9 @@ AUTOMATIC_EVENTS: Final[dict[str, Any]] = {
     "processed": None,
     "failed": Failure,
     "timeout": None,
+    "completed": Any,
 }
-"""Name and type of the events that the runner triggers."""
+"""Name and type of the events that the runner triggers; `completed` only where there is a do-activity (A15)."""
 
 AUTOMATIC_SLOTS: Final = ("enable", "disable", "activate", "deactivate", "reset")
 """Slots that the runner itself answers, whatever their signals carry."""

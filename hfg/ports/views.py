@@ -64,10 +64,14 @@ class PortView(Mapping[str, P_co], Generic[P_co]):
     def __repr__(self) -> str:
         return f"<{self._kind}s {list(self._specs)}>"
 
+    def _of_the_runner(self) -> list[str]:
+        has_do = "do" in self._node._type.hooks
+        return [name for name in AUTOMATIC_EVENTS if has_do or name != "completed"]
+
     def _automatic(self) -> tuple[str, ...]:
         box = self._node._type.is_subgraph
         if self._kind == "event":
-            return SUBGRAPH_EVENTS if box else (*AUTOMATIC_EVENTS, *map(sent_name, self._node._type.outputs))
+            return SUBGRAPH_EVENTS if box else (*self._of_the_runner(), *map(sent_name, self._node._type.outputs))
         if self._kind == "slot":
             return SUBGRAPH_SLOTS if box else AUTOMATIC_SLOTS
         return ()

@@ -21,6 +21,8 @@ from hfg.trace import (
     ActivityLost,
     CallEnded,
     CallStarted,
+    DoEnded,
+    DoStarted,
     EditWaits,
     ErrorRaised,
     EventTriggered,
@@ -156,7 +158,7 @@ class Replay:
         """
         if isinstance(event, RunPaused | RunResumed):
             self._paused = isinstance(event, RunPaused)
-        if self._is_idle(event):
+        if self._is_idle(event) or self._was_torn_down(event):
             return
         if event.time > self.machine.now + _SAME_TIME:
             self._let_time_go(event)
@@ -171,6 +173,14 @@ class Replay:
         elif not self._match(event):
             self._decide(event)
         self.seen.append(event)
+
+    def _was_torn_down(self, event: TraceEvent) -> bool:
+        """Whether a do-activity ends because an edit takes its node away, before or behind the edit itself (R4)."""
+        if not isinstance(event, DoEnded) or event.outcome != "cancelled" or key(event) in map(key, self.expected):
+            return False
+        index = self.machine.paths.get(event.node)
+        doing = None if index is None else self.machine.activity_of(self.machine.stations[index])
+        return doing is None or (not doing.cancelled and bool(self.machine.held))
 
     def _follow_edit(self, event: StructureChanged) -> None:
         """The run is edited (R4): so is the reference."""
@@ -280,7 +290,8 @@ class Replay:
     def _end_tasks(self, node: str) -> None:
         """Nobody sees tasks end that were cancelled, or a reset, but that their node begins something."""
         for move in self.machine.moves():
-            cancelled = move.kind == "task" and self.machine.task_of(move).cancelled
+            task = self.machine.task_of(move) if move.kind == "task" else None
+            cancelled = task is not None and task.cancelled and not task.stepped  # else one sees that it ends (A15)
             if move.node == node and (cancelled or self._resets(move)):
                 self._apply(move)
 
@@ -484,7 +495,9 @@ def value_key(value: Any) -> Any:
 
 
 def _is_of_task(event: TraceEvent) -> bool:
-    return isinstance(event, ErrorRaised) and event.what.startswith('task "')
+    return isinstance(event, DoStarted | DoEnded) or (
+        isinstance(event, ErrorRaised) and event.what.startswith(('task "', "do()"))
+    )
 
 
 def _owner(event: str) -> str:

@@ -89,6 +89,7 @@ class Allowed:
     concurrency: bool = False  # several firings of async nodes under way at once
     retries: bool = False  # firings that fail are tried again
     tasks: bool = False  # nodes start something beside their firings, outside of subgraphs
+    doing: bool = False  # nodes have do-activities
     through: bool = False  # operators on edges, with schedulers and without
     iteration: bool = False  # inside of iteration
     endings: bool = False  # last words, sources without end that work for who will have ended
@@ -148,6 +149,7 @@ _INNER_WHERE: list[tuple[Callable[[Allowed], bool], list[str]]] = [
     (lambda allowed: allowed.sending and allowed.waiting, ["PassingLater"]),
     (lambda allowed: allowed.sending and allowed.events and allowed.failing_calls, ["Utters", "Utters"]),
     (lambda allowed: allowed.sending and allowed.waiting and allowed.events and allowed.failing_calls, ["UttersLater"]),
+    (lambda allowed: allowed.doing, ["Works"] * 6),
     (lambda allowed: allowed.endings and not allowed.plain, ["LastWord", "LastWord", "Hums"]),
     (lambda allowed: allowed.iteration and not allowed.plain, ["EachOfEach"]),
     (lambda allowed: allowed.tuned, ["Tuned"] * 6),
@@ -189,6 +191,7 @@ _WAITING = {
     "Unsteady",
     *_TENDING,
     *_PAUSING,
+    "Works",
 }
 _ANY_SLOTS = {"tell", "begin", "more", "hear", "ping", "gave"}
 _BOUNDED_SLOTS = {"say", "hand_on", "hear", "utter"}
@@ -305,6 +308,9 @@ class _Making:
                 return {"at": choose.number(2, 3)}
             case "Tends" | "Beats":  # whose steps of one moment are in the order in which they were set
                 return {"pause_s": choose.one_of([0.003, 0.01])}
+            case "Works":
+                manners = ["at once", "later", "tells", "fails", "resists", "clings", "long"]
+                return {"manner": choose.one_of(manners), "pause_s": choose.one_of([0.003, 0.01])}
             case "slow_double" | "Waiting" | "Unsteady":
                 return {"pause_s": choose.one_of([0.0, 0.003, 0.01])}
             case "Tuned":
@@ -339,7 +345,7 @@ class _Making:
             options["max_rate_hz"] = 100.0
         if kind == "Clings":
             return options
-        if kind in ("Failing", "picky", "gives_up", "Utters", "UttersLater", *_TENDING, *_SPEAKING) or (
+        if kind in ("Failing", "picky", "gives_up", "Utters", "UttersLater", "Works", *_TENDING, *_SPEAKING) or (
             allowed.failures and choose.chance(5)
         ):
             options["on_error"] = choose.one_of(
@@ -389,6 +395,7 @@ class _Making:
             for port, spec in self.type_of(node.name).events.items()
             if spec.type is not None
         ]
+        own += [(node.name, "event", "completed") for node in nodes if node.type == "Works"]
         return own + (self._sent(nodes) if self.choose.chance(self._seldom(40)) else [])
 
     def _sent(self, nodes: Sequence[NodePlan]) -> list[End]:
@@ -487,6 +494,9 @@ class _Making:
                 candidates += self.signals(nearby)
             if candidates:
                 self._edge(choose.one_of(candidates), (node.name, "slot", port))
+        for node in self.nodes:
+            if node.type == "Works" and allowed.activity and allowed.start and choose.chance(40):
+                self._edge(("", "event", "start"), (node.name, "slot", "activate"), active=True)
         if allowed.activity and allowed.start and slots and choose.chance(60):
             begins = [(node.name, "slot", port) for node, port in slots if port in _ANY_SLOTS]
             begins += [(node.name, "slot", "activate") for node in self.nodes if node.type not in _LEFT_ALONE]
@@ -599,7 +609,8 @@ class _Making:
             members = inside[box.name] = set().union(*({one, *inside.get(one, ())} for one in box.members))
             first = min(index for index, node in enumerate(self.nodes) if node.name in members)
             if allowed.events and choose.chance(25):
-                self._call_box(box.name, self.nodes[:first])
+                does = any(node.type == "Works" and node.name in members for node in self.nodes)
+                self._call_box(box.name, self.nodes[:first], resets=not does)  # which would have to wait for its end
             if allowed.events and allowed.activity and choose.chance(25):
                 self._hear_box(box.name)
             if allowed.activity and choose.chance(10):
@@ -612,9 +623,10 @@ class _Making:
             found.append(box)
         return found, gates
 
-    def _call_box(self, name: str, before: Sequence[NodePlan]) -> None:
+    def _call_box(self, name: str, before: Sequence[NodePlan], *, resets: bool) -> None:
         choose, allowed = self.choose, self.allowed
-        slots = ["disable", "enable", "reset"] if allowed.disabling else []
+        slots = ["disable", "enable"] if allowed.disabling else []
+        slots += ["reset"] if allowed.disabling and resets else []
         slots += ["deactivate"] if allowed.activity else []
         if slots:
             slot = choose.one_of(slots)

@@ -65,6 +65,7 @@ __all__ = [
     "Utters",
     "UttersLater",
     "Waiting",
+    "Works",
     "add",
     "ascript",
     "calling",
@@ -1032,6 +1033,56 @@ class Beats(hfg.Node):
     def hear(self) -> None:
         """Count."""
         self.heard += 1
+
+
+class Works(hfg.Node):
+    """Works while it is active, in one of several manners, a few times; passes on what comes meanwhile."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    told = hfg.Event(int)
+    manner = hfg.Parameter("later")
+    pause_s = hfg.Parameter(0.003)
+    begun: Any = hfg.State(0)
+
+    def process(self, value: int) -> int:
+        """Pass the value on."""
+        return value
+
+    @hfg.slot
+    def hear(self) -> None:
+        """Do nothing; the signal may carry activity."""
+
+    async def do(self) -> int:
+        """Return at once or later, tell something, fail, resist its end or work for long; so often that rings end."""
+        self.begun += 1
+        if self.begun > 3:
+            await asyncio.sleep(0.05)
+            raise ValueError("that is enough")
+        match self.manner:
+            case "later":
+                await asyncio.sleep(self.pause_s)
+            case "tells":
+                self.told.trigger(self.begun)
+                await asyncio.sleep(self.pause_s)
+                await self.told.trigger_wait(-self.begun)
+            case "fails":
+                await asyncio.sleep(self.pause_s)
+                raise ValueError(f"cannot do it for the {self.begun}. time")
+            case "resists" | "clings":
+                await self._resist()
+            case "long":
+                await asyncio.sleep(0.3)
+        return int(self.begun)
+
+    async def _resist(self) -> None:
+        try:
+            await asyncio.sleep(4 * self.pause_s)
+        except asyncio.CancelledError:
+            await asyncio.sleep(self.pause_s)
+            self.told.trigger(100 + int(self.active))
+            if self.manner == "resists":
+                raise
 
 
 @hfg.node

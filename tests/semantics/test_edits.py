@@ -19,7 +19,7 @@ def test_an_edited_run_does_what_the_oracle_permits(block: int) -> None:
 
 def check(seed: int) -> int:
     """Edit one run; gives how many edits were carried out."""
-    allowed = Allowed(failures=seed % 3 == 0, waiting=seed % 2 == 0)
+    allowed = Allowed(failures=seed % 3 == 0, waiting=seed % 2 == 0, doing=seed % 4 == 3)
     if seed % 10 == 0:
         allowed = Allowed(threads=True, lossy=False, gates=False)
     edited = EditedRun(seed, allowed, quiet=seed % 3 == 1)

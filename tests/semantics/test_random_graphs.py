@@ -29,6 +29,7 @@ SEVERAL_AT_ONCE = Allowed(concurrency=True)
 TRIED_AGAIN = Allowed(concurrency=True, retries=True)
 TENDING = Allowed(tasks=True, max_nodes=6)
 SENDING = Allowed(sending=True)
+DOING = Allowed(doing=True, max_nodes=5)
 THREADS = Allowed(threads=True, lossy=False, gates=False)
 
 
@@ -150,6 +151,17 @@ def test_so_it_does_where_nodes_send_in_every_way_there_is(block: int) -> None:
         if reference(plan, seed) is not None:
             check(plan, seed)
             check(plan, seed, short_ways_differ)
+
+
+@pytest.mark.rule("A15", "X1", "R5", "F10")
+@pytest.mark.parametrize("block", range(4))
+def test_so_it_does_where_nodes_have_do_activities(block: int) -> None:
+    """Some return at once, some tell something, fail, resist their end or last; some are disabled, reset, restarted."""
+    drawn = ((seed, random_plan(seed, DOING)) for seed in itertools.count(300 * block))
+    chosen = ((seed, plan) for seed, plan in drawn if "Works" in {node.type for node in plan.nodes})
+    runs = ((seed, plan) for seed, plan in chosen if reference(plan, seed) is not None)
+    for seed, plan in itertools.islice(runs, 15):
+        check(plan, seed)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

@@ -25,7 +25,7 @@ from hfg.engine.editing.turns import Turns
 from hfg.engine.executing.code import answer, whose_code
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import BACKOFF, DISABLED, ENDED, UNREADY, Worker
-from hfg.engine.rules import concurrency, lifecycle, subgraphs
+from hfg.engine.rules import concurrency, doing, lifecycle, subgraphs
 from hfg.engine.runtime import plan
 from hfg.engine.runtime import ports as engine_ports
 from hfg.engine.runtime.callbacks import Edited
@@ -323,6 +323,8 @@ class Edits:
                 await self._become(worker, before)
             except HfgError as error:
                 self._engine.finish("failed", error)
+            else:
+                doing.afresh(worker)
 
     async def _become(self, worker: Worker, node: Any) -> None:
         """Let a worker run another node: teardown, setup. A teardown that fails is told with the other errors (X3)."""
@@ -361,6 +363,8 @@ class Edits:
         edited = Edited([worker for worker, _, _ in how.swapped], swapped, nodes)
         for find_again in engine.callbacks.edited:
             find_again(edited)
+        for worker in edited.workers:
+            doing.afresh(worker)
         for worker in edit.come:
             engine.core.upstairs.idle_again(worker)
         if engine.settings.check_all:

@@ -134,9 +134,7 @@ class Carrier:
 
     def cancel(self) -> None:
         """Cancel the coroutine under way; without one, let the task end."""
-        if self.waiting:
-            self._cancelled(None)
-        else:
+        if not self.take_cancellation(None):
             self.task.cancel()
 
     def drop(self) -> None:

@@ -17,8 +17,9 @@ from hfg.engine.executing.carrier import Carrier
 from hfg.engine.executing.code import CodeRunner, speak_for
 from hfg.engine.model.core import PENDING, Core
 from hfg.engine.model.flights import current_flight
-from hfg.engine.model.tasks import Task, Tasks, current_task
+from hfg.engine.model.tasks import Doing, Task, Tasks, current_task
 from hfg.engine.model.worker import DISABLED, ENDED, Worker
+from hfg.engine.rules import doing as do_activity
 from hfg.engine.rules import errors
 from hfg.errors import NodeError, NotRunning, UsageError
 from hfg.logs import current_log
@@ -61,8 +62,13 @@ class TaskRunner:
         self.under_way: dict[Task, None] = {}
         self._problems: list[NodeError] = []
 
-    def start(self, worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> None:
+    def start(self, worker: Worker, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
         """Run a coroutine as a child of a node, from the loop's next pass on.
+
+        Args:
+          worker: of the node.
+          coroutine: what is run.
+          doing: it is the node's do-activity, which no code has started (A15).
 
         Raises:
           UsageError: the node is in a thread, or the call comes from one.
@@ -73,15 +79,18 @@ class TaskRunner:
         if refusal is not None:
             coroutine.close()
             raise refusal
-        _not_again(worker)
+        if doing is None:
+            _not_again(worker)
         if worker.blocked & DISABLED and not worker.opening:
             coroutine.close()  # a firing of a node that was switched off meanwhile: what it does goes nowhere (F10)
             return
         if worker.tasks is None:
             worker.start_tasks(Tasks(worker))
             self._core.upstairs.bind_ports(worker)  # what it sends is looked at from here on
-        task = Task(worker, name, coroutine)
+        task = Task(worker, name, coroutine, doing)
         worker.tasks.begin(task)
+        if doing is not None:
+            doing.begin(task)
         self.under_way[task] = None
         self._engine.soon(partial(self._begin, task, self._context(task)))
 
@@ -104,7 +113,7 @@ class TaskRunner:
 
     def _context(self, task: Task) -> contextvars.Context:
         """What the code that has started it sees, but for whose code it is."""
-        context = contextvars.copy_context()
+        context = contextvars.copy_context() if task.doing is None else self._code.context.copy()
         for one in _OF_THE_RUN:
             context.run(one.set, self._code.context[one])
         context.run(speak_for, task.worker)
@@ -124,6 +133,8 @@ class TaskRunner:
         carrier = Carrier(code.loop, f"hfg {worker.path} {task.name}", code.context, context, self._engine.give_way)
         task.be_carried(carrier)
         core.current = worker
+        if task.doing is not None:
+            do_activity.begun(worker)
         try:
             result = carrier.start(task.coroutine, partial(self._over, task))
         except KeyboardInterrupt:
@@ -132,31 +143,36 @@ class TaskRunner:
             self._over(task, None, error)
         else:
             if result is not PENDING:
-                self._over(task, None, None)
+                self._over(task, result, None)
         finally:
             core.current = None
 
-    def _over(self, task: Task, _result: object, error: BaseException | None) -> None:
+    def _over(self, task: Task, result: object, error: BaseException | None) -> None:
         """It has come to its end."""
         self._core.current = None
         if task in self.under_way:
-            self._engine.guard(partial(self._end, task, error))
+            self._engine.guard(partial(self._end, task, result, error))
             if self._core.over:
                 self._code.came_back.set()
             else:
                 self._engine.go_on()
 
-    def _end(self, task: Task, error: BaseException | None) -> None:
+    def _end(self, task: Task, result: object, error: BaseException | None) -> None:
         worker = task.worker
         del self.under_way[task]
         if task.carrier is None:
             task.coroutine.close()
         else:
             task.carrier.drop()
-        if error is not None and not isinstance(error, asyncio.CancelledError):
-            self._failed(task, error)
+        failure = None if isinstance(error, asyncio.CancelledError) else error
+        if task.doing is not None:
+            failure = do_activity.over(worker, task, result, error)
+        if failure is not None:
+            self._failed(task, failure)
         tasks: Tasks = worker.tasks
         tasks.over(task)
+        if task.doing is not None:
+            do_activity.go_on(worker)
 
     def _failed(self, task: Task, error: BaseException) -> None:
         """X1: the policy of its node decides; of one that was to end, it is told with other errors (X3)."""
@@ -164,7 +180,7 @@ class TaskRunner:
         what = task.what + (", after its end" if worker.blocked & ENDED else "")
         if self._core.over:
             self._problems.append(errors.as_node_error(worker, what, error))
-        elif task.cancelled and not worker.blocked & DISABLED:
+        elif task.cancelled and worker.tasks.ending and not worker.blocked & DISABLED:
             worker.tasks.problems.append(errors.as_node_error(worker, what, error))
         else:
             errors.fail_beside(worker, what, error)
@@ -183,7 +199,7 @@ class TaskRunner:
             worker = task.worker
             words = f"it was cancelled and did not end within {seconds:.1f} s"
             problems.append(NodeError(worker.path, task.what, words))
-            self._end(task, None)
+            self._end(task, None, None)
         return problems
 
 

@@ -18,6 +18,7 @@ from typing_extensions import override
 from hfg.engine.model.flights import Flight
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
+from hfg.engine.model.tasks import Doing
 from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.errors import EngineInternalError, HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
@@ -145,8 +146,8 @@ class Host(Protocol):
     def soon(self, callback: Callable[[], None]) -> None:
         """Call back at the loop's next pass."""
 
-    def start_task(self, worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> None:
-        """A node's code starts a task, a child of the node."""
+    def start_task(self, worker: Worker, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
+        """Start a task, a child of the node: its code has asked for it, or it is the node's do-activity (A15)."""
 
     def on_loop(self) -> bool:
         """Whether the caller is on the run's own thread."""

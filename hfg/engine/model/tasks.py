@@ -15,7 +15,7 @@ from hfg.errors import NodeError
 if TYPE_CHECKING:
     from hfg.engine.model.worker import Worker
 
-__all__ = ["Task", "Tasks", "current_task"]
+__all__ = ["Doing", "Task", "Tasks", "current_task"]
 
 
 class Task:
@@ -26,13 +26,17 @@ class Task:
       name: of its coroutine function.
       coroutine: what it runs.
       carrier: what carries it once it has begun.
-      cancelled: its node is torn down or switched off, or the run is over.
+      cancelled: its node is torn down or switched off, the run is over, or a do-activity is to end with A(v).
+      doing: of a do-activity.
     """
 
-    __slots__ = ("cancelled", "carrier", "coroutine", "name", "worker")
+    __slots__ = ("cancelled", "carrier", "coroutine", "doing", "name", "worker")
 
-    def __init__(self, worker: Worker, name: str, coroutine: Coroutine[Any, Any, Any]) -> None:
+    def __init__(
+        self, worker: Worker, name: str, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None
+    ) -> None:
         self.worker = worker
+        self.doing = doing
         self.name = name
         self.coroutine = coroutine
         self.carrier: Any = None
@@ -41,7 +45,7 @@ class Task:
     @property
     def what(self) -> str:
         """What it is called where it fails."""
-        return f'task "{self.name}"'
+        return f'task "{self.name}"' if self.doing is None else "do()"
 
     def be_carried(self, carrier: object) -> None:
         """It begins."""
@@ -58,6 +62,55 @@ class Task:
             self.carrier.cancel()
 
 
+class Doing:
+    """The do-activity of one node (A15): never two at once.
+
+    Attributes:
+      task: the one under way, which may be about to end.
+      due: it is to begin: A(v) has become 1, or the node was set up anew while A(v) is 1.
+      entering: how many `on_activated` hooks it has to wait for.
+    """
+
+    __slots__ = ("due", "entering", "task")
+
+    def __init__(self) -> None:
+        self.task: Task | None = None
+        self.due = False
+        self.entering = 0
+
+    def enter(self) -> None:
+        """A(v) has become 1; `on_activated` comes first."""
+        self.due = True
+        self.entering += 1
+
+    def entered(self) -> None:
+        """One `on_activated` is over."""
+        self.entering -= 1
+
+    def leave(self) -> None:
+        """A(v) has become 0."""
+        self.due = False
+        if self.task is not None and not self.task.cancelled:
+            self.task.cancel()
+
+    def be_due(self, due: bool) -> None:
+        """The node has been set up; whether it is active."""
+        self.due = due
+
+    def may_begin(self) -> bool:
+        """Whether it is to begin, as far as it knows itself."""
+        return self.due and not self.entering and self.task is None
+
+    def begin(self, task: Task) -> None:
+        """It has begun."""
+        self.due = False
+        self.task = task
+
+    def over(self) -> None:
+        """It has ended."""
+        self.task = None
+
+
 current_task: ContextVar[Task | None] = ContextVar("hfg.task", default=None)
 """Whose code runs, if it is that of a task; also in the tasks that it starts by itself."""
 
@@ -68,9 +121,10 @@ class Tasks:
     Attributes:
       waiting_room: how many wait until a queue has room (F8).
       problems: what those failed with that were cancelled, for whoever ends them.
+      doing: the do-activity of the node, which most types do not have.
     """
 
-    __slots__ = ("_on_rest", "_under_way", "_worker", "problems", "waiting_room")
+    __slots__ = ("_on_rest", "_under_way", "_worker", "doing", "problems", "waiting_room")
 
     def __init__(self, worker: Worker) -> None:
         self._worker = worker
@@ -78,6 +132,7 @@ class Tasks:
         self._on_rest: list[Callable[[], None]] = []
         self.waiting_room = 0
         self.problems: list[NodeError] = []
+        self.doing = Doing()
 
     def __len__(self) -> int:
         return len(self._under_way)
@@ -91,6 +146,11 @@ class Tasks:
     def move(self) -> bool:
         """Whether one of them does not only wait for room."""
         return len(self._under_way) > self.waiting_room
+
+    @property
+    def ending(self) -> bool:
+        """Whether somebody waits until all of them have ended."""
+        return bool(self._on_rest)
 
     def begin(self, task: Task) -> None:
         """One more."""
@@ -112,9 +172,10 @@ class Tasks:
         self._worker.core.waiting_room += how_many
 
     def cancel(self) -> None:
-        """Let all of them end."""
+        """Let all of them end; what is about to has been told once, and may take its time."""
         for task in list(self._under_way):
-            task.cancel()
+            if not task.cancelled:
+                task.cancel()
 
     def end(self, then: Callable[[], None]) -> bool:
         """Let all of them end; whether there are any, which `then` follows."""

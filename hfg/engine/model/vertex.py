@@ -28,6 +28,8 @@ __all__ = ["RunningEvent", "Vertex", "slots_first"]
 
 NOTHING: Final[dict[str, Any]] = {}  # shared by the many that have none; never written
 
+_OF_ACTIVITY: Final = ("on_activated", "on_deactivated", "do")
+
 # What all nodes of a type share: what absent inputs give, who wants the token, what must be connected, the outputs.
 _Shared = tuple[tuple[Any, ...], tuple[bool, ...], tuple[str, ...], tuple[str, ...]]
 _shared: dict[NodeType, _Shared] = {}
@@ -206,7 +208,7 @@ class Vertex:
         self.process = node._process_call() if kind.process_kind != "none" else None
         hook = _no_hook if self.silent_code else node._hook
         self.ready_hook = hook("ready")
-        self.has_hooks = hook("on_activated") is not None or hook("on_deactivated") is not None
+        self.has_hooks = any([hook(name) is not None for name in _OF_ACTIVITY])  # noqa: C419 - few
 
     def take_node(self, node: Node) -> None:
         """Stand for another node, whose hooks are about to be called; the rest of it follows by `fit`."""

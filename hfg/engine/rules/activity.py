@@ -1,4 +1,4 @@
-"""What follows when A(v) changes: hooks, automatic events, time-outs, gates, subgraphs (rules A9, A11, A12, G2).
+"""What follows when A(v) changes: hooks, automatic events, time-outs, gates, subgraphs (A9, A11, A12, A15, G2).
 
 And reset (A14).
 
@@ -7,7 +7,7 @@ Only workers marked `watched` come here. Stands on `sending`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, Literal
 
 import msgspec
@@ -15,6 +15,7 @@ import msgspec
 from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import AMID_NOTHING, RESTING, Worker
+from hfg.engine.rules import doing
 from hfg.engine.rules.agenda import consider, must_wait
 from hfg.engine.rules.modifiers import automatic, set_active, touch
 from hfg.engine.rules.sending import flush_automatic, tell, trigger
@@ -36,19 +37,35 @@ def changed(worker: Worker, active: bool) -> None:
             if scope.gates:
                 _look_at(scope)
     if worker.has_hooks:
-        _call_hook(worker, "on_activated" if active else "on_deactivated")
+        _call_hooks(worker, active)
     if worker.busy in AMID_NOTHING:
         tell(worker)
 
 
-def _call_hook(worker: Worker, name: str) -> None:
+def _call_hooks(worker: Worker, active: bool) -> None:
+    """What its code is told; the do-activity begins behind `on_activated` (A15)."""
+    if not doing.has(worker):
+        _call_hook(worker, "on_activated" if active else "on_deactivated", None)
+    elif active:
+        doing.entering(worker)
+        _call_hook(worker, "on_activated", doing.entered)
+    else:
+        doing.leave(worker)
+        _call_hook(worker, "on_deactivated", None)
+
+
+def _call_hook(worker: Worker, name: str, then: Callable[[Worker], None] | None) -> None:
     hook = worker.node._hook(name)
     if hook is None:
+        if then is not None:
+            then(worker)
         return
 
     def done(_result: object, error: BaseException | None) -> None:
         if error is not None:
             worker.core.upstairs.fail(worker, f"{name}()", error, answer=False)
+        if then is not None:
+            then(worker)
 
     worker.core.code.execute_aside(worker, hook, done)
 

@@ -43,6 +43,8 @@ def triggering(event: RunningEvent, emit: _Emit) -> _Emit:
         task = current_task.get()
         if task is None or task.worker is not worker:
             return emit(value, activity, stamp)
+        if task.doing is not None and task.cancelled and activity is None:
+            activity = 0  # what there is of activity by now is not that of its attempt (A15)
         if host.on_loop():
             trigger_beside(event, value, activity, stamp)
         else:  # from a thread that the task has started

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, ENDED, REMOVED, TORN_DOWN, Worker
-from hfg.engine.rules import wiring
+from hfg.engine.rules import doing, wiring
 from hfg.engine.rules.agenda import consider, unblock
 from hfg.engine.rules.modifiers import derive_scopes, discard
 from hfg.engine.rules.releasing import release
@@ -235,6 +235,7 @@ def enable(worker: Worker, then: Callable[[], None], *, fresh: bool = False) -> 
         wiring.refresh(worker)
         consider(worker)
         judge_sources(core)
+        doing.afresh(worker)
         then()
 
     if fresh:
@@ -282,6 +283,7 @@ def reset(worker: Worker, then: Callable[[], None]) -> None:
         wiring.refresh(worker)
         judge_sources(worker.core)
         end_tasks((worker,))
+        doing.afresh(worker)
         then()
 
     _afresh(worker, up)
@@ -312,6 +314,7 @@ def restart(worker: Worker, backoff_s: float) -> None:
             core.host.finish("failed", error)
         elif not worker.blocked & TORN_DOWN:
             worker.allow(BACKOFF)  # before those that wait have their turn: they may enable or reset it
+            doing.afresh(worker)
             then()
 
     def rest() -> None:

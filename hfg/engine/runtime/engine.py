@@ -24,6 +24,7 @@ from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
 from hfg.engine.model.policies import make_policy
 from hfg.engine.model.sharing import Sharing
+from hfg.engine.model.tasks import Doing
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import iterating, quiet
 from hfg.engine.runtime import plan, rx
@@ -216,9 +217,9 @@ class Engine:
         """See `Host`."""
         self.loop.call_soon(callback, context=self.context)
 
-    def start_task(self, worker: Worker, coroutine: Coroutine[Any, Any, Any]) -> None:
+    def start_task(self, worker: Worker, coroutine: Coroutine[Any, Any, Any], doing: Doing | None = None) -> None:
         """See `Host`."""
-        self.tasks.start(worker, coroutine)
+        self.tasks.start(worker, coroutine, doing)
 
     # --- groups -----------------------------------------------------------------------------------------------------
 

@@ -84,6 +84,8 @@ def async_in_threads(flat: FlatGraph) -> Iterator[Problem]:
         waiting = [f"its slot {slot.name}" for slot in kind.slots.values() if slot.is_async]
         if kind.process_kind.startswith("async"):
             waiting.insert(0, "it")
+        if "do" in kind.hooks:
+            waiting.append("its do-activity")
         if waiting and group is not None:
             yield Problem(
                 path=node.path,

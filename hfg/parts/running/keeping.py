@@ -283,7 +283,7 @@ class Keeper:
     def _snapshot(self) -> Snapshot:
         core = self._engine.core
         if core.tasks:
-            busy = next(worker.path for worker in core.workers if worker.tasks is not None)
+            busy = next(worker.path for worker in core.workers if worker.tasks)
             raise RunError(
                 f'group "{self._name}" has a ledger, and node "{busy}" has started a task beside its firings, of which '
                 "nothing can be kept: await what it does in the firing, or take ledger= from the group"

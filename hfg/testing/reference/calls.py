@@ -236,6 +236,8 @@ class Calling(Tending):
                 station.opening = False
             if not self.is_enabled(station.leaf.index):  # they last as long as its setup (F10)
                 self.cancel_tasks(station)
+            station.is_to_do = station.active
+            self.begin_to_do(station)
 
     def tear_down(self, station: Station) -> None:
         """Close what `setup` opened."""

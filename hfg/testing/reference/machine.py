@@ -720,6 +720,7 @@ class ReferenceMachine(Editing):
                 station.active_since = None
                 station.changes.append((self.next_tick(), "deactivated", None, None))
                 self.observe(ActivityChanged(self.now, station.path, False, "reset"))
+                self.follow_activity(station)
         self.settle()
         self.trigger(ROOT, "start", activity=1)
         self.settle()

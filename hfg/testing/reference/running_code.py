@@ -81,6 +81,7 @@ class RunningCode(Sending):
     def _trigger_of(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], None]:
         def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
             flight = self.flight_of(station)
+            activity = self.withheld(station, activity)
             if flight is not None:
                 flight.triggered = True
             if flight is not None and flight.in_thread:
@@ -93,6 +94,7 @@ class RunningCode(Sending):
     def _waiting_trigger_of(self, station: Station, name: str) -> Callable[[Any, int | None, float | None], Any]:
         async def trigger(value: Any, activity: int | None, stamp: float | None) -> None:
             flight = self.flight_of(station)
+            activity = self.withheld(station, activity)
             if flight is not None:
                 flight.triggered = True
             speaker = self.in_task if flight is None else flight
@@ -104,6 +106,12 @@ class RunningCode(Sending):
                 speaker.waiting_for = ""
 
         return trigger
+
+    def withheld(self, station: Station, activity: int | None) -> int | None:
+        """A15: what a do-activity sends that is to end carries nothing of a later activity of its node."""
+        task = self.in_task
+        is_outdated = task is not None and task.station is station and task.is_activity and task.cancelled
+        return 0 if is_outdated and activity is None else activity
 
     def start_task(self, station: Station, coroutine: Coroutine[Any, Any, Any]) -> None:
         """Run it beside the firings of the node."""

@@ -187,6 +187,11 @@ class Sending(State):
         hook = station.node._hook("on_activated" if active else "on_deactivated")
         if hook is not None:
             self.run_hook(station, hook)
+        self.follow_activity(station)
+
+    def follow_activity(self, station: Station) -> None:
+        """A15: begin or cancel the do-activity."""
+        raise NotImplementedError
 
     def run_hook(self, station: Station, hook: Any) -> None:
         """Run a hook to its end."""

@@ -118,6 +118,8 @@ class Task:
     code: Any = None
     cancelled: bool = False
     waiting_for: str = ""  # an event whose queues have no room (trigger_wait)
+    is_activity: bool = False  # the node's own do-activity (A15)
+    stepped: bool = False  # its code has begun
 
 
 @dataclass(eq=False)
@@ -157,6 +159,7 @@ class Station:
     opening: bool = False  # its `setup()` runs
     tasks: list[Task] = field(default_factory=list)  # under way beside its firings
     tasks_begun: int = 0
+    is_to_do: bool = False  # its do-activity has yet to begin (A15)
     stops_itself: bool = False  # `ready` raised EndOfStream
 
     @property

@@ -1,4 +1,4 @@
-"""What the code of a node starts beside its firings by `start_soon` (rules X1, X3, R5, F10, T5).
+"""What the code of a node starts beside its firings by `start_soon`, and its do-activity (X1, X3, R5, F10, T5, A15).
 
 A task is a child of its node: quiet waits for it, its errors are the node's, and it has ended before the node is torn
 down. Its steps are moves of their own, one task after another in the order in which they could go on.
@@ -6,13 +6,14 @@ down. Its steps are moves of their own, one task after another in the order in w
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Coroutine
 from typing import Any
 
-from hfg.errors import Failure, NodeError, NotRunning, UsageError
+from hfg.errors import Failure, NodeError, NotRunning, QueueOverflow, UsageError
 from hfg.testing.reference.firing import Firing
 from hfg.testing.reference.state import Station, Task
-from hfg.trace import ErrorRaised
+from hfg.trace import DoEnded, DoStarted, ErrorRaised
 
 __all__ = ["Tending"]
 
@@ -56,6 +57,9 @@ class Tending(Firing):
 
     def go_on_with(self, task: Task) -> None:
         """Take its next step; it may be its last."""
+        if task.is_activity and not task.stepped and not task.cancelled:
+            self.observe(DoStarted(self.now, task.station.path))
+            task.stepped = True
         with self.amid_code():
             self.in_task = task
             try:
@@ -70,21 +74,25 @@ class Tending(Firing):
         station = task.station
         station.tasks.remove(task)
         self.loop.forget(task)
-        error = None if task.code.cancelled() else task.code.exception()
+        cancelled = task.code.cancelled()
+        error: BaseException | None = None if cancelled else task.code.exception()
+        if task.is_activity:
+            error = self.end_activity(task, asyncio.CancelledError() if cancelled and not task.cancelled else error)
         if error is not None:
             self.fail_task(task, error)
         if self.outcome is None:
             self.let_others(station)
+            self.begin_to_do(station)
 
     def fail_task(self, task: Task, error: BaseException) -> None:
         """X1: its node's policy decides, with nothing taken; a firing under way goes on."""
         station = task.station
         index = station.leaf.index
-        if task.cancelled and self.is_enabled(index):
+        if task.cancelled and self.is_enabled(index) and self.is_closing(station):
             raise NotImplementedError(f'task "{task.name}" of "{station.path}" fails as it is to end')
-        what = f'task "{task.name}"'
+        what = "do()" if task.is_activity else f'task "{task.name}"'
         failure = NodeError(station.path, what, error)
-        policy = self.policy_of(station)
+        policy = self.policy_of(station) if isinstance(error, Exception) else "stop"
         self.observe(ErrorRaised(self.now, station.path, what, str(failure), policy))
         if policy == "stop":
             self.fail_run(failure)
@@ -97,6 +105,63 @@ class Tending(Firing):
             self.flush_changes(station)
         if policy == "disable":
             self.disable(index)
+
+    # --- A15
+
+    def follow_activity(self, station: Station) -> None:
+        """The do-activity is due when A(v) has become 1, and to end when it has become 0."""
+        station.is_to_do = station.active
+        doing = self.activity_of(station)
+        if not station.active and doing is not None and not doing.cancelled:
+            doing.cancelled = True
+            with self.amid_code():
+                doing.code.cancel()
+        if not station.active and doing is not None:
+            station.node._outdated = lambda: self.in_task is doing
+        self.begin_to_do(station)
+
+    def activity_of(self, station: Station) -> Task | None:
+        """The do-activity that is under way; there is one at most."""
+        return next((task for task in station.tasks if task.is_activity), None)
+
+    def is_closing(self, station: Station) -> bool:
+        """Whether its tasks are to end because it is about to be torn down."""
+        return (bool(station.afterwards) and not station.is_amid) or any(
+            flight.when_rested is not None for flight in station.flights
+        )
+
+    def begin_to_do(self, station: Station) -> None:
+        """Begin the do-activity if it is due, the last one is over, and the node is enabled and set up."""
+        if not station.is_to_do or station.leaf.inside is not None or station.node._hook("do") is None:
+            return
+        if self.activity_of(station) is not None or self.is_closing(station) or self.outcome is not None:
+            return
+        if not station.set_up or station.opening or station.is_restarting or not self.is_enabled(station.leaf.index):
+            return
+        station.is_to_do = False
+        station.tasks_begun += 1
+        task = Task(station, "do", station.tasks_begun, is_activity=True)
+        station.tasks.append(task)
+        with self.amid_code():
+            task.code = self.loop.start(task, station.node.do())
+
+    def end_activity(self, task: Task, error: BaseException | None) -> BaseException | None:
+        """Tell how it has ended; if it has returned by itself that is an event. Gives how it has failed."""
+        station = task.station
+        station.node._outdated = None
+        if error is not None:
+            self.observe(DoEnded(self.now, station.path, "failed"))
+            return error
+        if task.cancelled:
+            if task.stepped:
+                self.observe(DoEnded(self.now, station.path, "cancelled"))
+            return None
+        self.observe(DoEnded(self.now, station.path, "completed"))
+        try:
+            self.trigger(station.leaf.index, "completed", task.code.result())
+        except QueueOverflow as overflow:
+            return overflow
+        return None
 
     def cancel_tasks(self, station: Station) -> None:
         """Let all of them end, each by its next step."""

@@ -1,0 +1,105 @@
+"""The do-activity of a node: one coroutine that begins with its activity and is cancelled with it (rule A15).
+
+It is a task of the node; `model.tasks.Doing` says whether it is due, and this module when it begins and what follows
+its end. Nodes whose type has no `do` never come here. Stands on `sending`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+
+from hfg.engine.model.tasks import Doing, Task, Tasks, current_task
+from hfg.engine.model.worker import BACKOFF, DISABLED, TORN_DOWN, Worker
+from hfg.engine.rules.modifiers import derive_scopes
+from hfg.engine.rules.sending import trigger_beside
+from hfg.trace import DoEnded, DoOutcome, DoStarted
+
+__all__ = ["afresh", "begun", "entered", "entering", "go_on", "has", "leave", "over"]
+
+_NOT_NOW = DISABLED | BACKOFF | TORN_DOWN
+
+
+def has(worker: Worker) -> bool:
+    """Whether its node has a do-activity."""
+    return worker.node is not None and worker.scope is None and "do" in worker.type.hooks
+
+
+def _of(worker: Worker) -> Doing:
+    if worker.tasks is None:
+        worker.start_tasks(Tasks(worker))
+        worker.core.upstairs.bind_ports(worker)  # what it sends is looked at from here on
+    doing: Doing = worker.tasks.doing
+    return doing
+
+
+def entering(worker: Worker) -> None:
+    """A(v) has become 1; its `on_activated` comes first."""
+    _of(worker).enter()
+
+
+def entered(worker: Worker) -> None:
+    """Its `on_activated` is over."""
+    _of(worker).entered()
+    go_on(worker)
+
+
+def leave(worker: Worker) -> None:
+    """A(v) has become 0; one that does not end at once sees nothing of the next activity."""
+    doing = _of(worker)
+    doing.leave()
+    if doing.task is not None:
+        worker.node._outdated = partial(_is_current, doing.task)
+
+
+def _is_current(task: Task) -> bool:
+    return current_task.get() is task
+
+
+def afresh(worker: Worker) -> None:
+    """The node has been set up anew: if it is active its do-activity begins anew too."""
+    if has(worker):
+        _of(worker).be_due(worker.active)
+        go_on(worker)
+
+
+def go_on(worker: Worker) -> None:
+    """Begin the do-activity if it is due, and neither the last one nor the state of its node keeps it back."""
+    tasks, core = worker.tasks, worker.core
+    if not tasks.doing.may_begin() or tasks.ending or not worker.is_up or worker.opening:
+        return
+    if worker.blocked & _NOT_NOW or core.over:
+        return
+    core.host.start_task(worker, worker.node.do(), tasks.doing)
+
+
+def begun(worker: Worker) -> None:
+    """Its first step is about to be taken."""
+    core = worker.core
+    if core.seldom is not None:
+        core.seldom(DoStarted(core.now(), worker.path))
+
+
+def over(worker: Worker, task: Task, result: object, error: BaseException | None) -> BaseException | None:
+    """It has ended: say so, and with what it returned if it came to its end by itself; gives back how it failed."""
+    core = worker.core
+    worker.tasks.doing.over()
+    worker.node._outdated = None
+    outcome: DoOutcome = "completed" if error is None else "failed"
+    if task.cancelled and isinstance(error, asyncio.CancelledError | None):
+        outcome = "cancelled"
+    if core.seldom is not None and not core.over and task.carrier is not None:  # else it was cancelled before it began
+        core.seldom(DoEnded(core.now(), worker.path, outcome))
+    if outcome == "completed":
+        try:
+            _complete(worker, result)
+        except Exception as failure:
+            return failure
+    return error if outcome == "failed" else None
+
+
+def _complete(worker: Worker, result: object) -> None:
+    event = worker.events.get("completed")
+    if event is not None:
+        trigger_beside(event, result)
+        derive_scopes(worker.core)
