@@ -292,14 +292,14 @@ class _Making:
         choose = self.choose
         match kind:
             case "script" | "ascript":
-                most = 12 if self.allowed.plain else 5
+                most = 24 if self.allowed.plain else 5
                 values = [choose.one_of([1, 2, 0, 3, 4, 6, None]) for _ in range(choose.number(0, most))]
                 given: dict[str, Any] = {"values": tuple(values)}
                 if kind == "ascript":
                     given["pause_s"] = choose.one_of([0.0, 0.004, 0.01])
                 return given
             case "Script" | "Pairs":
-                return {"count": choose.number(0, 12 if self.allowed.plain else 5)}
+                return {"count": choose.number(0, 24 if self.allowed.plain else 5)}
             case _ if kind in (*_SPEAKING, *_PAUSING):
                 return self._speaking(kind)
             case "some":
@@ -327,7 +327,7 @@ class _Making:
         if kind in _PAUSING:
             given["pause"] = choose.one_of(types.PAUSES)
         if kind in (*_SPEAKING_SOURCES, *_SPEAKING_SOURCES_LATER):
-            given["count"] = choose.number(0, 12 if allowed.plain else 5)
+            given["count"] = choose.number(0, 24 if allowed.plain else 5)
         if kind == "SpeaksLater" and choose.chance(25):
             given["by_task"] = True
         return given

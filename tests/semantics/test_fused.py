@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import random
-import threading
 import traceback
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -24,7 +22,9 @@ from hfg.testing.plans import GraphPlan
 from hfg.testing.recording import Recorder
 from hfg.testing.reference.structure import dissolve
 from hfg.testing.shrinking import shrink
+from tests.semantics.calls import Calls, Ran, begun, by_node, note_calls, noted_run, passed_by_trace
 
+LEAST_SHARE = 0.25  # of all firings and calls are fused
 MOST_MOVES = 1500
 BESIDE_THREADS = Allowed(plain=True, threads=True, lossy=False, gates=False)
 
@@ -34,86 +34,9 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(settings, "FUSE_AFTER", 0)
 
 
-class Calls(list[tuple[str, str]]):
-    """Each call of a node's code on the loop, in order: the node's path, and what it was given.
-
-    Attributes:
-      aside: the same of code in threads, by node: between those there is no order.
-    """
-
-    def __init__(self) -> None:
-        self.aside: dict[str, list[str]] = {}
-
-    def note(self, node: Any, given: str) -> None:
-        if threading.current_thread() is threading.main_thread():
-            self.append((str(node.place.path), given))
-        else:
-            self.aside.setdefault(str(node.place.path), []).append(given)
-
-    def take(self) -> tuple[list[tuple[str, str]], dict[str, list[str]]]:
-        taken = list(self), self.aside
-        self.clear()
-        self.aside = {}
-        return taken
-
-
 def plain_shapes(seed: int) -> Allowed:
     """What is fused, and now and then what splits it."""
     return Allowed(plain=True, max_nodes=4 + seed % 9, sending=seed % 2 == 1)
-
-
-def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
-    """Have every call of the code of every node noted from now on."""
-    calls = Calls()
-    process_call, handler = hfg.Node._process_call, hfg.Node._handler
-
-    def noted_process(self: Any) -> Callable[..., Any]:
-        call = process_call(self)
-        if self._type.process_kind == "generator":
-
-            def draw(*arguments: Any) -> Iterator[Any]:
-                values = iter(call(*arguments))
-                while True:
-                    calls.note(self, "next")
-                    try:
-                        value = next(values)
-                    except StopIteration:
-                        return
-                    yield value
-
-            return draw
-
-        def process(*arguments: Any) -> Any:
-            calls.note(self, repr(arguments))
-            return call(*arguments)
-
-        return process
-
-    def noted_handler(self: Any, name: str) -> Callable[..., Any] | None:
-        call = handler(self, name)
-        if call is None:
-            return None
-
-        def handle(*arguments: Any) -> Any:
-            calls.note(self, name + repr(arguments))
-            return call(*arguments)
-
-        return handle
-
-    monkeypatch.setattr(hfg.Node, "_process_call", noted_process)
-    monkeypatch.setattr(hfg.Node, "_handler", noted_handler)
-    return calls
-
-
-def noted_run(calls: Calls, plan: GraphPlan, *, fast: bool, trace: Recorder | None = None) -> tuple[Any, str, Any]:
-    """Run it; give its report, what it failed with, and its calls."""
-    calls.take()
-    error = ""
-    try:
-        report = hfg.run(plan.build(), clock="virtual", fast=fast, trace=trace, until_s=30.0)
-    except hfg.errors.RunError as problem:
-        report, error = problem.report, str(problem)  # type: ignore[attr-defined]
-    return report, error, calls.take()
 
 
 def ends(plan: GraphPlan, seed: int) -> bool:
@@ -125,23 +48,42 @@ def ends(plan: GraphPlan, seed: int) -> bool:
     return True
 
 
-def are_one(plan: GraphPlan, one: tuple[Any, str, Any], other: tuple[Any, str, Any]) -> bool:
+def coroutines(plan: GraphPlan) -> int:
+    """How many nodes are async: where several may wait at a moment their order is left open (R2)."""
+    return sum(leaf.node._type.process_kind.startswith("async") for leaf in dissolve(plan.build()).leaves)
+
+
+def are_one(plan: GraphPlan, one: Ran, other: Ran) -> bool:
     """Whether two runs did the same in the same order; each node by itself where several may wait at a moment (R2)."""
-    leaves = dissolve(plan.build()).leaves
-    if one == other or sum(leaf.node._type.process_kind.startswith("async") for leaf in leaves) < 2:
-        return one == other
-    return (*one[:2], _each_by_itself(*one[2])) == (*other[:2], _each_by_itself(*other[2]))
+    if one[:3] == other[:3] or coroutines(plan) < 2:
+        return one[:3] == other[:3]
+    return (*one[:2], by_node(*one.calls)) == (*other[:2], by_node(*other.calls))
 
 
-def _each_by_itself(calls: list[tuple[str, str]], aside: dict[str, list[str]]) -> dict[str, list[str]]:
-    found = {path: list(given) for path, given in aside.items()}
-    for path, given in calls:
-        found.setdefault(path, []).append(given)
-    return found
+def is_timeless(plan: GraphPlan) -> bool:
+    """Whether nothing in it has to do with time, so that it does the same on every clock."""
+    timed = {"ascript", "slow_double", "Waiting", "AsyncRelay", "restless", "calling"}
+    return (
+        not any(
+            node.type in timed
+            or node.parameters.get("pause") in ("wait", "mixed")
+            or {"max_rate_hz", "active_for_s", "group"} & set(node.options)
+            or node.options.get("on_error") == "restart"
+            for node in plan.nodes
+        )
+        and not any("through" in edge.options for edge in plan.edges)
+        and not plan.gates
+    )
 
 
-def fusing_differs(calls: Calls, plan: GraphPlan) -> str | None:
-    """Interpreted, fused and watched a graph does the same, and what the oracle permits."""
+def fusing_differs(calls: Calls, plan: GraphPlan, look: int = 0) -> str | None:
+    """Interpreted, fused, looked at and watched a graph does the same, call by call, and what the oracle does.
+
+    Args:
+      calls: where calls are noted.
+      plan: what to run.
+      look: who looks at a second fused run: nobody but on the real clock, taps on all edges, or who measures.
+    """
     interpreted = noted_run(calls, plan, fast=False)
     fused = noted_run(calls, plan, fast=True)
     if not are_one(plan, fused, interpreted):
@@ -154,15 +96,44 @@ def fusing_differs(calls: Calls, plan: GraphPlan) -> str | None:
         replay(plan, trace, until_s=30.0)
     except Divergence as divergence:
         return str(divergence)
+    return oracle_differs(plan, watched, calls.take()) or looking_differs(calls, plan, interpreted, trace, look)
+
+
+def oracle_differs(plan: GraphPlan, watched: Ran, oracle: tuple[list[Any], dict[str, list[Any]]]) -> str | None:
+    """The oracle has called the same code with the same, in the same order; it begins coroutines late."""
+    engine: Any = begun(watched.calls[0])
+    reference: Any = begun(oracle[0])
+    if watched.calls[1] or coroutines(plan):
+        engine, reference = by_node(engine, watched.calls[1]), by_node(reference, oracle[1])
+        engine = {path: begun(notes) for path, notes in engine.items()}
+    return None if engine == reference else f"engine: {engine}\n  oracle: {reference}"
+
+
+def looking_differs(calls: Calls, plan: GraphPlan, interpreted: Ran, trace: Recorder, look: int) -> str | None:
+    """Fused once more: with taps that see what a trace sees, measured, or on the real clock, where waves repeat."""
+    match look % 3:
+        case 0:
+            tapped = noted_run(calls, plan, fast=True, tapped=True)
+            passed = {label: tokens for label, tokens in tapped.passed.items() if tokens}
+            if not are_one(plan, tapped, interpreted) or passed != passed_by_trace(trace):
+                return f"untapped: {interpreted}\n  {passed_by_trace(trace)}\n  tapped: {tapped}"
+        case 1:
+            measured = noted_run(calls, plan, fast=True, measured=True)
+            if not are_one(plan, measured, interpreted):
+                return f"not measured: {interpreted}\n  measured: {measured}"
+        case 2 if is_timeless(plan):
+            runs = [noted_run(calls, plan, fast=fast, real=True) for fast in (False, True)]
+            if not are_one(plan, *runs):
+                return f"interpreted on the real clock: {runs[0]}\n  fused: {runs[1]}"
     return None
 
 
 def check(calls: Calls, seed: int, allowed: Allowed) -> None:
     plan = random_plan(seed, allowed)
-    if not ends(plan, seed) or fusing_differs(calls, plan) is None:
+    if not ends(plan, seed) or fusing_differs(calls, plan, seed) is None:
         return
-    small = shrink(plan, lambda smaller: ends(smaller, seed) and fusing_differs(calls, smaller) is not None)
-    pytest.fail(f"seed {seed}\n{small}\n\n{fusing_differs(calls, small)}", pytrace=False)
+    small = shrink(plan, lambda smaller: ends(smaller, seed) and fusing_differs(calls, smaller, seed) is not None)
+    pytest.fail(f"seed {seed}\n{small}\n\n{fusing_differs(calls, small, seed)}", pytrace=False)
 
 
 @pytest.mark.rule("R2", "R7", "F3", "F4", "F5", "T5", "X1")
@@ -171,6 +142,7 @@ def test_fused_interpreted_and_watched_runs_are_one(block: int, monkeypatch: pyt
     calls = note_calls(monkeypatch)
     for seed in range(15 * block, 15 * block + 15):
         check(calls, seed, plain_shapes(seed))
+    assert calls.share > LEAST_SHARE
 
 
 @pytest.mark.rule("R1", "F7")
@@ -187,7 +159,7 @@ def fused_order(graph: hfg.Graph, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         hfg.run(graph, clock="virtual", fast=fast)
         orders.append(calls.take()[0])
     assert orders[0] == orders[1]
-    return [path for path, _ in orders[0]]
+    return [note[0] for note in orders[0]]
 
 
 class SendsBehindAnAwait(hfg.Node):
@@ -267,6 +239,40 @@ def test_a_slot_handler_whose_helper_sends_is_told_so_by_the_fast_path_too(by: s
     report = hfg.run(graph, clock="virtual")
     assert report.nodes["utters"].failed == 1
     assert 'output "utters.out" was written in a slot handler' in str(report.errors[0])
+
+
+@pytest.mark.rule("R2")
+def test_whom_a_buffer_has_enabled_goes_before_the_next_wave_of_a_source_on_the_real_clock(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    graph, calls = hfg.Graph(), note_calls(monkeypatch)
+    source, sends = graph.add(nodes.script(values=(1, 2, 3)), name="s"), graph.add(nodes.Sends(), name="n")
+    graph.connect(source.out, sends.value, buffer=3)
+    hfg.run(graph, clock="real")
+    assert [note[0] for note in calls.take()[0]] == ["s", "n", "s", "n", "s", "n", "s"]
+
+
+@pytest.mark.rule("R7", "F6")
+def test_a_wave_that_is_left_behind_a_silent_slot_counts_no_call_for_it_and_loses_none() -> None:
+    graph = hfg.Graph()
+    source, sends = graph.add(nodes.Script(count=9)), graph.add(nodes.Sends())
+    leaves, tally = graph.add(nodes.SpeaksTwice(way="token")), graph.add(nodes.Tally(), name="tally")
+    graph.connect(source.out, sends.value)
+    graph.connect(sends.rest, leaves.value)
+    graph.connect(sends.out, tally.note)
+    assert hfg.run(graph, clock="virtual").nodes["tally"].calls == 3
+
+
+@pytest.mark.rule("F11", "F5", "R5")
+def test_no_time_is_waited_for_before_a_source_whose_wave_still_holds_its_output() -> None:
+    graph = hfg.Graph()
+    source, later = graph.add(nodes.Talks(count=9), max_rate_hz=10), nodes.SpeaksTwiceLater(way="held", pause="turn")
+    graph.connect(source.out, graph.add(later).value)
+    graph.connect(later.out, graph.add(nodes.add()).a, buffer=1)
+    graph.connect(source.out, graph.add(nodes.Speaks(way="seldom")).value)
+    with pytest.raises(hfg.errors.Stalled) as caught:
+        hfg.run(graph, clock="virtual")
+    assert caught.value.report.duration_s == pytest.approx(0.1)  # type: ignore[attr-defined]
 
 
 @pytest.mark.rule("F4")

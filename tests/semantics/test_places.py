@@ -12,7 +12,7 @@ import reactivex.operators as ops
 import hfg
 from hfg.testing.nodes import Greeter, Latch, Script, Tally, Waiting, add, script
 from hfg.trace import CallStarted, FiringStarted, TokenSent
-from tests.semantics.test_fused import note_calls
+from tests.semantics.calls import note_calls
 
 
 def order_of(path: str) -> Callable[[Any], list[str]]:
@@ -132,7 +132,7 @@ def test_who_is_freed_first_by_a_taken_wave_goes_first_fused_or_not(monkeypatch:
     orders = []
     for fast in (True, False):
         hfg.run(graph, clock="virtual", fast=fast)
-        orders.append([path for path, _ in calls.take()[0]])
+        orders.append([note[0] for note in calls.take()[0]])
     assert orders[0] == orders[1]
     assert orders[0][-6:] == ["both", "first", "second", "both", "first", "second"]
 

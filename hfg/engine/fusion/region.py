@@ -250,7 +250,7 @@ class Region:
             self._rest()
         if core.followers:
             self._let_follow(self.schedule.followers)
-        if head.placed and (head.outputs.missing or head.inputs.missing):
+        if head.outputs.missing or head.inputs.missing:
             head.unplace()  # what came in while the wave ran gave it a place; F1 does not hold behind the wave
         if head.outputs.missing:
             head.hold(self.held_entries)
@@ -374,7 +374,7 @@ class Region:
         stamp = found["stamp"]
         silent_calls: set[SyncEdge] = set()
         for j in range(k):
-            self._count(j, found)
+            self._count(self.order[j], j in self.schedule.called)
             for edge, output, to in self.schedule.outs[j]:
                 if to is None or (to > k and not edge.live):  # one end was disabled meanwhile: it goes nowhere (F10)
                     continue
@@ -405,13 +405,12 @@ class Region:
                 target.mark_special()
         return True
 
-    def _count(self, j: int, found: dict[str, Any]) -> None:
-        """Member j has fired, or was called, in the wave that does not come to its end."""
-        worker = self.order[j]
-        if j not in self.schedule.called:
-            worker.has_fired(1)
-        elif found.get(self.schedule.local(worker.slot_edges[0])) is not None:
+    def _count(self, worker: Worker, called: bool) -> None:
+        """It has fired, or was called, in the wave that does not come to its end; its silence is counted already."""
+        if called:
             worker.was_called(1)
+        else:
+            worker.has_fired(1)
 
     def _queue_behind(self, k: int) -> None:
         """Who stands behind member k is enabled by now, or by an outside edge that was waited for (R2)."""
@@ -459,6 +458,7 @@ class Region:
         """The wave has given way to others: its members are busy until it is over."""
         lender: Any = self._lender
         self.amid = "wave"
+        self.called_off = bool(self.flags)  # raised by the call before it gave way; the flags are cleared meanwhile
         for worker in self.order:
             if worker.busy != "firing":  # else its call, under way, was announced
                 worker.be_in_wave(self.amid)
@@ -514,7 +514,9 @@ class Region:
             self.called_off = False
             for worker in self.order:
                 worker.rest()
-            if self.head.placed and len(self.order) > 1:  # by what came in meanwhile; but it waits for the wave (F5)
+            if (
+                len(self.order) > 1
+            ):  # what came in meanwhile gave it a place, or time to start; it waits for the wave (F5)
                 self.head.unplace()
 
     def _go_on(self, called_off: bool) -> None:

@@ -546,7 +546,7 @@ class Writer:
         if not self.is_source:
             stop += ["inputs.missing", "worker.special", f"entry0.queue[0][{ACTIVITY}]", "now() > core.until"]
         if self.has_border:
-            stop.append("outputs.missing")
+            stop += ["outputs.missing", "core.followers"]  # whom a buffer has enabled goes before the next wave (R2)
         say(f"if {' or '.join(stop)}: break")
 
     def _may_go_on_at_once(self) -> bool:
