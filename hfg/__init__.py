@@ -10,7 +10,7 @@ Which floor stands on which; imports go down only, and asyncio begins on floor 5
     2  nodetype, functions  <-  declaration  <-  vectors, signature  <-  hints, description     registry
     1  ports                transport   sharedmemory
     0  errors  problem  token  types  values  limits  bounds  encoding  images  generics  clock  frames  logs  trace
-       starting
+       starting  whole
 
 A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
 """

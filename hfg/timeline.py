@@ -39,6 +39,7 @@ from hfg.trace import (
     TokenTaken,
     TraceEvent,
 )
+from hfg.whole import GrowingFile
 
 __all__ = ["Timeline"]
 
@@ -88,7 +89,7 @@ class Timeline:
         """
         if isinstance(file, str | os.PathLike):
             try:
-                self._stream: Any = Path(file).open("wb")  # noqa: SIM115  # closed with the run
+                self._stream: Any = GrowingFile(Path(file), append=False, at_once=False)
             except OSError as error:
                 raise UsageError(f"the timeline cannot be written to {file}: {error.strerror}") from None
             self._ours = True
@@ -164,7 +165,7 @@ class Timeline:
         self._closed = True
         self._stream.write(b"\n]\n")
         if self._ours:
-            self._stream.close()
+            self._stream.complete()
         else:
             self._stream.flush()
 

@@ -33,6 +33,7 @@ FLOORS = {
     "hfg.logs": 0,
     "hfg.trace": 0,
     "hfg.starting": 0,
+    "hfg.whole": 0,
     "hfg.ports": 1,
     "hfg.sharedmemory": 1,
     "hfg.transport": 1,

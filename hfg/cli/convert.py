@@ -16,6 +16,7 @@ from hfg.cli.options import AllowOption, ArgOption
 from hfg.cli.target import SUFFIXES, load_graph
 from hfg.errors import TargetError, UsageError
 from hfg.files import apex, describe, save, schema, text_of, write
+from hfg.whole import write_whole
 
 __all__ = ["convert"]
 
@@ -90,7 +91,7 @@ def _write_schema(file: str | None) -> int:
         sys.stdout.write(schema())
         return 0
     try:
-        Path(file).write_text(schema(), encoding="utf-8")
+        write_whole(Path(file), lambda stream: stream.write(schema().encode()))
     except OSError as error:
         show.sentence(f"{file} cannot be written: {error.strerror}")
         return 2

@@ -6,10 +6,9 @@ Stands on `execute`, `live`, `target`, `settings`, `interrupt` and `show`.
 from __future__ import annotations
 
 import asyncio
-import io
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, TextIO
@@ -41,6 +40,7 @@ from hfg.errors import HfgError, TargetError
 from hfg.graph import Graph
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
+from hfg.whole import GrowingFile
 
 __all__ = ["run"]
 
@@ -90,9 +90,10 @@ def run(
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()
     output = _Output(sys.stdout)
+    unwritten: list[str] = []
     with (
         redirect_stdout(sys.stderr if json else output),
-        _writing(trace, graph, interrupt) as write,
+        _writing(trace, graph, interrupt, unwritten) as write,
         live_table(table and not json and clock is Clock.real) as live,
     ):
         interrupt.before_leaving.append(live.leave)
@@ -122,13 +123,14 @@ def run(
     for page in pages:
         if page.error is not None:
             show.sentence(f'the report "{page.path}" cannot be written: {page.error.strerror}')
+            unwritten.append(str(page.path))
     if output.broken is not None:
         raise output.broken
     if json and report is not None:
         show.json(report)
     if error is None and report is not None and not interrupt.count and (not json or verbose):
         show.report(graph.name, report, verbose)
-    return _ended(graph, error, interrupt)
+    return _ended(graph, error, interrupt) or (1 if unwritten else 0)
 
 
 def _ended(graph: Graph, error: HfgError | None, interrupt: Interrupt) -> int:
@@ -141,8 +143,13 @@ def _ended(graph: Graph, error: HfgError | None, interrupt: Interrupt) -> int:
 
 
 @contextmanager
-def _writing(file: Path | None, graph: Graph, interrupt: Interrupt) -> Iterator[Callable[[TraceEvent], None] | None]:
-    """Open the trace file; it is whole however the run ends. One that ends in .json becomes a timeline."""
+def _writing(
+    file: Path | None, graph: Graph, interrupt: Interrupt, unwritten: list[str]
+) -> Iterator[Callable[[TraceEvent], None] | None]:
+    """Open the trace file; it is whole however the run ends, or among those unwritten.
+
+    One that ends in .json becomes a timeline.
+    """
     if file is None:
         yield None
         return
@@ -152,46 +159,58 @@ def _writing(file: Path | None, graph: Graph, interrupt: Interrupt) -> Iterator[
             f"line, or {file.with_suffix('.json').name}, a timeline"
         )
     try:
-        stream = _Stream(file)
+        stream: Any = _Stream(file)
     except OSError as error:
         raise TargetError(f"the trace cannot be written to {file}: {error.strerror}") from None
-    with stream:
+    try:
         if file.suffix == ".json":
             with Timeline(stream, graph) as timeline:
-                interrupt.before_leaving.append(timeline.close)
+                interrupt.before_leaving += [timeline.close, stream.close]
                 yield timeline
-            return
-        interrupt.before_leaving.append(stream.flush)
-        yield lambda event: _write(stream.write, event)
+        else:
+            interrupt.before_leaving.append(stream.close)
+            yield lambda event: _write(stream.write, event)
+    finally:
+        stream.close()
+        unwritten += [str(file)] * stream.is_broken
 
 
-class _Stream(io.BufferedWriter):
-    """A file whose disk may become full: that is told once, and the run goes on."""
+class _Stream:
+    """A file whose disk may become full: that is told once, and the run goes on.
+
+    Attributes:
+      is_broken: whether it lacks something.
+    """
 
     def __init__(self, file: Path) -> None:
-        super().__init__(io.FileIO(file, "wb"))
-        self._file = file
-        self._is_broken = False
+        self._file = GrowingFile(file, append=False, at_once=False)
+        self._path = file
+        self._is_closed = False
+        self.is_broken = False
 
-    def write(self, data: Any, /) -> int:
-        return self._try(partial(super().write, data)) or len(data)
+    def write(self, data: bytes) -> None:
+        """Append an event."""
+        if not self.is_broken:
+            self._try(lambda: self._file.write(data))
 
     def flush(self) -> None:
-        self._try(super().flush)
+        """Hand it to the system."""
+        self._try(self._file.flush)
 
     def close(self) -> None:
-        with suppress(OSError):  # told by now: it flushes first
-            super().close()
+        """Give it its name, if it is whole."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._try(self._file.complete)
 
-    def _try(self, call: Callable[[], int | None]) -> int | None:
-        if self._is_broken:
-            return None
+    def _try(self, call: Callable[[], object]) -> None:
         try:
-            return call()
+            call()
         except OSError as error:
-            self._is_broken = True
-            show.sentence(f"the trace in {self._file} is not whole: {error.strerror}")
-            return None
+            if not self.is_broken:
+                self.is_broken = True
+                part = f"; what could be written is in {self._file.place}" if self._file.place.suffix == ".part" else ""
+                show.sentence(f"the trace in {self._path} is not whole: {error.strerror}{part}")
 
 
 class _Output:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import tempfile
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +15,7 @@ from hfg.files.document import (
     OperatorDocument,
 )
 from hfg.files.emitting import emit
+from hfg.whole import write_whole
 
 __all__ = ["text_of", "write_text"]
 
@@ -98,32 +96,4 @@ def write_text(text: str, path: Path) -> None:
     Raises:
       OSError: it cannot be written.
     """
-    file = path.resolve()  # what a link names, not the link
-    descriptor, name = tempfile.mkstemp(prefix=f".{file.name}.", suffix=".new", dir=file.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(text.encode())
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(name).chmod(_mode(file))
-        Path(name).replace(file)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise
-    with contextlib.suppress(OSError):  # so that the name, too, outlives a sudden end; not every system can
-        folder = os.open(file.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-
-
-def _mode(file: Path) -> int:
-    """Who may read and write it: as before, else as any new file."""
-    try:
-        return file.stat().st_mode & 0o7777
-    except OSError:
-        mask = os.umask(0)
-        os.umask(mask)
-        return 0o666 & ~mask
+    write_whole(path.resolve(), lambda stream: stream.write(text.encode()))

@@ -17,6 +17,7 @@ from hfg.reporting.html import Page, drawing
 from hfg.reporting.observing import Observed
 from hfg.reporting.sections import Sections
 from hfg.trace import RunEnded, TraceEvent
+from hfg.whole import need_writable, write_whole
 
 __all__ = ["ReportPage", "report_page"]
 
@@ -55,7 +56,7 @@ class ReportPage(Sections):
     def write(self) -> None:
         """Write the page as far as the run has come; its end does it, too. A disk that is full is logged and kept."""
         try:
-            self.path.write_text(self.text(), encoding="utf-8", errors="replace")
+            write_whole(self.path, lambda file: file.write(self.text().encode(errors="replace")))
             self.error = None
         except OSError as error:
             self.error = error
@@ -80,8 +81,7 @@ def report_page(run: Run, file: str | os.PathLike[str], *, pictures: int, pictur
     _need_whole(title, "pictures", pictures, 0, _MOST_PICTURES)
     _need_whole(title, "picture_size", picture_size, 16, _LONGEST_SIDE)
     try:
-        with path.open("ab"):
-            pass  # it can be written, which is better known now than when the run is over
+        need_writable(path)  # which is better known now than when the run is over
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else error
         raise UsageError(

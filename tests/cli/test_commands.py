@@ -187,7 +187,7 @@ def test_trace_that_cannot_be_written(hfg: Command) -> None:
 def test_trace_on_a_full_disk_is_told_once_and_the_run_goes_on(hfg: Command, name: str) -> None:
     Path(name).symlink_to("/dev/full")
     shown = hfg("run", TARGET, *VIRTUAL, "--trace", name)
-    assert (shown.code, shown.out) == (0, "half 0\nhalf 1\nhalf 2\n")
+    assert (shown.code, shown.out) == (1, "half 0\nhalf 1\nhalf 2\n")
     assert shown.err.startswith(f"hfg: the trace in {name} is not whole: No space left on device\n")
     assert shown.err.count("not whole") == 1
 

@@ -476,7 +476,7 @@ def test_a_new_file_has_the_permissions_of_the_old_one_and_a_link_stays_one() ->
 def test_lines_are_there_as_soon_as_they_are_written() -> None:
     node = files.WriteLines(path="deep/a.txt")
     fire(node, text="one")
-    assert Path("deep/a.txt").read_text() == "one\n"
+    assert Path("deep/a.txt.part").read_text() == "one\n"
     fire(node, text="zwölf")
     fire(node, hook="end")
     assert Path("deep/a.txt").read_bytes() == "one\nzwölf\n".encode()
@@ -485,7 +485,7 @@ def test_lines_are_there_as_soon_as_they_are_written() -> None:
 def test_lines_that_are_not_flushed_are_there_at_the_end_in_any_case() -> None:
     node = files.WriteLines(path="a.txt", flush=False)
     fire(node, text="one")
-    assert Path("a.txt").read_text() == ""
+    assert Path("a.txt.part").read_text() == ""
     fire(node, hook="teardown")
     assert Path("a.txt").read_text() == "one\n"
 

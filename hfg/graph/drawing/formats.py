@@ -19,6 +19,7 @@ from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.pointing import meant, node_at
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetype import Node
+from hfg.whole import write_whole
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph
@@ -42,7 +43,7 @@ def draw(
     file = Path(path)
     text = _writer(title, f".{format}" if format else file.suffix, f'"{file}"')(graph, view)
     try:
-        file.write_text(text, encoding="utf-8", errors="replace")
+        write_whole(file, lambda stream: stream.write(text.encode(errors="replace")))
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else error
         raise UsageError(

@@ -1,19 +1,20 @@
 """Reaching files: what goes wrong in one sentence, and whole files that are old or new, never half of each.
 
-Stands on the standard library alone.
+Stands on `whole`.
 """
 
 from __future__ import annotations
 
 import errno
 import glob
-import itertools
 import os
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, Final, Literal, TypeAlias
+
+from hfg import whole
 
 __all__ = ["FilePath", "find_files", "is_a_path", "named", "reaching", "write_whole"]
 
@@ -30,11 +31,10 @@ _REASONS: Final = {
     errno.EEXIST: "it is there already; allow to overwrite it, or change the path",
     errno.ENOSPC: "the disk is full; make room on it",
     errno.EDQUOT: "your part of the disk is full; make room on it",
+    errno.EFBIG: "a file may not be as large there; raise the limit, or write less",
     errno.ENAMETOOLONG: "the name is too long",
     errno.EMFILE: "too many files are open",
 }
-
-_numbers: Final = itertools.count()
 
 
 def is_a_path(path: FilePath) -> bool:
@@ -71,37 +71,14 @@ def reaching(path: FilePath, doing: Literal["read", "write"]) -> Iterator[None]:
 
 
 def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:
-    """Write a file so that it is either the old one or the new one, whatever happens meanwhile.
-
-    It is written beside its place, brought to the disk and then renamed. Directories that are missing are made.
-
-    Args:
-      path: where it will be; of a symbolic link, what that leads to.
-      write: writes the content.
-      overwrite: whether a file that is there may be replaced.
+    """Write a file as `hfg.whole.write_whole` does. Directories that are missing are made.
 
     Raises:
-      OSError: it cannot be written; the old file is whole.
+      OSError: it cannot be written; the sentence says why, and the old file is whole.
     """
     with reaching(path, "write"):
-        target = path.resolve() if path.is_symlink() else path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if target.is_dir():
-            raise IsADirectoryError(errno.EISDIR, "")
-        if not overwrite and target.exists():
-            raise FileExistsError(errno.EEXIST, "")
-        beside = target.with_name(f".hfg-{os.getpid()}-{next(_numbers)}.part")
-        try:
-            with beside.open("xb") as file:
-                write(file)
-                file.flush()
-                os.fsync(file.fileno())
-            with suppress(OSError):
-                beside.chmod(target.stat().st_mode)
-            beside.replace(target)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
+        path.parent.mkdir(parents=True, exist_ok=True)
+        whole.write_whole(path, write, overwrite=overwrite)
 
 
 def find_files(pattern: str, order: str) -> list[Path]:

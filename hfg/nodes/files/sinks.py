@@ -1,17 +1,19 @@
 """Streams as files: one file for each value, or one for all of them.
 
-A file that holds one value is the old one or the new one, never half of each. A file that grows line by line is
-brought to the system with each line, unless it is told otherwise. Stands on access, nodetype, ports and numpy.
+A file that holds one value is the old one or the new one, never half of each. A file that grows line by line has its
+name when it is complete. Stands on access, whole, nodetype, ports and numpy.
 """
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any, BinaryIO, Final
+from types import SimpleNamespace
+from typing import Any, BinaryIO, Final
 
 import msgspec
 import numpy as np
@@ -26,6 +28,7 @@ from hfg.nodes.values.text import format_safely, is_a_format
 from hfg.nodetype import Node
 from hfg.ports import Input, Output, Parameter, State
 from hfg.types import Array
+from hfg.whole import GrowingFile
 
 __all__ = [
     "StackArrays",
@@ -190,7 +193,12 @@ class WriteArray(_WholeFiles):
 
     def process(self, array: Array) -> str:
         """Write it."""
-        return self._write(lambda file: np.save(file, array, allow_pickle=False))
+        return self._write(lambda file: _save(file, array))
+
+
+def _save(file: BinaryIO, array: Array) -> None:
+    """Write an array by Python's own calls: numpy's own way to a file swallows the error of its last write."""
+    np.save(SimpleNamespace(write=file.write), array, allow_pickle=False)
 
 
 class WriteArrays(_WholeFiles):
@@ -292,50 +300,53 @@ _LOSSY = (".jpg", ".jpeg", ".jpe", ".webp")
 
 
 class _GrowingFile(Node):
-    """Writes all values to one file, which is opened with the first one and closed at the end in any case."""
+    """Writes all values to one file, which is opened with the first one and completed at the end in any case."""
 
     path = Parameter("", Predicate(is_a_path), save=True)
     append = Parameter(False)
     flush = Parameter(True)
-    file = State[IO[str] | None](None)
+    file = State[GrowingFile | None](None)
+    encoder = State[codecs.IncrementalEncoder | None](None)
     is_new = State(True)
 
-    def _opened(self, encoding: str) -> IO[str]:
+    def _opened(self, encoding: str) -> GrowingFile:
         if self.file is None:
             place = named(self.path)
             with reaching(place, "write"):
                 place.parent.mkdir(parents=True, exist_ok=True)
-                # Line ends are those of the values on all systems: a file is the same wherever it is made.
-                self.file = place.open("a" if self.append else "w", encoding=encoding, newline="")
-                self.is_new = self.file.tell() == 0
+                self.file = GrowingFile(place, append=self.append, at_once=self.flush)
+            self.is_new = self.file.is_empty
+            self.encoder = codecs.getincrementalencoder(encoding)()
+            if not self.is_new:
+                self.encoder.setstate(2 if encoding == "utf-16" else 0)  # the mark of the byte order is there already
         return self.file
 
     def _put(self, text: str, encoding: str = "utf-8") -> None:
         file = self._opened(encoding)
+        assert self.encoder is not None
         with reaching(self.path, "write"):
-            file.write(text)
-            if self.flush:
-                file.flush()
+            file.write(self.encoder.encode(text))
 
     def _finish(self, encoding: str = "utf-8") -> None:
-        """Close a file that has come to its end, and make one that nothing was written to."""
+        """Complete a file that has come to its end, and make one that nothing was written to."""
         self._opened(encoding)
         self.teardown()
 
     def teardown(self) -> None:
-        """Close it."""
+        """Complete it."""
         file, self.file = self.file, None
         if file is not None:
             with reaching(self.path, "write"):
-                file.close()
+                file.complete()
 
 
 class WriteLines(_GrowingFile):
     """Write texts to a file, a line each.
 
-    The file is made, or made empty, with the first line, or at the end if there was none. It is the system's after each
-    line; with `flush` off it is so from time to time, which is faster, and at the end. A line takes microseconds; put
-    the node into a thread group where the disk is slow.
+    Lines go into a file beside it, `<name>.part`, which takes the name when the stream ends or the run is over; so a
+    file of this name is complete. With `append` they go behind those that the file has. The system has each line at
+    once; with `flush` off many together, which is faster. A line takes microseconds; put the node into a thread group
+    where the disk is slow.
 
     Attributes:
       text: each line, without its end.
@@ -345,7 +356,7 @@ class WriteLines(_GrowingFile):
       encoding: how it is written.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why.
+      OSError: the file cannot be written; the sentence says why, and what could be written is in `<name>.part`.
       ValueError: the encoding has no bytes for a character, or no path is set.
 
     CS::APEX: csapex::ExportFile.
@@ -366,9 +377,10 @@ class WriteLines(_GrowingFile):
 class WriteJsonLines(_GrowingFile):
     """Write values to a file as JSON, a line each.
 
-    The file is made, or made empty, with the first value, or at the end if there was none. It is the system's after
-    each line; with `flush` off it is so from time to time, which is faster, and at the end. A line takes microseconds;
-    put the node into a thread group where the disk is slow.
+    Lines go into a file beside it, `<name>.part`, which takes the name when the stream ends or the run is over; so a
+    file of this name is complete. With `append` they go behind those that the file has. The system has each line at
+    once; with `flush` off many together, which is faster. A line takes microseconds; put the node into a thread group
+    where the disk is slow.
 
     Attributes:
       value: anything that has a form in JSON: dicts, lists, dataclasses, structs, arrays ...
@@ -377,7 +389,7 @@ class WriteJsonLines(_GrowingFile):
       flush: whether each line is given to the system at once.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why.
+      OSError: the file cannot be written; the sentence says why, and what could be written is in `<name>.part`.
       TypeError: the value has no form in JSON.
       ValueError: something in it has none, or no path is set.
 
@@ -398,10 +410,10 @@ class WriteJsonLines(_GrowingFile):
 class WriteCsv(_GrowingFile):
     """Write dicts to a file as a table of comma-separated values, a row each.
 
-    The columns are the keys of the first row, unless they are said; a key that a row lacks is empty. The file is made,
-    or made empty, with the first row, or at the end if there was none. It is the system's after each row; with `flush`
-    off it is so from time to time, which is faster, and at the end. A row takes microseconds; put the node into a
-    thread group where the disk is slow.
+    The columns are the keys of the first row, unless they are said; a key that a row lacks is empty. Rows go into a
+    file beside it, `<name>.part`, which takes the name when the stream ends or the run is over; so a file of this name
+    is complete. With `append` they go behind those that the file has. The system has each row at once; with `flush` off
+    many together, which is faster. A row takes microseconds; put the node into a thread group where the disk is slow.
 
     Attributes:
       row: values by the names of the columns; None is empty.
@@ -412,7 +424,7 @@ class WriteCsv(_GrowingFile):
       flush: whether each row is given to the system at once.
 
     Raises:
-      OSError: the file cannot be written; the sentence says why.
+      OSError: the file cannot be written; the sentence says why, and what could be written is in `<name>.part`.
       ValueError: a row has a key that is no column, or no path is set.
     """
 
@@ -491,7 +503,7 @@ class StackArrays(Node):
     def _write(self, path: Path) -> None:
         self.is_written = True
         whole = np.stack(self.rows) if self.rows else np.zeros(0)
-        write_whole(path, lambda file: np.save(file, whole, allow_pickle=False))
+        write_whole(path, lambda file: _save(file, whole))
 
 
 class StandardOutput(Node):

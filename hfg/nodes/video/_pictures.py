@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import cv2
 import numpy as np
 from annotated_types import Interval
 
@@ -15,6 +12,8 @@ from hfg.functions import node
 from hfg.images import Color, Picture
 from hfg.nodes._extras import require
 from hfg.nodes._pictures import colour
+from hfg.nodes.files.access import write_whole
+from hfg.nodes.files.sinks import encoded
 from hfg.nodetype import Node
 from hfg.ports import Event, Parameter, slot
 
@@ -97,10 +96,8 @@ class Screenshot(Node):
         number = 0
         while (target := folder / f"{self.name}{number}.{self.format}").exists():
             number += 1
-        handle, temporary = tempfile.mkstemp(suffix=f".{self.format}", prefix=".screenshot-", dir=folder)
-        os.close(handle)
-        cv2.imwrite(temporary, image, [cv2.IMWRITE_JPEG_QUALITY, self.quality])
-        Path(temporary).replace(target)
+        data = encoded(image, target, self.quality)
+        write_whole(target, lambda file: file.write(data))
         self.done.trigger(str(target))
 
 

@@ -6,7 +6,7 @@ import errno
 import os
 import tempfile
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import cv2
 from annotated_types import Interval
@@ -18,6 +18,9 @@ from hfg.nodetype import Node
 from hfg.ports import Event, Input, Parameter, State, slot
 
 __all__ = ["WriteVideo"]
+
+_LEAST_BYTES: Final = 64 * 1024
+"""More than OpenCV holds back, so that what it could not write would not fit now either."""
 
 
 class WriteVideo(Node):
@@ -59,6 +62,7 @@ class WriteVideo(Node):
     temporary: State[str | None] = State(None)
     target = State("")
     size = State((0, 0))
+    count = State(0)
 
     def setup(self) -> None:
         """See that a file can be written there before the first picture comes."""
@@ -86,10 +90,19 @@ class WriteVideo(Node):
                 f'the video "{self.target}" has pictures of {self.size[0]} x {self.size[1]} pixels, got one of '
                 f"{shape[0]} x {shape[1]}: scale it, or set width and height"
             )
+        self._need_room()
         if (image.shape[1], image.shape[0]) != self.size:
             self.writer.write(cv2.resize(colour(image), self.size))
         else:
             self.writer.write(colour(image))
+        self.count += 1
+
+    def _need_room(self) -> None:
+        """OpenCV does not say that a disk is full, so look before each picture."""
+        if _room(Path(str(self.temporary))) < _LEAST_BYTES:
+            self.clear()
+            with reaching(self.target, "write"):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def _begin(self, size: tuple[int, int]) -> None:
         target = Path(self.path).absolute()
@@ -97,12 +110,17 @@ class WriteVideo(Node):
         os.close(handle)
         writer = cv2.VideoWriter(temporary, cv2.VideoWriter.fourcc(*self.codec), self.fps, size)
         if not writer.isOpened():
-            Path(temporary).unlink()
+            with reaching(self.path, "write"):
+                try:
+                    _need_room(Path(temporary))
+                finally:
+                    Path(temporary).unlink()
             raise ValueError(
                 f'OpenCV does not write "{self.path}" with the codec {self.codec}: take "MJPG" and a name that ends '
                 "with .avi"
             )
         self.writer, self.temporary, self.target, self.size = writer, temporary, str(target), size
+        self.count = 0
 
     @slot
     def finish(self) -> None:
@@ -119,9 +137,16 @@ class WriteVideo(Node):
 
     def _close(self) -> str:
         self.writer.release()
-        Path(str(self.temporary)).chmod(0o666 & ~_umask())
-        Path(str(self.temporary)).replace(self.target)
+        temporary = Path(str(self.temporary))
         self.writer = self.temporary = None
+        try:
+            with reaching(self.target, "write"):
+                _need_complete(temporary, self.count)
+                temporary.chmod(0o666 & ~_umask())
+                temporary.replace(self.target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
         return self.target
 
     def end(self) -> None:
@@ -133,9 +158,53 @@ class WriteVideo(Node):
             self.written.trigger(self._close())
 
     def teardown(self) -> None:
-        """Give what was written its name, also if the run failed: every picture in it is whole."""
+        """Give what was written its name, also if the run failed elsewhere: every picture in it is whole."""
         if self.writer is not None:
             self._close()
+
+
+def _need_room(file: Path) -> None:
+    """See that a file can become longer, and leave it as it is.
+
+    Raises:
+      OSError: the disk is full, or a limit is reached.
+    """
+    with file.open("ab") as stream:
+        length = stream.tell()
+        try:
+            stream.write(bytes(_LEAST_BYTES))
+            stream.flush()
+            os.fsync(stream.fileno())
+        finally:
+            os.truncate(file, length)
+
+
+def _need_complete(file: Path, count: int) -> None:
+    """See that a video holds so many pictures and its index, for OpenCV does not say what it could not write.
+
+    Raises:
+      OSError: it does not.
+    """
+    _need_room(file)
+    video = cv2.VideoCapture(str(file))
+    try:
+        said = video.get(cv2.CAP_PROP_FRAME_COUNT)
+        video.set(cv2.CAP_PROP_FORMAT, -1)  # packets are counted, which need not be decoded for that
+        found = 0
+        while video.grab():
+            found += 1
+    finally:
+        video.release()
+    if found != count or abs(said - count) > 1:
+        raise OSError(errno.EIO, f"of {count} pictures {found} came to the disk; is it full?")
+
+
+def _room(file: Path) -> int:
+    """How many bytes the disk of a file has left for this user."""
+    if not hasattr(os, "statvfs"):
+        return _LEAST_BYTES
+    disk = os.statvfs(file)
+    return disk.f_frsize * (disk.f_bavail if os.geteuid() else disk.f_bfree)
 
 
 def _umask() -> int:

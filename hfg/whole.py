@@ -1,0 +1,179 @@
+"""Files that are whole or not there: written beside their place, brought to the disk, then renamed.
+
+A disk that becomes full, a limit and a sudden end leave the old file, or none. Stands on the standard library alone.
+"""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO, Final
+
+__all__ = ["GrowingFile", "need_writable", "write_whole"]
+
+_numbers: Final = itertools.count()
+_HELD_BYTES: Final = 64 * 1024
+
+
+def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:
+    """Write a file so that it is either the old one or the new one, whatever happens meanwhile.
+
+    A device or a pipe is written to directly.
+
+    Args:
+      path: where it will be; of a symbolic link, what that leads to.
+      write: writes the content.
+      overwrite: whether a file that is there may be replaced.
+
+    Raises:
+      OSError: it cannot be written; the old file is whole.
+    """
+    target = _target(path)
+    if not overwrite and target.exists():
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    if _is_no_file(target):
+        with target.open("wb") as file:
+            write(file)
+        return
+    beside = target.with_name(f".hfg-{os.getpid()}-{next(_numbers)}.part")
+    try:
+        with beside.open("xb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        with suppress(OSError):
+            beside.chmod(target.stat().st_mode)
+        beside.replace(target)
+    except BaseException:
+        with suppress(OSError):
+            beside.unlink()
+        raise
+    _keep_the_name(target)
+
+
+def need_writable(path: Path) -> None:
+    """See that a file could be written there, and leave nothing behind.
+
+    Raises:
+      OSError: it could not.
+    """
+    was_there = path.exists()
+    with path.open("ab"):
+        pass
+    if not was_there:
+        path.unlink()
+
+
+def _target(path: Path) -> Path:
+    target = path.resolve() if path.is_symlink() else path
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    return target
+
+
+def _is_no_file(path: Path) -> bool:
+    return path.exists() and not path.is_file()
+
+
+def _keep_the_name(file: Path) -> None:
+    """Bring the name to the disk too; not every system can."""
+    with suppress(OSError):
+        folder = os.open(file.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+class GrowingFile:
+    """A file that grows piece by piece, each whole, and has its name when it is complete.
+
+    Until then it is named `<name>.part`, so whoever likes can follow it, and a sudden end leaves what was written. A
+    file that is appended to keeps its name, and loses no more than the pieces that could not be written.
+
+    Attributes:
+      place: what is written to.
+      lost: how many pieces could not be written; such a file is never complete.
+    """
+
+    def __init__(self, path: Path, *, append: bool, at_once: bool) -> None:
+        """Open it.
+
+        Args:
+          path: its name; of a symbolic link, what that leads to.
+          append: whether what is there stays in front.
+          at_once: whether each piece is given to the system at once, else many together.
+
+        Raises:
+          OSError: it cannot be opened.
+        """
+        self._target = _target(path)
+        in_place = append or _is_no_file(self._target)
+        self.place = self._target if in_place else self._target.with_name(f"{self._target.name}.part")
+        self._file = self.place.open("ab" if append else "wb", buffering=0)
+        self._at_once = at_once
+        self._held: list[bytes] = []
+        self._held_bytes = 0
+        self._length = self._file.seek(0, os.SEEK_END) if self._file.seekable() else 0
+        self.lost = 0
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is in it."""
+        return not self._length and not self._held
+
+    def write(self, piece: bytes) -> None:
+        """Append a piece.
+
+        Raises:
+          OSError: this piece, or those held before it, cannot be written.
+        """
+        self._held.append(piece)
+        self._held_bytes += len(piece)
+        if self._at_once or self._held_bytes > _HELD_BYTES:
+            self.flush()
+
+    def flush(self) -> None:
+        """Give the system what is held.
+
+        Raises:
+          OSError: it cannot be written, so the file ends with the last whole piece.
+        """
+        data, pieces = b"".join(self._held), len(self._held)
+        self._held.clear()
+        self._held_bytes = 0
+        left = memoryview(data)
+        try:
+            while left:
+                left = left[self._file.write(left) or 0 :]
+        except OSError:
+            self.lost += pieces
+            with suppress(OSError):
+                self._file.truncate(self._length)
+                self._file.seek(self._length)
+            raise
+        self._length += len(data)
+
+    def complete(self) -> None:
+        """Close it and give it its name. A file that lacks something stays as it is.
+
+        Raises:
+          OSError: not everything is in it.
+        """
+        try:
+            self.flush()
+            if self.lost:
+                raise OSError(errno.EIO, f"{self.lost} pieces could not be written; the others are in {self.place}")
+            with suppress(OSError):  # a pipe cannot
+                os.fsync(self._file.fileno())
+        finally:
+            self._file.close()
+        if self.place != self._target:
+            with suppress(OSError):
+                self.place.chmod(self._target.stat().st_mode)
+            self.place.replace(self._target)
+            _keep_the_name(self._target)
