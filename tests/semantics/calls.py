@@ -5,6 +5,7 @@ The same notes are taken of fused runs, of interpreted runs, and of the oracle, 
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import threading
 from collections.abc import Callable, Iterator
@@ -200,8 +201,12 @@ def noted_run(
     if fast and trace is None:
         calls.may_fuse += sum(node.firings + node.calls for node in report.nodes.values())
     report = hfg.Report(**{**_fields(report), "duration_s": 0.0}) if real else report
-    passed = {label: [_token(token) for token in tap._buffer.kept] for label, tap in taps.items()}
-    return Ran(report, error, calls.take(), passed)
+    return Ran(report, error, calls.take(), asyncio.run(_passed(taps)) if tapped else {})
+
+
+async def _passed(taps: dict[str, Any]) -> Passed:
+    """What the taps of a run that is over have kept."""
+    return {label: [_token(token) async for token in tap] for label, tap in taps.items()}
 
 
 def _fields(report: hfg.Report) -> dict[str, Any]:
