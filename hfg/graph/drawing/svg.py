@@ -37,14 +37,14 @@ _ACTIVE: Final = "#d9480f"
 _GROUPS: Final = ("#cfe5fb", "#d6efc9", "#fde2b8", "#f5d3e4", "#e3daf8", "#c9ecea", "#f4efb3", "#e5dccb")
 
 _STYLE: Final = """\
-.hfg text{white-space:pre}
+.hfg text{white-space:pre;stroke:none}
 @media (prefers-color-scheme:dark){
 .hfg-paper,.hfg-gap{fill:#14181d}.hfg-halo,.hfg-gap{stroke:#14181d}
 .hfg-line{stroke:#d5dde6}.hfg-line.hfg-light{stroke:#93a7bd}
 .hfg-tip{fill:#d5dde6}.hfg-tip.hfg-light{fill:#93a7bd}
 .hfg-box{stroke:#7b8ea3}.hfg-free{fill:#d5dde6}
-.hfg-node{stroke:#93a7bd}.hfg-on{stroke:#ff7a3d}
-.hfg-port{stroke:#eef3f8}
+rect.hfg-node{stroke:#93a7bd}rect.hfg-on{stroke:#ff7a3d}
+rect.hfg-port,path.hfg-port{stroke:#eef3f8}
 }
 """
 
