@@ -113,8 +113,8 @@ class Hostile:
         self._held = 0
         self._rows = self._one(_SIDES)
         self._columns = self._rows if self.chance(25) else self._one(_SIDES)
-        if self.chance(1):
-            self._rows, self._columns = self._one([(1, 40_000), (40_000, 1), (500, 700), (33_000, 2)])
+        if self.number(300) == 0:
+            self._rows, self._columns = self._one([(1, 40_000), (40_000, 1), (400, 500)])
         self._count = self._one(_LENGTHS)
         self._channels = self._one((1, 1, 1, 3, 3, 2, 4))
         self._kind = self._one(("u1", "u1", "f4", "f4", "f8", "i2", "u2", "i4", "i1", "f2"))

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from hfg.files.apex.document import ApexConnection, ApexFile, ApexGraph, ApexNode, ApexParameter
+from hfg.files.apex.playing import file_importer
 from hfg.files.apex.ports import AUTOMATIC, Missing, Ports, is_source, parts
 from hfg.files.apex.reading import SEPARATOR
 from hfg.files.apex.report import ConversionReport, Converted
@@ -176,6 +177,8 @@ class _Converting:
             made.notes["csapex"] = node.raw
             told.lost("there is no such type here; the node keeps its place and its data, and the graph does not run")
             return
+        if rule.made_by == "file_importer":
+            rule = file_importer(rule, node.parameters)
         made.type = told.type = rule.type
         counts = self.counts(node)
         level.ports[node.uuid] = Ports(rule, level.numbers[node.uuid], counts, self.old)
@@ -220,7 +223,8 @@ class _Converting:
         try:
             _set(made.parameters, goes, said)
         except (TypeError, ValueError):
-            told.differs(f'its parameter "{name}" ({said.value}) cannot be "{goes.to}" here, which is as usual')
+            shown = said.text or said.value
+            told.differs(f'its parameter "{name}" ({shown}) cannot be "{goes.to}" here, which is as usual')
             return False
         return True
 
@@ -434,21 +438,44 @@ class _Converting:
 
 
 def _set(parameters: dict[str, Any], goes: ParameterRule, said: ApexParameter) -> None:
-    value = said.text if said.kind == "set" and goes.how == "lower" else said.value
+    """Set a parameter.
+
+    Raises:
+      TypeError: there is nothing for the value.
+      ValueError: the same.
+    """
+    value = _meant(goes, said)
     match goes.how:
         case "same":
             parameters[goes.to] = value
         case "float":
             parameters[goes.to] = float(value)
-        case "lower":
+        case "lower" | "ending":
             if not isinstance(value, str):
                 raise TypeError
-            parameters[goes.to] = value.lower()
+            parameters[goes.to] = (value if goes.how == "lower" else value.rpartition(".")[2]).lower()
         case "square":
             parameters[goes.to] = [int(value), int(value)]
         case "first" | "second":
             pair = parameters.setdefault(goes.to, [1, 1])
             pair[goes.how == "second"] = int(value)
+        case "from" | "into":
+            before, _, behind = parameters[goes.to].partition("2")
+            parameters[goes.to] = f"{value}2{behind}" if goes.how == "from" else f"{before}2{value}"
+
+
+def _meant(goes: ParameterRule, said: ApexParameter) -> Any:
+    """Return the value that is meant: of a set that of its text, because numbers are what its author counted by."""
+    if said.kind != "set" or not said.text:
+        if goes.values:
+            raise ValueError  # a number alone says nothing
+        return said.value
+    if goes.values:
+        if said.text not in goes.values:
+            raise ValueError
+        return goes.values[said.text]
+    is_number = isinstance(said.value, int | float) and said.text == f"{said.value:g}"
+    return said.value if is_number else said.text
 
 
 def _shown_sizes(rule: TypeRule, names: Iterable[str]) -> dict[str, int]:

@@ -16,7 +16,7 @@ class ApexParameter(msgspec.Struct):
       kind: "value", "range", "interval", "set", "bitset", "color", "path", "angle", "string_list", "trigger" ...
       value: as plain data; None if none is set, or the kind has none. A set's is its number or text, a bitset's the
         list of its names if they are known, else the mask, a colour's "#rrggbb".
-      text: of a set, the name of what is selected.
+      text: of a set, the name of what is selected; it says what is meant, and the number does not.
     """
 
     kind: str

@@ -224,8 +224,18 @@ class _Reader:
         if kind not in _NO_VALUE:
             made.value = self.value_of(kind, entry, line, where)
         if kind == "set":
-            made.text = str(entry["txt"].value) if "txt" in entry else ""
+            made.text = self.selected(entry, made.value, where)
+            made.value = made.text if made.value is None and made.text else made.value
         return made
+
+    def selected(self, entry: dict[str, Located], value: Any, where: str) -> str:
+        """Return the text of a set: the one that is said, else the one of its value."""
+        said = self.value(entry, "txt", str, "a text", where)
+        if said is not None:
+            return str(said)
+        pairs = plain(entry["values"]) if "values" in entry else None
+        found = [one for one in pairs if isinstance(one, list) and len(one) == 2] if isinstance(pairs, list) else []
+        return next((str(text) for text, number in found if number == value), "")
 
     def value_of(self, kind: str, entry: dict[str, Located], line: int, where: str) -> Any:
         match kind:

@@ -14,7 +14,7 @@ import yaml
 
 __all__ = ["As", "ParameterRule", "TypeRule", "rule_of", "rules"]
 
-As = Literal["same", "float", "lower", "square", "first", "second"]
+As = Literal["same", "float", "lower", "square", "first", "second", "from", "into", "ending"]
 
 _NAMESPACES: Final = ("csapex::", "vision_plugins::", "csapex::vision_plugins::")
 
@@ -24,11 +24,14 @@ class ParameterRule(msgspec.Struct, rename={"how": "as"}, forbid_unknown_fields=
 
     Attributes:
       to: its name here.
-      how: what becomes of its value: "square" makes (k, k) of k, "first" and "second" are the parts of a pair.
+      how: what becomes of its value: "square" makes (k, k) of k, "first" and "second" are the parts of a pair, "from"
+        and "into" those of a word such as "BGR2HSV"; "ending" takes that of a name of a file.
+      values: of a set: the values here of its texts, which are all that is known.
     """
 
     to: str
     how: As = "same"
+    values: dict[str, Any] = {}
 
 
 class TypeRule(msgspec.Struct, forbid_unknown_fields=True):
@@ -42,6 +45,7 @@ class TypeRule(msgspec.Struct, forbid_unknown_fields=True):
       shown: parameters that show what has come, and the outputs that they are here; {} stands for any number.
       same: parameters without a counterpart, and the value with which that makes no difference.
       set: parameters that are only here; "{name}" is the node's name.
+      made_by: the function that changes the rule for a node, if its type depends on its parameters.
       differs: why the node does not do the same in all cases.
     """
 
@@ -55,6 +59,7 @@ class TypeRule(msgspec.Struct, forbid_unknown_fields=True):
     shown: dict[str, str] = {}
     same: dict[str, Any] = {}
     set: dict[str, Any] = {}
+    made_by: Literal["", "file_importer"] = ""
     differs: str = ""
 
     def parameter(self, name: str) -> ParameterRule | None:

@@ -78,7 +78,7 @@ class Calling:
         self._knobs = knobs
         self._given = given
         self._deadly = deadly
-        self._needs = overrides.NEEDS.get(name)
+        self._needs = overrides.NEEDS.get(name, ())
         self._results = results
         self._is_single = is_single
         self._lists = {place for place, kind in enumerate(results) if kind.startswith("Sequence[")}
@@ -92,8 +92,8 @@ class Calling:
         """
         arguments = dict(self._given)
         inputs = self._take(values, arguments)
-        if self._needs is not None:
-            wrong = self._needs.wrong(inputs, {knob.argument: parameters[knob.setting.name] for knob in self._knobs})
+        for need in self._needs:
+            wrong = need.wrong(inputs, {knob.argument: parameters[knob.setting.name] for knob in self._knobs})
             if wrong is not None:
                 raise ValueError(f"{self._node}: {wrong}")
         self._convert(arguments, inputs, parameters)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from annotated_types import Ge, Gt, Interval, Le, Len, MinLen, Predicate
 
 from hfg.images import Color, Gray, Labels, Mask, Matrix, OneOf, Points, Rows
+from hfg.nodes._encodable import is_encodable
 from hfg.nodes.cv._stub import enumerations
 from hfg.ports.specs import REQUIRED
 from hfg.types import Named, Pixels, Shape
@@ -178,8 +179,13 @@ def _criteria(count: int, epsilon: float) -> Say:
 
 
 def rounds_are_few(value: tuple[int, float]) -> bool:
-    """Say whether there are 1 to 10000 rounds and the change is not negative."""
-    return 1 <= value[0] <= 10000 and value[1] >= 0
+    """Say whether there are 1 to 10000 rounds and the change is 0 to 1e9."""
+    return 1 <= value[0] <= 10000 and 0 <= value[1] <= 1e9  # OpenCV squares it, and stops before it begins
+
+
+def can_be_encoded(value: str) -> bool:
+    """Say whether a text has no half of a pair of surrogates, for which OpenCV ends the process."""
+    return is_encodable(value)
 
 
 def _first(inputs: Mapping[str, Any]) -> Any:
@@ -234,8 +240,13 @@ def _in_a_list(value: Any, inputs: Mapping[str, Any]) -> Any:
     return [value]
 
 
+def _in_columns(value: Any, inputs: Mapping[str, Any]) -> Any:
+    """Give points as OpenCV takes a single one, too: n x 2 numbers are n x 1 pairs."""
+    return np.reshape(value, (-1, 1, value.shape[-1]))
+
+
 def _with_room(value: Any, inputs: Mapping[str, Any]) -> Any:
-    """Copy a mask to where something is behind it: OpenCV reads some bytes more."""
+    """Copy an array to where something is behind it: OpenCV reads some bytes more."""
     room = np.zeros(value.size + 64, value.dtype)
     room[: value.size] = value.reshape(-1)
     return room[: value.size].reshape(value.shape)
@@ -346,7 +357,7 @@ COMMON: Final[Mapping[str, Say]] = {
     "motionType": _words("MOTION_ TRANSLATION EUCLIDEAN AFFINE", "AFFINE"),
     "gaussFiltSize": _int(5, 1, 31, odd=True),
     "dstCn": _int(0, 0, 4),
-    "minDistance": _float(10.0, 0.0),
+    "minDistance": _float(10.0, 0.0, 32767.0),
     "qualityLevel": _float(0.01, above=0.0, high=1.0),
     "maxCorners": _int(100, 0, 100000),
     "useHarrisDetector": Say(bool, False),
@@ -661,7 +672,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
         ["fastNlMeansDenoisingMulti", "fastNlMeansDenoisingColoredMulti"],
         {
             "srcImgs": Say(Annotated[list[Color], MinLen(1)]),
-            "imgToDenoiseIndex": _int(0, 0),
+            "imgToDenoiseIndex": _int(0, 0, 10000),
             "temporalWindowSize": _int(1, 1, 15, odd=True),
             "h": _float(3.0, 0.0),
             "hColor": _float(3.0, 0.0),
@@ -751,7 +762,12 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
         "alpha": _float(0.0, 0.0, 1.0),
         "newImgSize": Say(Size, (0, 0)),
     },
-    "getRectSubPix": {"patchSize": _sizes((16, 16)), "center": MIDDLE, "patchType": _dtype("same", "same", "float32")},
+    "getRectSubPix": {
+        "image": Say(convert=_with_room),
+        "patchSize": _sizes((16, 16)),
+        "center": MIDDLE,
+        "patchType": _dtype("same", "same", "float32"),
+    },
     "goodFeaturesToTrack": {},
     "goodFeaturesToTrackWithQuality": {"gradientSize": Say(Literal[3, 5, 7], 3)},
     "grabCut": {
@@ -805,6 +821,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "mulTransposed": {"src": Say(Matrix), "aTa": Say(bool, True), "delta": DROP},
     "norm": {"mask": Say(Mask, convert=_with_room)},
     "normalize": {
+        "src": Say(convert=_with_room),
         "mask": Say(Mask, convert=_with_room),
         "dst": NOTHING,
         "norm_type": _words("NORM_ INF L1 L2 MINMAX", "L2"),
@@ -826,7 +843,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "pow": {"power": _float(2.0)},
     "projectPoints": {"aspectRatio": DROP},
     "putText": {
-        "text": Say(Annotated[str, Len(0, 1000)], "hfg"),
+        "text": Say(Annotated[str, Len(0, 1000), Predicate(can_be_encoded)], "hfg"),
         "org": Say(Position, (8, 24)),
         "fontFace": _pick("HersheyFonts", "SIMPLEX", "FONT_HERSHEY_"),
         "fontScale": _float(1.0, above=0.0, high=100.0),
@@ -934,6 +951,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
         "src": Say(Annotated[npt.NDArray[np.uint8 | np.float32], Pixels(3), Named("Picture")]),
         "m": Say(Annotated[npt.NDArray[Reals], OneOf((3, 3), (3, 4)), Named("Mixture")]),
     },
+    "triangulatePoints": dict.fromkeys(["projPoints1", "projPoints2"], Say(Corners, convert=_in_columns)),
     "transposeND": {"order": Say(tuple[int, ...], (1, 0))},
     "undistortImagePoints": {"src": Say(Exacts), "arg1": DROP},
     "undistortPoints": {"src": Say(Exacts), "P": Say(Three)},
@@ -979,11 +997,19 @@ class Need(NamedTuple):
     wrong: Callable[[Mapping[str, Any], Mapping[str, Any]], str | None]
 
 
-def _samples_are_near(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
-    """The centres of samples that are not numbers, or so large that squares overflow, are at places that are not."""
-    if bool((np.abs(inputs["data"]) <= 1e15).all()):
-        return None
-    return "data has a number that is not within 1e15"
+_LARGEST: Final = 1e15
+
+
+def _near(name: str) -> Need:
+    """Numbers that are NaN, or so large that squares or differences overflow, become places beyond the memory."""
+
+    def wrong(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+        array = inputs[name]
+        if array.dtype.kind != "f" or bool((np.abs(array) <= _LARGEST).all()):
+            return None
+        return f"{name} has a number that is not within 1e15; clip it, or replace NaN and infinity, first"
+
+    return Need(f"{name} has a number that is not within 1e15", wrong)
 
 
 def _matches_name_keypoints(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
@@ -1083,30 +1109,49 @@ def _disparities_are_of_the_range(inputs: Mapping[str, Any], parameters: Mapping
     return f"disparity has numbers that are not within {least * 16} and {most * 16 - 1}, sixteenths of the disparities"
 
 
-def _is_finite(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
-    return None if bool(np.isfinite(inputs["src"]).all()) else "src has what is no number"
+def _finite(*names: str) -> Need:
+    """Refuse what is not a number, or infinite: OpenCV counts such elements in one place and not in another."""
+
+    def wrong(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+        for name in names:
+            array = inputs.get(name)
+            if array is not None and array.dtype.kind == "f" and not bool(np.isfinite(array).all()):
+                return f"{name} has NaN or infinity; replace it first, as patch_nans does for NaN"
+        return None
+
+    return Need(f"{' or '.join(names)} has NaN or infinity", wrong)
 
 
 def _shown(array: Any) -> str:
     return f"{array.shape[0]} x {array.shape[1]}"
 
 
-_ANCHOR: Final = Need("the anchor is outside of the kernel", _anchor_is_inside)
 _MATCHED: Final = Need("a match names a keypoint that is not there", _matches_name_keypoints)
-NEEDS: Final[Mapping[str, Need]] = {
-    "kmeans": Need("data has a number that is not within 1e15", _samples_are_near),
-    "drawMatches": _MATCHED,
-    "drawMatchesKnn": _MATCHED,
-    **dict.fromkeys(["blur", "boxFilter", "dilate", "erode", "filter2D", "morphologyEx", "sqrBoxFilter"], _ANCHOR),
-    "pow": Need("the array is of integers and the power is no whole number", _power_fits),
-    "convertMaps": Need("the maps have two sizes", _maps_are_alike),
-    "drawChessboardCorners": Need("a board that was found has more or fewer corners", _corners_fill_the_board),
-    "triangulatePoints": Need("the cameras do not see equally many points", _points_are_pairs),
-    "HoughLinesP": Need("rho is more than the picture", _steps_are_in_the_picture),
-    "minMaxLoc": Need("the mask has another size", _mask_is_alike),
-    "spatialGradient": Need("the picture is one pixel wide", _is_wide),
-    "minEnclosingTriangle": Need("the points lie almost on a line", _points_are_no_line),
-    "validateDisparity": Need("there are disparities outside of their range", _disparities_are_of_the_range),
-    "eigenNonSymmetric": Need("an element is not finite", _is_finite),
+_ONE_SIZE: Final = Need("the mask has another size", _mask_is_alike)
+_NEEDED: Final[tuple[tuple[str, Need], ...]] = (
+    ("kmeans", _near("data")),
+    ("bilateralFilter", _near("src")),
+    ("drawMatches drawMatchesKnn", _MATCHED),
+    (
+        "blur boxFilter dilate erode filter2D morphologyEx sqrBoxFilter",
+        Need("the anchor is outside of the kernel", _anchor_is_inside),
+    ),
+    ("pow", Need("the array is of integers and the power is no whole number", _power_fits)),
+    ("convertMaps", Need("the maps have two sizes", _maps_are_alike)),
+    ("drawChessboardCorners", Need("a board that was found has more or fewer corners", _corners_fill_the_board)),
+    ("triangulatePoints", Need("the cameras do not see equally many points", _points_are_pairs)),
+    ("HoughLinesP", Need("rho is more than the picture", _steps_are_in_the_picture)),
+    ("minMaxLoc", _ONE_SIZE),
+    ("spatialGradient", Need("the picture is one pixel wide", _is_wide)),
+    ("minEnclosingTriangle", Need("the points lie almost on a line", _points_are_no_line)),
+    ("validateDisparity", Need("there are disparities outside of their range", _disparities_are_of_the_range)),
+    ("eigenNonSymmetric", _finite("src")),
+    ("filter2D", _finite("kernel")),
+    ("sepFilter2D", _finite("kernelX", "kernelY")),
+)
+NEEDS: Final[Mapping[str, tuple[Need, ...]]] = {
+    name: tuple(need for names, need in _NEEDED if name in names.split())
+    for names, _ in _NEEDED
+    for name in names.split()
 }
 """What OpenCV does not look at, found by placing each array before a page that nobody may touch."""

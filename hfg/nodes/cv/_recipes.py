@@ -194,8 +194,7 @@ def _arguments(
 
 
 def _refusals(name: str) -> str:
-    needs = overrides.NEEDS.get(name)
-    own = "" if needs is None else f", {needs.says}"
+    own = "".join(f", {need.says}" for need in overrides.NEEDS.get(name, ()))
     return f"an input is empty{own}, or OpenCV refuses the values; the message says why."
 
 

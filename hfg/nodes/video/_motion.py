@@ -219,7 +219,7 @@ class PointTracker(Node):
 
     most = Parameter(100, Interval(ge=1, le=10_000))
     least = Parameter(10, Interval(ge=0))
-    distance = Parameter(8.0, Interval(ge=1))
+    distance = Parameter(8.0, Interval(ge=1, le=32767), unit="px")
     window = Parameter(21, Interval(ge=3, le=101))
     image = Input(Picture)
     points = Output(Tracked)

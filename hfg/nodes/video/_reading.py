@@ -17,6 +17,7 @@ from annotated_types import Ge, Gt
 from hfg.clock import now
 from hfg.errors import EndOfStream
 from hfg.images import Image
+from hfg.nodes._encodable import need_encodable
 from hfg.nodetype import Node
 from hfg.ports import Output, Parameter, State
 
@@ -27,6 +28,7 @@ class _Capture:
     """An open video or camera that one thread at a time reads."""
 
     def __init__(self, source: str | int) -> None:
+        need_encodable("the path", source)
         self._lock = threading.Lock()
         self._capture = cv2.VideoCapture(source)
         self._open = self._capture.isOpened()
@@ -173,6 +175,7 @@ class Camera(Node):
 
     Raises:
       OSError: there is no such camera, or it gives no more pictures.
+      ValueError: the path of the camera has half of a character.
 
     CS::APEX: csapex::Camera.
     """

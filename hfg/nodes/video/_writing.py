@@ -12,6 +12,7 @@ import cv2
 from annotated_types import Interval
 
 from hfg.images import Picture
+from hfg.nodes._encodable import need_encodable
 from hfg.nodes._pictures import colour, need_picture
 from hfg.nodes.files.access import reaching
 from hfg.nodetype import Node
@@ -21,6 +22,9 @@ __all__ = ["WriteVideo"]
 
 _LEAST_BYTES: Final = 64 * 1024
 """More than OpenCV holds back, so that what it could not write would not fit now either."""
+
+_NARROWEST: Final = 8
+"""OpenCV writes beyond its memory when it packs narrower pictures as MJPG."""
 
 
 class WriteVideo(Node):
@@ -45,7 +49,7 @@ class WriteVideo(Node):
     Raises:
       FileNotFoundError: no video is named.
       OSError: the file cannot be written; the sentence says why.
-      ValueError: a picture has another size than the first, or OpenCV does not write such a file.
+      ValueError: a picture has another size than the first or is too narrow, or OpenCV does not write such a file.
 
     CS::APEX: csapex::MakeVideo.
     """
@@ -68,6 +72,7 @@ class WriteVideo(Node):
         """See that a file can be written there before the first picture comes."""
         if not self.path:
             raise FileNotFoundError('no video is named: set path, as in WriteVideo(path="people.avi")')
+        need_encodable("the path", self.path)
         self._folder()
 
     def _folder(self) -> Path:
@@ -105,6 +110,11 @@ class WriteVideo(Node):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def _begin(self, size: tuple[int, int]) -> None:
+        if self.codec == "MJPG" and size[0] < _NARROWEST:
+            raise ValueError(
+                f"MJPG needs pictures that are at least {_NARROWEST} pixels wide, got {size[0]} x {size[1]}: "
+                'set width and height, or take "mp4v" and a name that ends with .mp4'
+            )
         target = Path(self.path).absolute()
         handle, temporary = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem}-", dir=self._folder())
         os.close(handle)

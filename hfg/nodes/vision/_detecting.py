@@ -12,6 +12,7 @@ from annotated_types import Interval, Len
 
 from hfg.functions import node
 from hfg.images import Gray, Picture, Rows
+from hfg.nodes._encodable import need_encodable
 from hfg.nodes._pictures import colour, gray, need_picture, refusal
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Output, Parameter, State
@@ -126,6 +127,7 @@ class CascadeDetector(Node):
                 sorted(one.stem.removeprefix("haarcascade_") for one in shipped.glob("haarcascade_*.xml"))
             )
             raise FileNotFoundError(f'there is no cascade "{self.cascade}": name a file, or one of {known}')
+        need_encodable("the path", str(file))
         try:
             self.detector = cv2.CascadeClassifier(str(file))
         except (cv2.error, SystemError):
@@ -312,10 +314,11 @@ def qr_code(text: Annotated[str, Len(1, 1000)], *, scale: Annotated[int, Interva
       out: the picture; dots are black.
 
     Raises:
-      ValueError: the text is empty, or too long for a code.
+      ValueError: the text is empty, too long for a code, or has half of a character.
     """
     if not text:
         raise ValueError("a QR code needs a text, got an empty one")
+    need_encodable("the text", text)
     try:
         dots = cv2.QRCodeEncoder.create().encode(text)
     except cv2.error as error:
