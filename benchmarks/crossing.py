@@ -22,9 +22,9 @@ import hfg
 from benchmarks.measure import ROOT
 from benchmarks.meters import Laps
 from benchmarks.parcels import SHAPE, Job, Picture, Post, letter, opened, picture, picture_bytes
-from hfg.links.local import LocalEndpoint, LocalRoute
+from hfg.links.local import LocalTransport
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
-from hfg.transport import Datagrams, Traffic
+from hfg.transport import Traffic
 
 __all__ = ["activity", "edge", "link", "meeting", "pipeline"]
 
@@ -97,39 +97,21 @@ async def paced(job: Job, send: Callable[[int], Awaitable[object]]) -> None:
         await send(number)
 
 
-async def open_session(folder: str, shared: bool) -> Any:
-    """Open a session as parts of a run do, but for shared memory of Zenoh."""
+async def open_session(folder: str, way: str) -> Any:
+    """Open a session: "straight" as parts of a run do on one host, else over Zenoh, perhaps with its shared memory."""
+    if way == "straight":
+        return await LocalTransport().open(folder=folder)
     from hfg_transports.zenoh import ZenohTransport
 
     meet = [f"unixsock-stream/{folder}/meet"]
-    return await ZenohTransport().open(realm=Path(folder).name, meet=meet, shared_memory=POOL if shared else 0)
-
-
-class Way:
-    """A session, and the way of links on one host beside it."""
-
-    def __init__(self, session: Any, folder: str, here: str, there: str, way: str) -> None:
-        """Open this end; `way` is "straight", or over the session alone."""
-        self._session = session
-        self._endpoint = LocalEndpoint(f"{folder}/{here}", session.largest_message) if way == "straight" else None
-        self._route = LocalRoute(self._endpoint, session, f"{folder}/{there}") if self._endpoint else None
-        self.datagrams: Datagrams = self._route or session
-
-    async def close(self) -> None:
-        """Close all of it."""
-        if self._route is not None and self._endpoint is not None:
-            await self._route.close()
-            self._endpoint.close()
-        await self._session.close()
+    return await ZenohTransport().open(realm=Path(folder).name, meet=meet, shared_memory=POOL * (way == "shared"))
 
 
 async def link_sender(job: Job, folder: str, window: int, way: str) -> None:
     """Send over a link: the other process."""
-    session = await open_session(folder, way == "shared")
-    opened_way = Way(session, folder, "sender", "receiver", way)
-    datagrams = opened_way.datagrams
-    exact = None if job.leaky else LinkSender(datagrams, "link", epoch=1, window=window)
-    loose = BoundedSender(datagrams, "link", epoch=1) if job.leaky else None
+    session = await open_session(folder, way)
+    exact = None if job.leaky else LinkSender(session, "link", epoch=1, window=window)
+    loose = BoundedSender(session, "link", epoch=1) if job.leaky else None
     if exact is not None:
         exact.admit("here", 1)
     publisher = session.publisher("link/tokens", Traffic.BULK)
@@ -150,14 +132,12 @@ async def link_sender(job: Job, folder: str, window: int, way: str) -> None:
         await exact.close(over=True)
     elif loose is not None:
         await loose.close()
-    await opened_way.close()
+    await session.close()
 
 
 async def link_receiver(post: Post, folder: str, window: int, way: str) -> None:
     """Receive: this process."""
-    session = await open_session(folder, way == "shared")
-    opened_way = Way(session, folder, "receiver", "sender", way)
-    datagrams = opened_way.datagrams
+    session = await open_session(folder, way)
     is_picture = post.job.what == "picture"
     over = asyncio.Event()
     receiver: LinkReceiver | BoundedReceiver
@@ -176,16 +156,16 @@ async def link_receiver(post: Post, folder: str, window: int, way: str) -> None:
             over.set()
 
     if post.job.leaky:
-        receiver = BoundedReceiver(datagrams, "link", arrived=arrived, producer=1)
+        receiver = BoundedReceiver(session, "link", arrived=arrived, producer=1)
     else:
         receiver = LinkReceiver(
-            datagrams, "link", consumer="here", incarnation=1, producer=1, capacity=window, arrived=arrived
+            session, "link", consumer="here", incarnation=1, producer=1, capacity=window, arrived=arrived
         )
     job = post.job._asdict()
     process = begin("link", {"job": job, "folder": folder, "window": window, "way": way})
     await until_over(process, over)
     await receiver.close()
-    await opened_way.close()
+    await session.close()
 
 
 def link(window: int, way: Literal["straight", "zenoh", "shared"], job: Job) -> dict[str, float]:
@@ -204,8 +184,7 @@ def meeting(window: int, job: Job) -> dict[str, float]:
     Post.current = post = Post(job)
     with tempfile.TemporaryDirectory(prefix="hfg-") as folder:
         settings = Path(folder) / "here.toml"
-        realm, meet = Path(folder).name, f"unixsock-stream/{folder}/meet"
-        settings.write_text(f'realm = "{realm}"\nmeet = ["{meet}"]\n', encoding="utf-8")
+        settings.write_text(f'realm = "{Path(folder).name}"\n', encoding="utf-8")
         graph = hfg.Graph("subscriber")
         sink = graph.add(read() if job.what == "letter" else see())
         hfg.subscribe(

@@ -51,6 +51,7 @@ FLOORS = {
     "hfg.links.running": 5,
     "hfg.links.meeting": 5,
     "hfg.links.local": 5,
+    "hfg.private": 1,
     "hfg.timeline": 4,
     "hfg.engine": 5,
     "hfg.nodes": 6,
@@ -74,6 +75,7 @@ SAME_FLOOR_PAIRS = {
     ("hfg.cli", "hfg.studio"),
     ("hfg.engine", "hfg.links.running"),
     ("hfg.links.meeting", "hfg.links.running"),
+    ("hfg.parts.transports", "hfg.links.local"),  # the one that is always there
     ("hfg.__main__", "hfg.cli"),
     ("hfg.testing", "hfg"),
     ("hfg.nodes", "hfg.recording"),  # a family of it is made there

@@ -68,10 +68,8 @@ def two_hosts() -> Iterator[dict[str, str]]:
 def write_settings(folder: Path) -> None:
     """Write what each host needs to know; no other computer can reach them, so they need no keys."""
     address = f"tcp/{ADDRESSES['arm']}:7447"
-    (folder / "arm.toml").write_text(
-        f'realm = "cell"\nhost = "arm"\nlisten = ["{address}"]\ninsecure = true\nmeet = []\n'
-    )
-    (folder / "base.toml").write_text(f'realm = "cell"\nhost = "base"\nconnect = ["{address}"]\nmeet = []\n')
+    (folder / "arm.toml").write_text(f'realm = "cell"\nhost = "arm"\nlisten = ["{address}"]\ninsecure = true\n')
+    (folder / "base.toml").write_text(f'realm = "cell"\nhost = "base"\nconnect = ["{address}"]\ninsecure = true\n')
 
 
 @contextlib.contextmanager

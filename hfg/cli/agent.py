@@ -22,7 +22,7 @@ from hfg.cli.options import SettingsOption
 from hfg.parts.hosts.agent import Agent
 from hfg.parts.hosts.hosting import Computer, Journal, logs_folder
 from hfg.parts.running.rings import sweep_runs
-from hfg.parts.transports import transport
+from hfg.parts.transports import open_session
 
 __all__ = ["agent", "session_settings"]
 
@@ -45,7 +45,7 @@ def agent(
 
 async def _serve(settings: dict[str, Any], folder: Path) -> int:
     sweep_runs()
-    session = await transport("zenoh").open(mode="router", **settings)
+    session = await open_session("", **({"mode": "router"} | settings if settings else {}))
     try:
         journal = Journal(logs_folder(), session.host)
         journal.open()

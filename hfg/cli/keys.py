@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import secrets
 import socket
 import sys
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Annotated
 import typer
 
 from hfg.cli.certificates import AUTHORITY, Kind, make_authority, make_certificate
+from hfg.errors import TargetError
 
 __all__ = ["keys"]
 
@@ -30,6 +33,19 @@ read = ["viewer"]
 
 Whoever can read {authority}.key can be anybody: it is for tests, and belongs on one computer.
 """
+
+
+@keys.command("secret")
+def _secret(file: Annotated[Path, typer.Argument(help="where it is to lie; it must not be there yet")]) -> int:
+    """Make a secret that all programs of a realm have, instead of certificates: key = "..." in their settings."""
+    try:
+        with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as stream:
+            stream.write(secrets.token_hex(32) + "\n")
+    except OSError as error:
+        raise TargetError(f"{file} cannot be written: {error.strerror}") from None
+    sys.stdout.write(f'{file} is there: copy it to all hosts, and write key = "{file.name}" in their settings\n')
+    return 0
+
 
 Folder = Annotated[Path, typer.Argument(help="where the authority and the certificates lie")]
 Hosts = Annotated[

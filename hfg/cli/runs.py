@@ -47,7 +47,7 @@ from hfg.parts.hosts.realm import (
     ask,
     run_place,
 )
-from hfg.parts.transports import transport
+from hfg.parts.transports import open_session
 
 __all__ = ["RealmLine", "deploy", "logs", "ps", "restart", "stop"]
 
@@ -167,7 +167,7 @@ def restart(
 
 @asynccontextmanager
 async def _realm(settings: str | None) -> AsyncIterator[Realm]:
-    session = await transport("zenoh").open(**session_settings(settings))
+    session = await open_session("", **session_settings(settings))
     try:
         realm = Realm(session)
         await realm.until(lambda: realm.agents or realm.runs, FINDS_S)

@@ -1,7 +1,8 @@
 """The session of a transport that all nodes of one run share, opened by the first and closed by the last.
 
 Which transport: what a node says, else the environment variable HFG_TRANSPORT, else the one in memory for runs in
-virtual time and Zenoh for all others. With which settings: what a node says, else the file that HFG_SETTINGS names.
+virtual time; otherwise Zenoh if settings name an address, and local sockets if not. With which settings: what a node
+says, else the file that HFG_SETTINGS names.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from weakref import WeakKeyDictionary
 
 from hfg.engine import VirtualTimeLoop
 from hfg.graph import Graph
-from hfg.parts.transports import transport
+from hfg.parts.transports import open_session
 from hfg.transport import Session
 
 __all__ = ["Share", "share"]
@@ -74,7 +75,7 @@ def share(graph: Graph, name: str, settings: str) -> Share:
     """
     loop = asyncio.get_running_loop()
     if not name:
-        name = os.environ.get("HFG_TRANSPORT", "") or ("memory" if isinstance(loop, VirtualTimeLoop) else "zenoh")
+        name = os.environ.get("HFG_TRANSPORT", "") or ("memory" if isinstance(loop, VirtualTimeLoop) else "")
     if not settings and name != "memory":
         settings = os.environ.get("HFG_SETTINGS", "")
     all_of_graph = _OPEN.setdefault(graph, {})
@@ -89,4 +90,4 @@ async def _open(name: str, settings: str) -> Session:
     said: dict[str, Any] = {}
     if settings:
         said = {"network" if name == "memory" else "settings": settings}
-    return await transport(name).open(**said)
+    return await open_session(name, **said)

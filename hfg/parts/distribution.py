@@ -181,6 +181,7 @@ class Distribution:
         self._carrier = Carrier(
             self._part,
             session,
+            self._launcher.near or session,
             self._run,
             self._lives,
             edges,

@@ -23,7 +23,7 @@ def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(runs, "FINDS_S", 0.1)
     file = tmp_path / "cell.toml"
-    file.write_text(f'realm = "{tmp_path.name}"\nhost = "here"\nlisten = ["tcp/127.0.0.1:{free_port()}"]\nmeet = []\n')
+    file.write_text(f'realm = "{tmp_path.name}"\nhost = "here"\n')
     return file
 
 
@@ -43,7 +43,8 @@ def test_settings_that_are_not_there(tmp_path: Path) -> None:
 
 
 def test_an_agent_whose_port_is_taken(alone: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    port = int(alone.read_text().partition("127.0.0.1:")[2].partition('"')[0])
+    port = free_port()
+    alone.write_text(f'listen = ["tcp/127.0.0.1:{port}"]\ninsecure = true\n')
     with socket.create_server(("127.0.0.1", port)):
         assert main(["agent", "--settings", str(alone)]) == 1
     assert "is taken by another program; is an hfg agent running already?" in capsys.readouterr().err
@@ -65,6 +66,13 @@ def test_a_realm_in_which_nobody_is(
 ) -> None:
     assert main([*arguments, "--settings", str(alone)]) == code
     assert sentence in capsys.readouterr().err
+
+
+@pytest.mark.rule("L5")
+def test_an_address_at_which_nobody_proves_who_he_is(alone: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    alone.write_text('listen = ["tcp/127.0.0.1:7447"]\n')
+    assert main(["agent", "--settings", str(alone)]) == 2
+    assert '"tcp/127.0.0.1:7447" is open: whoever connects there' in capsys.readouterr().err
 
 
 def test_a_folder_for_logs_that_cannot_be(alone: Path) -> None:

@@ -554,4 +554,4 @@ def test_ports_that_are_none_or_in_no_graph_are_refused() -> None:
 def test_a_transport_that_is_not_there_is_named(world: World) -> None:
     graph = hfg.Graph()
     hfg.publish("camera", graph.add(numbers()).out, transport="pigeon")
-    assert 'no transport is called "pigeon"; installed are: memory, zenoh' in refused(graph)
+    assert 'no transport is called "pigeon"; installed are: local, memory, zenoh' in refused(graph)

@@ -32,7 +32,9 @@ def free_port() -> int:
 @pytest.fixture
 def settings(tmp_path: Path) -> Path:
     file = tmp_path / "cell.toml"
-    file.write_text(f'listen = ["tcp/127.0.0.1:{free_port()}"]\nmeet = ["tcp/127.0.0.1:{free_port()}"]\n')
+    file.write_text(
+        f'listen = ["tcp/127.0.0.1:{free_port()}"]\nmeet = ["tcp/127.0.0.1:{free_port()}"]\ninsecure = true\n'
+    )
     return file
 
 

@@ -63,7 +63,7 @@ class Cell:
         self.written = folder / "written"
         arm, base = free_port(), free_port()
         (folder / "robot.py").write_text(textwrap.dedent(ROBOT))
-        usual = f'realm = "{folder.name}"\nmeet = []\nlease_s = 1.0\n'
+        usual = f'realm = "{folder.name}"\ninsecure = true\nlease_s = 1.0\n'
         (folder / "arm.toml").write_text(f'{usual}host = "arm"\nlisten = ["tcp/127.0.0.1:{arm}"]\n')
         agents = f'agents = ["tcp/127.0.0.1:{arm}"]\n'
         (folder / "base.toml").write_text(f'{usual}host = "base"\nlisten = ["tcp/127.0.0.1:{base}"]\n{agents}')
@@ -89,6 +89,8 @@ class Cell:
         begun = [self.begin("agent", "--settings", f"{host}.toml") for host in hosts]
         for host, process in zip(hosts, begun, strict=True):
             assert process.stdout is not None
+            assert "WARNING" in (said := process.stdout.readline())
+            assert "insecure: nobody proves who he is" in said
             assert process.stdout.readline() == f'agent of host "{host}" is ready, process {process.pid}\n'
         return begun
 

@@ -138,7 +138,9 @@ def test_what_is_said_of_an_edge_that_is_not_there_is_refused_and_changes_nothin
         said: list[Any] = []
         part = Part(MAIN, Composition(cutting.parts[MAIN], Settings()), edges, rests=said.append)
         session = await Network().open()
-        carrier = Carrier(part, session, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *told: said.append(told))
+        carrier = Carrier(
+            part, session, session, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *told: said.append(told)
+        )
         for other in cutting.parts:
             with pytest.raises(Untrue, match="an edge"):
                 carrier.hear(other, message)
@@ -162,7 +164,7 @@ def test_a_gap_in_the_numbers_of_an_edge_that_may_lose_is_counted_however_large_
         edges = list(cutting.edges_of(MAIN))
         part = Part(MAIN, Composition(cutting.parts[MAIN], Settings()), edges, rests=lambda _: None)
         here, there = await (network := Network()).open(), await network.open()
-        carrier = Carrier(part, here, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *_: None)
+        carrier = Carrier(part, here, here, RUN, dict.fromkeys(cutting.parts, 1), edges, lambda *_: None)
         publisher = there.publisher(f"{RUN}/edge/{edges[0].number}/tokens", Traffic.BULK)
         publisher.put(write(Tokens(1, 1, 2**61, 1, [b""])), b"")
         await asyncio.sleep(0.01)

@@ -101,20 +101,18 @@ CHAIN = """
 """
 
 
-class SlowTransport:
-    """One whose session is there after a while, with a file of its own."""
+class SlowSession:
+    """One that is there after a while, with a file of its own."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self) -> None:
         self.begun, self.may_go_on = asyncio.Event(), asyncio.Event()
         self.closed = False
 
-    async def open(self, **_: object) -> SlowTransport:
+    async def open(self, settings: object, folder: str) -> tuple[SlowSession, SlowSession]:
         self.begun.set()
         await self.may_go_on.wait()
-        for folder in self.folder.iterdir():
-            (folder / "meet").touch()
-        return self
+        (Path(folder) / "secret").touch()
+        return self, self
 
     async def close(self) -> None:
         self.closed = True
@@ -126,8 +124,8 @@ def test_who_is_interrupted_while_parts_begin_to_meet_leaves_no_folder(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
     async def scenario() -> None:
-        slow = SlowTransport(tmp_path)
-        monkeypatch.setattr(launching, "transport", lambda _: slow)
+        slow = SlowSession()
+        monkeypatch.setattr(launching, "open_sessions", slow.open)
         launcher = launching.ProcessLauncher()
         opening = asyncio.create_task(launcher.open())
         await slow.begun.wait()
@@ -188,9 +186,9 @@ def test_the_next_run_removes_what_runs_have_left_that_were_killed_and_nothing_e
     others = [tmp_path / "hfg-something", tmp_path / "hfg-meet-notes", tmp_path / f"{left.folder.name}-of-mine"]
     for other in others:
         other.mkdir()
-        (other / "meet").touch()
+        (other / "secret").touch()
     for place in (left, young):
-        (place.folder / "meet").touch()
+        (place.folder / "secret").touch()
         assert place._lock is not None
         os.close(place._lock)  # as the end of a process does
         place._lock = None
@@ -202,7 +200,7 @@ def test_the_next_run_removes_what_runs_have_left_that_were_killed_and_nothing_e
     for place in (left, lives, young, following):
         place.leave()
     assert sorted(tmp_path.iterdir()) == sorted(others)
-    assert all((other / "meet").exists() for other in others)
+    assert all((other / "secret").exists() for other in others)
 
 
 def test_a_process_that_is_forked_from_a_run_leaves_its_folder_alone(tmp_path: Path) -> None:
@@ -245,38 +243,6 @@ def test_a_process_that_dies_is_begun_again_and_nothing_is_lost(tmp_path: Path, 
     assert 'the process of group "far" was begun again 1 times' in out
     assert ("has ended with code 3" if how == "exit" else "was ended by SIGKILL") in err
     nothing_is_left(tmp_path, pids)
-
-
-@pytest.mark.rule("L2")
-@pytest.mark.skipif(sys.platform != "linux", reason="the sockets are Linux's")
-def test_tokens_go_straight_to_a_process_of_this_host_and_also_to_its_next_life(tmp_path: Path) -> None:
-    running = program(
-        tmp_path,
-        f"""
-    from hfg.links.local import LocalRoute
-
-    if __name__ == "__main__":
-        straight, put = [], LocalRoute.put
-
-        def noted(route, *args, **kwargs):
-            went = put(route, *args, **kwargs)
-            straight.append((route._neighbour, went))
-            return went
-
-        LocalRoute.put = noted
-        graph = hfg.Graph()
-        graph.group("far", process=True)
-        far = graph.add(deadly(pids={str(tmp_path / "pids")!r}, how="SIGKILL"), group="far")
-        graph.connect(graph.add(numbers()).out, far.value)
-        graph.connect(far.out, graph.output("out", int))
-        assert hfg.run(graph).outputs == {{"out": list(range(200))}}
-        for life in 1, 2:
-            print(life, sum(went for neighbour, went in straight if neighbour.endswith(f"part far/{{life}}")) > 10)
-    """,
-    )
-    out, err = running.communicate(timeout=60)
-    assert running.returncode == 0, err
-    assert out == "1 True\n2 True\n"
 
 
 @pytest.mark.rule("L2")

@@ -70,6 +70,11 @@ class AgentLauncher:
         self._session: Session | None = None
         self._realm: Realm | None = None
 
+    @property
+    def near(self) -> Session | None:
+        """See `Launcher`."""
+        return self._here.near
+
     async def open(self) -> Session:
         """See `Launcher`."""
         self._session = session = await self._here.open()

@@ -21,6 +21,7 @@ import msgspec
 from hfg.errors import TransportError
 from hfg.parts.hosts.realm import Chunk, Deploy, Missing, Start, run_id
 from hfg.parts.processes.launching import Begun, PartProcess, beat_of
+from hfg.parts.processes.meeting import MeetingPlace
 from hfg.parts.processes.spares import Spares
 from hfg.parts.running.rings import sweep_run
 from hfg.transport import Session
@@ -66,6 +67,7 @@ class Computer:
         self._folder = folder
         self._path = [str(folder), *(one for one in sys.path if one)]
         self._spares = Spares(keeps_output=True)
+        self._places: dict[str, MeetingPlace] = {}  # of the parts of each run that are here
 
     async def part(self, order: Start) -> PartProcess:
         """See `Host`."""
@@ -74,14 +76,13 @@ class Computer:
             order.run,
             order.part,
             order.lives,
-            "zenoh",
             self._settings,
             order.argv,
             main="",
             targets={},
             path=self._path,
             parent=os.getpid(),
-            folder="",
+            folder=str(self._place(order.run).folder),
             beat=beat_of(order.run, order.part, life),
             level=order.level,
         )
@@ -89,6 +90,11 @@ class Computer:
         process.watch(self._session, begun.beat)
         self._journal.keep(order.run, order.part, process)
         return process
+
+    def _place(self, run: str) -> MeetingPlace:
+        if run not in self._places:
+            self._places[run] = MeetingPlace()
+        return self._places[run]
 
     async def main(self, order: Deploy) -> PartProcess:
         """See `Host`."""
@@ -111,10 +117,15 @@ class Computer:
     def forget(self, run: str) -> None:
         """See `Host`."""
         sweep_run(run)
+        place = self._places.pop(run, None)
+        if place is not None:
+            place.leave()
 
     async def close(self) -> None:
         """See `Host`."""
         await self._spares.close()
+        for run in tuple(self._places):
+            self.forget(run)
 
 
 def _is_folder(path: str) -> bool:

@@ -18,14 +18,14 @@ from typing import Any, Final
 
 import msgspec
 
-from hfg.errors import TransportError, UsageError, in_words
+from hfg.errors import HfgError, TransportError, UsageError, in_words
 from hfg.graph import Graph
 from hfg.parts.model.messages import Open
 from hfg.parts.processes.meeting import MeetingPlace
 from hfg.parts.processes.spares import PROCESS, Spares, start
 from hfg.parts.processes.worker import Worker
 from hfg.parts.running.channels import name_of
-from hfg.parts.transports import transport
+from hfg.parts.transports import open_sessions, transport
 from hfg.transport import Buffer, Session
 
 __all__ = ["BEAT_S", "STARTS_S", "Begun", "LoopLauncher", "PartProcess", "ProcessLauncher", "beat_of", "build_graph"]
@@ -46,14 +46,13 @@ class Begun(msgspec.Struct, frozen=True):
       run: by which name all parts know the run.
       part: the name of the part that it is to serve.
       lives: which life this is of it, and which of the main part.
-      transport: the name of the transport, and how to open a session.
-      settings: of the session.
+      settings: of the network; None if all parts are on this host.
       argv: what the program was called with; its main file may read that when it is imported.
       main: the file of the program, for node types that are in it; "" if there is none.
       targets: other files that hfg itself has imported, by the name of the module.
       path: where modules are found.
       parent: the process that has begun it; when that is gone, the folder is of no use to anybody.
-      folder: in which the parts meet.
+      folder: in which the parts on this host meet.
       beat: the key on which the process says that its event loop goes round.
       level: of log records that are of use to the main program.
     """
@@ -61,8 +60,7 @@ class Begun(msgspec.Struct, frozen=True):
     run: str
     part: str
     lives: tuple[int, int]
-    transport: str
-    settings: dict[str, Any]
+    settings: dict[str, Any] | None
     argv: list[str]
     main: str
     targets: dict[str, str]
@@ -99,6 +97,7 @@ class LoopLauncher:
 
     shares_memory = False
     is_in_realm = False
+    near = None
 
     def __init__(self, **settings: Any) -> None:
         """Begin nothing yet.
@@ -176,34 +175,30 @@ class ProcessLauncher:
     """Begins parts as processes of this host.
 
     Args:
-      settings: of the sessions by which they meet; None: where nobody but they can meet.
+      settings: of the network, if there are parts on other hosts; None if there are not.
+
+    Attributes:
+      near: the session that reaches the parts on this host.
     """
 
     shares_memory = True
     is_in_realm = False
 
     def __init__(self, settings: dict[str, Any] | None = None) -> None:
-        self._transport = transport("zenoh")
-        self._said = settings
+        self.near: Session | None = None
+        self._settings = settings
         self._place: MeetingPlace | None = None
         self._session: Session | None = None
-        self._opening: asyncio.Future[Session] | None = None
+        self._opening: asyncio.Future[tuple[Session, Session]] | None = None
         self._spares = Spares()
 
     async def open(self) -> Session:
         """See `Launcher`."""
-        if self._said is None:
-            self._place = MeetingPlace()
-        self._opening = asyncio.ensure_future(self._transport.open(**self._settings))
-        self._session = await asyncio.shield(self._opening)
-        return self._session
-
-    @property
-    def _settings(self) -> dict[str, Any]:
-        if self._said is not None:
-            return self._said
-        assert self._place is not None
-        return self._place.settings
+        self._place = MeetingPlace()
+        self._opening = asyncio.ensure_future(open_sessions(self._settings, str(self._place.folder)))
+        session, self.near = await asyncio.shield(self._opening)
+        self._session = session
+        return session
 
     async def prepare(self, hosts: Mapping[str, str], modules: Mapping[str, str]) -> None:
         """See `Launcher`: what is here can be imported here."""
@@ -211,18 +206,18 @@ class ProcessLauncher:
     async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> PartProcess:
         """See `Launcher`."""
         assert self._session is not None
+        assert self._place is not None
         begun = Begun(
             run,
             part,
             lives,
-            "zenoh",
             self._settings,
             sys.argv,
             _main_program(),
             _targets(),
             sys.path,
             parent=os.getpid(),
-            folder="" if self._place is None else str(self._place.folder),
+            folder=str(self._place.folder),
             beat=beat_of(run, part, lives[0]),
             level=logging.getLogger("hfg").getEffectiveLevel(),
         )
@@ -234,8 +229,9 @@ class ProcessLauncher:
         """See `Launcher`."""
         await self._spares.close()
         if self._opening is not None:  # who was interrupted amid it would leave what it makes in the folder
-            with contextlib.suppress(TransportError):
-                await (await self._opening).close()
+            with contextlib.suppress(HfgError):
+                for session in set(await self._opening):
+                    await session.close()
         if self._place is not None:
             self._place.leave()
 

@@ -1,4 +1,4 @@
-"""A folder in which the parts of one run meet: nobody but this user reaches the socket in it.
+"""A folder in which the parts of one run on one host meet: only this user can enter it (rule L5).
 
 However a run ends, its folder goes: by `leave`, or `leave_all` where the process ends without a teardown; by the end of
 the interpreter where nobody comes to either; by a part that sees that the main one was killed, and if that had no
@@ -29,7 +29,7 @@ __all__ = ["MeetingPlace", "remove"]
 _MACHINE: Final = hashlib.blake2b(machine().encode(), digest_size=4).hexdigest()
 _PREFIX: Final = f"hfg-meet-{_MACHINE}-"  # a lock may be of one machine, and the directory of several
 _NAME: Final = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")
-_HOLDS: Final = ("meet", "meet.lock")  # Zenoh's socket, and what it keeps beside
+_HOLDS: Final = re.compile(r"secret(-[0-9a-f]+)?|[sn]-[0-9a-f]+")  # what sessions make in it
 _YOUNG_S: Final = 60.0  # a folder so young may belong to who has not come to lock it yet
 
 
@@ -49,15 +49,10 @@ class MeetingPlace:
           OSError: there is no room for it.
         """
         _sweep(Path(tempfile.gettempdir()))
-        self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX))
+        self.folder = Path(tempfile.mkdtemp(prefix=_PREFIX))  # which nobody else can enter
         self._left = weakref.finalize(self, _leave, self.folder, os.getpid())
         self._lock = _lock(self.folder)
         self._of_this_process.add(self)
-
-    @property
-    def settings(self) -> dict[str, object]:
-        """Of the sessions that meet here."""
-        return {"realm": self.folder.name, "meet": [f"unixsock-stream/{self.folder}/meet"]}
 
     def leave(self) -> None:
         """Remove it."""
@@ -81,10 +76,10 @@ def _leave(folder: Path, process: int) -> None:
 
 def remove(folder: Path) -> None:
     """Remove what is ours in it, and it, if nothing else is."""
-    for name in _HOLDS:
-        with contextlib.suppress(OSError):
-            (folder / name).unlink()
     with contextlib.suppress(OSError):
+        for file in folder.iterdir():
+            if _HOLDS.fullmatch(file.name) is not None:
+                file.unlink(missing_ok=True)
         folder.rmdir()
 
 

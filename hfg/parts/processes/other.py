@@ -43,10 +43,15 @@ class Launcher(Protocol):
     Attributes:
       shares_memory: whether large arrays between parts of one host may go through shared memory.
       is_in_realm: whether others can hear of the run on that session, and steer it.
+      near: once it is open, the session that reaches parts on this host; None if that of the main part does.
     """
 
     shares_memory: bool
     is_in_realm: bool
+
+    @property
+    def near(self) -> Session | None:
+        """See above."""
 
     async def open(self) -> Session:
         """Give the session of the main part."""

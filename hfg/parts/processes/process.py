@@ -33,7 +33,7 @@ from hfg.parts.processes import meeting
 from hfg.parts.processes.launching import BEAT_S, Begun, build_graph
 from hfg.parts.processes.spares import SPARE
 from hfg.parts.processes.worker import Worker
-from hfg.parts.transports import transport
+from hfg.parts.transports import open_sessions
 from hfg.transport import Session, Traffic
 
 __all__ = ["main"]
@@ -139,7 +139,7 @@ async def _serve(begun: Begun, problem: RunError | None) -> None:
     assert task is not None
     stop = partial(asyncio.get_running_loop().call_soon_threadsafe, task.cancel)
     threading.Thread(target=_watch, args=(stop, begun), daemon=True, name="hfg watch of the main part").start()
-    session = await transport(begun.transport).open(**begun.settings)
+    session, near = await open_sessions(begun.settings, begun.folder)
     try:
         beside = Path(begun.main).parent if begun.main else None
 
@@ -148,7 +148,7 @@ async def _serve(begun: Begun, problem: RunError | None) -> None:
                 raise problem
             return build_graph(message, beside=beside)
 
-        worker = Worker(session, begun.run, begun.part, begun.lives, build)
+        worker = Worker(session, begun.run, begun.part, begun.lives, build, near=near)
         handler = _ToMain(asyncio.get_running_loop(), worker.log, begun.level)
         logging.getLogger().addHandler(handler)
         logging.getLogger().setLevel(begun.level)
@@ -159,7 +159,8 @@ async def _serve(begun: Begun, problem: RunError | None) -> None:
             beating.cancel()
             logging.getLogger().removeHandler(handler)
     finally:
-        await session.close()
+        for one in {session, near}:
+            await one.close()
 
 
 def _watch(stop: Callable[[], object], begun: Begun) -> None:

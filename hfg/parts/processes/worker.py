@@ -77,12 +77,21 @@ class Worker:
       name: of the part.
       lives: which life this is of it, and which of the main part.
       build: makes the graph of what comes.
+      near: the session that reaches parts on the same host; None if `session` does.
     """
 
     def __init__(
-        self, session: Session, run: str, name: str, lives: tuple[int, int], build: Callable[[Open], Graph]
+        self,
+        session: Session,
+        run: str,
+        name: str,
+        lives: tuple[int, int],
+        build: Callable[[Open], Graph],
+        *,
+        near: Session | None = None,
     ) -> None:
         self._session = session
+        self._near = near or session
         self._run = run
         self._name = name
         self._life = lives[0]
@@ -204,6 +213,7 @@ class Worker:
         self._carrier = Carrier(
             part,
             self._session,
+            self._near,
             self._run,
             lives,
             edges,

@@ -2,7 +2,6 @@
 
 part      an engine, and the tokens that leave it and come in
 channels  messages to and from others
-ways      over the session of a transport, or straight
 ends      links, at the near ends of its edges to and from others
 carrier   all of these, as one
 rings     large arrays among these, in shared memory

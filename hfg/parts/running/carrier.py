@@ -1,6 +1,6 @@
 """Connects a part of a run with the links of all its edges to and from others.
 
-Stands on `ends` and `ways`.
+Stands on `ends`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Se
 from hfg.parts.running.channels import name_of
 from hfg.parts.running.ends import IncomingEnd, OutgoingEnd, World
 from hfg.parts.running.part import Part
-from hfg.parts.running.ways import Ways
 from hfg.transport import Session
 
 __all__ = ["Carrier"]
@@ -28,6 +27,7 @@ class Carrier:
         self,
         part: Part,
         session: Session,
+        near: Session,
         run: str,
         lives: dict[str, int],
         edges: list[CutEdge],
@@ -41,29 +41,27 @@ class Carrier:
 
         Args:
           part: nothing of which has begun yet.
-          session: of the transport.
+          session: reaches all parts.
+          near: reaches those on the same host.
           run: by which name all parts of the run know it.
           lives: which life of each part this is for.
           edges: those between it and others.
           say: brings a message to another part.
           remembering: the parts that know in each life what they have sent in others.
-          shares_memory: parts of one host may reach each other by its means: large arrays go through shared memory, all
-            else over local sockets.
+          shares_memory: large arrays between parts of one host may go through shared memory.
           admits: parts of younger lives are there, and hear what they are told.
         """
         self._part = part
         self._links: dict[str, OutgoingEnd | IncomingEnd] = {}
         outgoing: dict[str, OutgoingEnd] = {}
         incoming: dict[str, IncomingEnd] = {}
-        near = [edge for edge in edges if shares_memory and edge.within_host]
-        self._ways = Ways(session, run, part.name, lives, {edge.far_from(part.name) for edge in near})
-        world = World(part, self._ways, run, lives, say)
+        world = World(part, session, near, run, lives, say)
         for edge in edges:
             if edge.source == part.name:
                 self._links[edge.label] = outgoing[edge.label] = OutgoingEnd(world, edge)
             else:
                 self._links[edge.label] = incoming[edge.label] = IncomingEnd(world, edge, edge.source in remembering)
-        for edge in near:
+        for edge in (edge for edge in edges if shares_memory and edge.within_host):
             must_hold_arrays = part.keeper is not None and edge.source == part.name  # for they are kept with it
             if edge.guarantee == "exact" and not must_hold_arrays:
                 self._links[edge.label].share(world)
@@ -80,7 +78,6 @@ class Carrier:
         _LOGGER.info(
             "%s: %s is there again, as life %d: its edges go on", name_of(self._part.name), name_of(other), life
         )
-        self._ways.admit(other, life)
         for link in self._links.values():
             if link.other == other:
                 link.admit(life)
@@ -120,4 +117,3 @@ class Carrier:
         """End all links."""
         for link in self._links.values():
             await link.close()
-        await self._ways.close()

@@ -1,7 +1,7 @@
 """The near ends of edges between the parts of a run: links, and what is kept, lent and counted beside them.
 
 A link goes on when the other end has died and begins anew: the older of two lives tells the younger where (`Joins`).
-Stands on `hfg.links`, `part`, `ways` and `messages`.
+Stands on `hfg.links`, `part` and `messages`.
 """
 
 from __future__ import annotations
@@ -25,10 +25,9 @@ from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, Sees, Shares
 from hfg.parts.running.channels import name_of
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import Borrowing, Lending, segment_of
-from hfg.parts.running.ways import Ways
 from hfg.ports.outputs import OutputPort
 from hfg.token import Token
-from hfg.transport import Delivery, EncodedToken, Position
+from hfg.transport import Delivery, EncodedToken, Position, Session
 
 __all__ = ["IncomingEnd", "OutgoingEnd", "World"]
 
@@ -53,10 +52,15 @@ class World(NamedTuple):
     """What all near ends of a part know alike; see `Carrier`."""
 
     part: Part
-    ways: Ways
+    session: Session
+    near: Session
     run: str
     lives: dict[str, int]
     say: Callable[[str, Message], None]
+
+    def way_of(self, edge: CutEdge) -> Session:
+        """Return the session that carries an edge."""
+        return self.near if edge.within_host else self.session
 
 
 class _NearEnd:
@@ -102,7 +106,7 @@ class OutgoingEnd(_NearEnd):
         self._held: deque[EncodedToken] = deque()  # what is not kept yet, and may not leave before it is
         self._sender: LinkSender | BoundedSender
         outbox = None if part.keeper is None else part.keeper.outbox(edge.label)
-        way = world.ways.to(edge.target)
+        way = world.way_of(edge)
         self._kept_from = 1 if outbox is None else outbox.first
         if edge.guarantee == "exact":
             self._sender = sender = LinkSender(
@@ -304,7 +308,7 @@ class IncomingEnd(_NearEnd):
         self._lent_by = lives[edge.source]
         self._before = 0  # tokens of former lives of the producer; of a lossy edge, where numbers tell what is lost
         self._receiver: LinkReceiver | BoundedReceiver
-        way = world.ways.to(edge.source)
+        way = world.way_of(edge)
         if edge.guarantee == "exact":
             self._receiver = LinkReceiver(
                 way,

@@ -93,7 +93,12 @@ async def open_one() -> AsyncIterator[Open]:
 @pytest.fixture
 def here() -> dict[str, Any]:
     """Settings of programs that meet at ports of their own."""
-    return {"listen": (f"tcp/127.0.0.1:{free_port()}",), "meet": (f"tcp/127.0.0.1:{free_port()}",), "lease_s": 1.0}
+    return {
+        "listen": (f"tcp/127.0.0.1:{free_port()}",),
+        "meet": (f"tcp/127.0.0.1:{free_port()}",),
+        "lease_s": 1.0,
+        "insecure": True,
+    }
 
 
 @pytest_asyncio.fixture
@@ -136,4 +141,4 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Certificates:
 
 def settings(**fields: Any) -> Settings:
     """Settings with a short lease."""
-    return Settings(**({"lease_s": 1.0} | fields))
+    return Settings(**({"lease_s": 1.0, "insecure": True} | fields))

@@ -79,7 +79,9 @@ async def chaos(ledger: Path, counts: Mapping[str, int], tokens: int, seed: int)
     port = free_port()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["tests.transports.zenoh.workers"])
-    agent = await ZenohTransport().open(mode="router", listen=(f"tcp/127.0.0.1:{port}",), lease_s=workers.LEASE_S)
+    agent = await ZenohTransport().open(
+        mode="router", listen=(f"tcp/127.0.0.1:{port}",), insecure=True, lease_s=workers.LEASE_S
+    )
     recoveries: dict[str, list[float]] = {name: [] for name in counts}
     async with Proxy(port) as to_relay, Proxy(port) as to_sink:
         relay, sink = Part(context, to_relay, workers.relay), Part(context, to_sink, workers.sink, str(ledger))

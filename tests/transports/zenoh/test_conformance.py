@@ -71,6 +71,7 @@ class TestPeers(ZenohTests):
             "listen": (f"tcp/127.0.0.1:{free_port()}",),
             "meet": (f"tcp/127.0.0.1:{free_port()}",),
             "largest_message": 5_000_000,
+            "insecure": True,
         }
         async with AsyncExitStack() as stack:
             opened = []
@@ -91,13 +92,19 @@ class TestClientsOfAnAgent(ZenohTests):
         self.proxies: dict[str, Proxy] = {}
         port = free_port()
         async with AsyncExitStack() as stack:
-            agent = await ZenohTransport().open(mode="router", listen=(f"tcp/127.0.0.1:{port}",), lease_s=1.0)
+            agent = await ZenohTransport().open(
+                mode="router", listen=(f"tcp/127.0.0.1:{port}",), insecure=True, lease_s=1.0
+            )
             stack.push_async_callback(agent.close)
             opened = []
             for _ in range(count):
                 proxy = await stack.enter_async_context(Proxy(port))
                 session = await ZenohTransport().open(
-                    mode="client", connect=(f"tcp/127.0.0.1:{proxy.port}",), largest_message=5_000_000, lease_s=1.0
+                    mode="client",
+                    connect=(f"tcp/127.0.0.1:{proxy.port}",),
+                    insecure=True,
+                    largest_message=5_000_000,
+                    lease_s=1.0,
                 )
                 stack.push_async_callback(session.close)
                 self.proxies[session.name] = proxy

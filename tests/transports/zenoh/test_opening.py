@@ -79,7 +79,10 @@ def test_a_socket_file_that_is_not_there(tmp_path: Path) -> None:
 
 
 def test_wrong_settings_are_told_before_anything_is_opened() -> None:
-    assert '"listen": "tcp/0.0.0.0:7447" can be reached from other hosts' in refusal(listen=("tcp/0.0.0.0:7447",))
+    said = refusal(listen=("tcp/127.0.0.1:7447",), insecure=False)
+    assert '"listen": "tcp/127.0.0.1:7447" is open: whoever connects there' in said
+    said = refusal(connect=("tcp/127.0.0.1:7447",), insecure=False)
+    assert '"connect": "tcp/127.0.0.1:7447" is open: whoever listens there' in said
 
 
 def test_a_mode_that_does_not_exist() -> None:

@@ -200,7 +200,7 @@ import asyncio, sys
 from hfg.transport import Traffic
 from hfg_transports.zenoh import ZenohTransport
 async def main():
-    session = await ZenohTransport().open(mode="router", listen=(sys.argv[1],))
+    session = await ZenohTransport().open(mode="router", listen=(sys.argv[1],), insecure=True)
     session.subscribe("a", lambda burst: None)
     session.publisher("a", Traffic.BULK).put(b"", bytes(1_000_000))
     raise SystemExit(3)
@@ -218,7 +218,7 @@ STANDING = """
 import asyncio, sys
 from hfg_transports.zenoh import ZenohTransport
 async def main():
-    session = await ZenohTransport().open(mode="router", listen=(sys.argv[1],), lease_s=0.5)
+    session = await ZenohTransport().open(mode="router", listen=(sys.argv[1],), insecure=True, lease_s=0.5)
     session.subscribe("bulk", lambda burst: None)
     session.announce("standing/here")
     print("ready", flush=True)
@@ -233,7 +233,7 @@ async def test_a_peer_that_stands_still_holds_neither_the_loop_nor_the_end(open_
     presences: asyncio.Queue[Presence] = asyncio.Queue()
     async with Program([sys.executable, "-c", STANDING, address]) as standing:
         assert await soon(standing.line()) == "ready"
-        session = await open_one(mode="client", connect=(address,), lease_s=0.5)
+        session = await open_one(mode="client", connect=(address,), lease_s=0.5, insecure=True)
         session.watch("standing", into(presences))
         assert (await soon(presences.get())).present
         publisher = session.publisher("bulk", Traffic.BULK)
@@ -254,7 +254,7 @@ async def test_a_program_that_is_killed_has_gone_and_one_that_stands_still_is_go
 ) -> None:
     address = f"tcp/127.0.0.1:{free_port()}"
     presences: asyncio.Queue[Presence] = asyncio.Queue()
-    watcher = await open_one(connect=(), listen=(address,), meet=here["meet"], lease_s=0.5)
+    watcher = await open_one(connect=(), listen=(address,), meet=here["meet"], lease_s=0.5, insecure=True)
     watcher.watch("", into(presences))
     async with Program([sys.executable, "-c", STANDING, address]) as program:
         assert await soon(program.line()) == "ready"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from hfg.errors import FileError
-from hfg_transports.zenoh import Settings, read_settings
+from hfg_transports.zenoh import Mode, Settings, read_settings
 from hfg_transports.zenoh.config import configuration
-from hfg_transports.zenoh.settings import is_loopback, problems_of
+from hfg_transports.zenoh.settings import problems_of
 
 WHOLE = """\
 realm = "cell-4"
@@ -53,19 +54,36 @@ def test_an_empty_file_is_this_computer_alone(tmp_path: Path) -> None:
     assert read_settings(tmp_path / "hfg.toml") == Settings()
 
 
+@pytest.mark.rule("L5")
 @pytest.mark.parametrize("mode", ["router", "peer", "client"])
-def test_without_settings_nothing_leaves_this_computer(mode: str) -> None:
-    told = configuration(Settings(), mode, wait_s=1)  # type: ignore[arg-type]
+def test_without_settings_nothing_listens_and_nothing_connects(mode: Mode) -> None:
+    told = configuration(Settings(), mode, wait_s=1)
     assert told["scouting/multicast/enabled"] is False
-    addresses = told["listen/endpoints"] + told["connect/endpoints"]
-    assert addresses
-    assert all(is_loopback(address) for address in addresses)
+    assert told["listen/endpoints"] == told["connect/endpoints"] == []
+
+
+@pytest.mark.rule("L5")
+@pytest.mark.parametrize("mode", ["router", "peer", "client"])
+def test_nothing_listens_at_an_address_that_no_setting_names(mode: Mode) -> None:
+    one = ("tcp/127.0.0.1:1",)
+    for named in (Settings(listen=one), Settings(connect=one), Settings(agents=("tcp/10.0.0.1:1",))):
+        settings = structs.replace(named, insecure=True)
+        listening = configuration(settings, mode, wait_s=1)["listen/endpoints"]
+        assert listening == (list(settings.listen) if mode == "router" else [])
+
+
+def test_peers_that_meet_listen_beside_the_address_at_which_they_meet() -> None:
+    both = ("tcp/127.0.0.1:1", "unixsock-stream//run/cell/meet")
+    first, second, *rest = configuration(Settings(meet=both, insecure=True), "peer", wait_s=1)["listen/endpoints"]
+    assert first == "tcp/127.0.0.1:0"
+    assert second.startswith("unixsock-stream//run/cell/meet-")
+    assert rest == list(both)
 
 
 def test_all_findings_come_at_once_with_their_lines(tmp_path: Path) -> None:
     text = """\
 reallm = "x"
-listen = ["tcp/0.0.0.0:7447", "udp/127.0.0.1:1", "127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:99999"]
+listen = ["tcp/0.0.0.0:7447", "udp/127.0.0.1:1", "127.0.0.1:7447", "tcp/127.0.0.1", "tls/127.0.0.1:99999"]
 agents = "tls/base.local:7447"
 
 lease_s = 600
@@ -75,13 +93,13 @@ certificate = 3
 """
     assert findings(tmp_path, text) == [
         'hfg.toml:1: "reallm": there is no such key; did you mean "realm"?',
-        'hfg.toml:2: "listen": "tcp/0.0.0.0:7447" can be reached from other hosts, and anybody there could steer '
-        'this one; write "tls/0.0.0.0:7447" with a table [tls], or insecure = true if all who can reach it are '
-        "to be trusted",
+        'hfg.toml:2: "listen": "tcp/0.0.0.0:7447" is open: whoever connects there, other users of the same computer '
+        'too, can run code as this user; write "tls/0.0.0.0:7447" with key = ... or [tls], or insecure = true if all '
+        "of them are to be trusted",
         'hfg.toml:2: "listen": "udp/127.0.0.1:1": "udp" is not spoken here; take tcp, tls, unixsock-stream',
-        'hfg.toml:2: "listen": "127.0.0.1:7447" is no address; write "protocol/host:port", as in tcp/127.0.0.1:7447',
+        'hfg.toml:2: "listen": "127.0.0.1:7447" is no address; write "protocol/host:port", as in tls/arm.local:7447',
         'hfg.toml:2: "listen": "tcp/127.0.0.1" has no host and port; write "tcp/127.0.0.1:7447"',
-        'hfg.toml:2: "listen": "tcp/127.0.0.1:99999": there is no port 99999; take one below 65536',
+        'hfg.toml:2: "listen": "tls/127.0.0.1:99999": there is no port 99999; take one below 65536',
         'hfg.toml:3: "agents": expected `array`, got `str`; write agents = ["tls/base.local:7447"]',
         'hfg.toml:5: "lease_s": 600.0 s is no time to wait; take 0.2 to 60',
         'hfg.toml:7: "tls": "authority" is missing; add authority = ...',
@@ -102,24 +120,31 @@ TLS = '[tls]\nauthority = "a"\ncertificate = "b"\nkey = "c"\n'
         ("shared_memory = -1", 'hfg.toml:1: "shared_memory": -1 bytes cannot be had; take 0 for none'),
         (
             'listen = ["tls/localhost:7447"]',
-            'hfg.toml:1: "listen": "tls/localhost:7447" needs certificates; add a table [tls]; hfg keys new makes some',
+            'hfg.toml:1: "listen": "tls/localhost:7447" needs certificates or a key; add a table [tls] or key = ...; '
+            "hfg keys new makes some",
         ),
         (
             '[access]\nwrite = ["arm"]',
             'hfg.toml:1: "access": names are those of certificates, and nobody has to show one; add a table [tls]',
         ),
         (
-            f'{TLS}mutual = false\n[access]\nwrite = ["arm"]',
-            'hfg.toml:6: "access": names are those of certificates, and nobody has to show one; '
+            f'insecure = true\n{TLS}mutual = false\n[access]\nwrite = ["arm"]',
+            'hfg.toml:7: "access": names are those of certificates, and nobody has to show one; '
             "leave out mutual = false in [tls]",
         ),
+        (
+            f"{TLS}mutual = false",
+            'hfg.toml:5: "tls.mutual": whoever connects proves nothing, and can run code as this user; leave it out, '
+            "or write insecure = true",
+        ),
+        (f'key = "cell.key"\n{TLS}', 'hfg.toml:1: "key": there is a table [tls] too; take one of the two'),
         (
             f'listen = ["tls/localhost:1"]\n{TLS}[access]\nwrite = ["arm", ""]\nread = ["arm"]',
             'hfg.toml:7: "access.write": a name is empty; leave it out',
         ),
         (
-            f'{TLS}[access]\nwrite = ["arm"]',
-            'hfg.toml: "listen": "tcp/127.0.0.1:7447" asks for no certificate, so [access] would refuse all who come '
+            f'listen = ["tcp/127.0.0.1:7447"]\ninsecure = true\n{TLS}[access]\nwrite = ["arm"]',
+            'hfg.toml:1: "listen": "tcp/127.0.0.1:7447" asks for no certificate, so [access] would refuse all who come '
             'there; write "tls/127.0.0.1:7447"',
         ),
         (
@@ -147,12 +172,10 @@ def test_whoever_says_so_listens_to_everybody() -> None:
     assert not problems_of(Settings(listen=("tcp/0.0.0.0:7447",), insecure=True))
 
 
-@pytest.mark.parametrize(
-    ("address", "mode"), [("tcp/127.0.0.1:7447", "peer"), ("tcp/[::1]:7447", "peer"), ("tcp/10.0.0.1:7447", "client")]
-)
-def test_who_meets_at_an_agent_of_another_host_speaks_through_that(address: str, mode: str) -> None:
-    """Those behind it listen for programs of their own host alone, so no connection can be made to them."""
-    assert configuration(Settings(connect=(address,)), "peer", wait_s=1)["mode"] == mode
+@pytest.mark.parametrize("address", ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tcp/10.0.0.1:7447"])
+def test_who_meets_at_an_agent_speaks_through_that(address: str) -> None:
+    """Those behind it listen nowhere, so no connection can be made to them."""
+    assert configuration(Settings(connect=(address,), insecure=True), "peer", wait_s=1)["mode"] == "client"
 
 
 def test_who_listens_everywhere_is_reached_from_within_at_loopback() -> None:

@@ -45,7 +45,9 @@ async def _opened(port: int, seed: int) -> ZenohSession:
     address = (f"tcp/127.0.0.1:{port}",)
     while True:
         try:
-            session = await ZenohTransport().open(mode="client", connect=address, lease_s=LEASE_S, wait_s=5.0)
+            session = await ZenohTransport().open(
+                mode="client", connect=address, insecure=True, lease_s=LEASE_S, wait_s=5.0
+            )
         except (
             Exception
         ):  # the connection is cut or swallowed just now; whatever it is, the test waits no longer than it says

@@ -3,6 +3,7 @@
     settings    the settings file: realm, addresses, certificates, who may do what; every finding with its line
     config      what Zenoh is told for them
     opening     opens Zenoh's session, and says in a sentence why it cannot
+    keys        a secret that all programs have, as certificates
     diagnosing  finds out what Zenoh does not tell: why an address cannot be reached
     binding     the one module that imports Zenoh: its version, and what is marked unstable in it
     names       keys and names of hfg as Zenoh's key expressions

@@ -5,8 +5,10 @@ Plain data, so it can be looked at without Zenoh. Why each is as it is stands be
 
 from __future__ import annotations
 
+import secrets
 from typing import Any, Final
 
+from hfg_transports.zenoh.keys import tls_of_key
 from hfg_transports.zenoh.names import Keys
 from hfg_transports.zenoh.settings import Access, Mode, Settings, Tls, is_loopback
 
@@ -31,9 +33,7 @@ def configuration(settings: Settings, mode: Mode, *, wait_s: float) -> dict[str,
       mode: how the session takes part.
       wait_s: how long a client waits for an agent.
     """
-    if mode == "peer" and (settings.tls is not None or _is_elsewhere(settings.connect)):
-        # connections among peers would pass by the agent, and so by its access control; and where that is on another
-        # host, none can be made to those behind it, which listen for programs of their own host alone
+    if mode == "peer" and not _is_among_peers(settings):
         mode = "client"
     told: dict[str, Any] = {
         "mode": mode,
@@ -65,6 +65,8 @@ def configuration(settings: Settings, mode: Mode, *, wait_s: float) -> dict[str,
         told |= {"listen/timeout_ms": 0, "listen/exit_on_failure": False}
     if settings.tls is not None:
         told["transport/link/tls"] = _tls(settings.tls)
+    if settings.key:
+        told["transport/link/tls"] = tls_of_key(settings.key)
     if settings.access is not None and mode == "router":
         told["access_control"] = _access_control(settings.access, Keys(settings.realm))
     return told
@@ -86,9 +88,26 @@ def listens(settings: Settings, mode: Mode) -> list[str]:
     """Give the addresses at which a session listens."""
     if mode == "router":
         return list(settings.listen)
-    if mode == "peer" and settings.tls is None:
-        return ["tcp/127.0.0.1:0", *([] if settings.connect else settings.meet)]
+    if mode == "peer" and _is_among_peers(settings):
+        return [*map(_beside, settings.meet), *([] if settings.connect else settings.meet)]
     return []
+
+
+def _is_among_peers(settings: Settings) -> bool:
+    """Whether there is an address at which peers listen. All others speak through agents, which see to who may do what.
+
+    With certificates connections among peers would pass by the agent, and so by its access control; and where that is
+    on another host, none can be made to those behind it.
+    """
+    return bool(settings.meet) and settings.tls is None and not _is_elsewhere(settings.connect)
+
+
+def _beside(address: str) -> str:
+    """Return where a peer listens besides the one address that only the first of them has."""
+    protocol, _, place = address.partition("/")
+    if protocol == "unixsock-stream":
+        return f"{address}-{secrets.token_hex(4)}"
+    return f"{protocol}/{place.rpartition(':')[0]}:0"
 
 
 def targets(settings: Settings, mode: Mode) -> list[str]:
@@ -97,7 +116,7 @@ def targets(settings: Settings, mode: Mode) -> list[str]:
         return list(settings.agents)
     if settings.connect:
         return list(settings.connect)
-    meet = settings.meet if mode == "peer" and settings.tls is None else ()
+    meet = settings.meet if mode == "peer" and _is_among_peers(settings) else ()
     return [*(_reachable(address) for address in settings.listen), *meet]
 
 

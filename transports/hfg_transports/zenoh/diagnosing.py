@@ -57,7 +57,7 @@ def files_that_do_not_fit(tls: Tls) -> Reason | None:
     return None
 
 
-def why_unreachable(address: str, tls: Tls | None) -> Reason:
+def why_unreachable(address: str, tls: Tls | None, *, has_key: bool = False) -> Reason:
     """Say why a session could not connect to an address."""
     protocol, _, rest = address.partition("/")
     place = rest.partition("?")[0].partition("#")[0]
@@ -69,6 +69,8 @@ def why_unreachable(address: str, tls: Tls | None) -> Reason:
         with socket.create_connection((host, int(port)), timeout=_PATIENCE_S) as connection:
             if protocol == "tls" and tls is not None:
                 return _handshake(connection, host, tls)
+            if protocol == "tls" and has_key:
+                return Reason("somebody listens there who has not our key", "take the same file for key = ... there")
             return Reason("somebody listens there, but does not speak Zenoh without TLS", "is it TLS (tls/...)?")
     except socket.gaierror:
         return Reason(f'there is no host "{host}"', "correct the name")

@@ -6,15 +6,20 @@ Blocks until a client has found its agent, so it is called in a thread. Stands o
 from __future__ import annotations
 
 import json
+import os
 import re
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from hfg.errors import TransportError
+from hfg.logs import log
+from hfg.private import check_parents
 from hfg_transports.zenoh import binding
 from hfg_transports.zenoh.config import configuration, listens, targets
 from hfg_transports.zenoh.diagnosing import files_that_do_not_fit, why_unreachable
-from hfg_transports.zenoh.settings import Mode, Settings, problems_of
+from hfg_transports.zenoh.keys import key_of
+from hfg_transports.zenoh.settings import Mode, Settings, open_addresses, problems_of
 
 if TYPE_CHECKING:
     import zenoh
@@ -31,9 +36,10 @@ def open_session(settings: Settings | None = None, mode: Mode = "peer", *, wait_
     """Open a session.
 
     Args:
-      settings: the network; by default this computer alone.
-      mode: "router" is what an agent is; a "peer" has connections to all others, and needs no agent; a "client" speaks
-        with everybody through an agent, which sees to what it may do. With certificates peers are clients.
+      settings: the network.
+      mode: "router" is what an agent is; a "peer" has connections to all others if settings have `meet`, where peers
+        listen, and otherwise is a client; a "client" speaks with everybody through an agent, which sees to what it may
+        do.
       wait_s: how long a client, or a peer that is told where to connect, waits for somebody to be there.
 
     Raises:
@@ -48,6 +54,15 @@ def open_session(settings: Settings | None = None, mode: Mode = "peer", *, wait_
         raise TransportError("; ".join(str(problem) for problem in problems[:3]))
     if settings.tls is not None and (reason := files_that_do_not_fit(settings.tls)) is not None:
         raise TransportError(f"{reason.what}; {reason.remedy}")
+    if settings.key:
+        key_of(settings.key)
+    for address in (*settings.listen, *settings.meet):
+        _need_private(address, settings)
+    if exposed := open_addresses(settings):
+        log().warning(
+            "insecure: nobody proves who he is at %s, so whoever can connect there can run code as this user",
+            " and ".join(f'"{address}"' for address in exposed),
+        )
     config = library.Config()
     for key, value in configuration(settings, mode, wait_s=wait_s).items():
         config.insert_json5(key, json.dumps(value))
@@ -58,6 +73,24 @@ def open_session(settings: Settings | None = None, mode: Mode = "peer", *, wait_
     if mode == "peer" and settings.connect and settings.tls is None:
         _wait_for_somebody(session, settings, wait_s)
     return session
+
+
+def _need_private(address: str, settings: Settings) -> None:
+    """Refuse a socket in a folder that other users can enter."""
+    protocol, _, place = address.partition("/")
+    if protocol != "unixsock-stream" or settings.insecure:
+        return
+    folder = Path(place).parent
+    try:
+        found = folder.stat()
+        check_parents(folder)
+    except OSError as error:
+        raise TransportError(f'"{address}" cannot be used: {folder}: {error.strerror}') from None
+    if found.st_uid != os.geteuid() or found.st_mode & 0o077:
+        raise TransportError(
+            f'"{address}": other users can enter {folder}, and could steer this computer: write chmod 700 {folder}, or '
+            "insecure = true if all of them are to be trusted"
+        )
 
 
 def _wait_for_somebody(session: zenoh.Session, settings: Settings, wait_s: float) -> None:
@@ -93,6 +126,6 @@ def _unreachable(settings: Settings, mode: Mode) -> str:
     """Say why, for each address."""
     parts = []
     for address in targets(settings, mode):
-        reason = why_unreachable(address, settings.tls)
+        reason = why_unreachable(address, settings.tls, has_key=bool(settings.key))
         parts.append(f'cannot connect to "{address}": {reason.what}; {reason.remedy}')
     return " / ".join(parts)

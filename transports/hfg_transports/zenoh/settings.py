@@ -4,7 +4,7 @@ A TOML file of which every key may be left out. What is wrong is found all at on
 
     realm = "cell-4"                         # programs of other realms are not heard
     host = "arm"                             # what this computer is called; its own name if left out
-    listen = ["tls/arm.local:7447"]          # where the agent of this host is reached; tcp/127.0.0.1:7447 if left out
+    listen = ["tls/arm.local:7447"]          # where the agent of this host is reached
     agents = ["tls/base.local:7447"]         # the agents of other hosts
     connect = ["tls/arm.local:7447"]         # where workers and viewers go; where this host's agent listens if left out
 
@@ -17,7 +17,8 @@ A TOML file of which every key may be left out. What is wrong is found all at on
     write = ["arm", "base"]                  # names in certificates: may do everything
     read = ["viewer"]                        # may look: values, who is there, and questions "…/ro/<verb>"
 
-Without a file nothing leaves this computer. Stands on errors and problems; knows nothing of Zenoh.
+Instead of [tls], key = "cell.key" names a file with a secret that all programs have. Without an address nothing listens
+and nothing leaves this computer. Stands on errors and problems; knows nothing of Zenoh.
 """
 
 from __future__ import annotations
@@ -35,7 +36,17 @@ import msgspec
 from hfg.errors import FileError
 from hfg.problem import Problem
 
-__all__ = ["Access", "Mode", "Settings", "SettingsProblem", "Tls", "is_loopback", "problems_of", "read_settings"]
+__all__ = [
+    "Access",
+    "Mode",
+    "Settings",
+    "SettingsProblem",
+    "Tls",
+    "is_loopback",
+    "open_addresses",
+    "problems_of",
+    "read_settings",
+]
 
 Mode: TypeAlias = Literal["router", "peer", "client"]
 """How a session takes part: as the agent that others meet at; with connections to everybody; through an agent alone."""
@@ -85,10 +96,13 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
       listen: where its agent is reached.
       agents: where those of other hosts are.
       connect: where everybody else connects to; empty: to `listen`.
-      meet: where programs of this host meet while no agent runs; the first listens there. Empty: nowhere.
-      tls: certificates; None: what is sent can be read on its way.
+      meet: where programs meet without an agent; the first listens there, and the others at a free port of the same
+        address. Rarely needed: programs of one user on one computer meet without any address.
+      key: a file with a secret that all programs of the realm have, by which both ends prove who they are and which
+        encrypts what is sent; "" for none.
+      tls: certificates, instead of a key.
       access: who may do what; None: everybody everything.
-      insecure: whether a listen address may be reached from other hosts without TLS.
+      insecure: whether there may be addresses without TLS: anybody who can connect there can run code as this user.
       largest_message: bytes of header and payload that are sent and received at most.
       lease_s: after how many seconds of silence somebody counts as gone.
       shared_memory: bytes that long messages between programs of one host go through; 0: none. What a killed program
@@ -97,10 +111,11 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     realm: str = "default"
     host: str = msgspec.field(default_factory=socket.gethostname)
-    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
+    listen: tuple[str, ...] = ()
     agents: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
-    meet: tuple[str, ...] = ("tcp/127.0.0.1:7446",)
+    meet: tuple[str, ...] = ()
+    key: str = ""
     tls: Tls | None = None
     access: Access | None = None
     insecure: bool = False
@@ -154,8 +169,10 @@ def read_settings(file: Path | str) -> Settings:
     problems += problems_of(settings, broken={one.path.split(".")[0] for one in problems})
     if problems:
         raise _refused(file, problems, [_line_of(text, one.path) for one in problems])
+    folder = file.parent
+    if settings.key:
+        settings = msgspec.structs.replace(settings, key=str(folder / settings.key))
     if settings.tls is not None:
-        folder = file.parent
         tls = settings.tls
         files = {name: str(folder / getattr(tls, name)) for name in ("authority", "certificate", "key")}
         settings = msgspec.structs.replace(settings, tls=msgspec.structs.replace(tls, **files))
@@ -217,10 +234,11 @@ def _convert(
 _EXAMPLES: Final = {
     "realm": 'write realm = "cell-4"',
     "host": 'write host = "arm"',
-    "listen": 'write listen = ["tcp/127.0.0.1:7447"]',
+    "listen": 'write listen = ["tls/arm.local:7447"]',
     "agents": 'write agents = ["tls/base.local:7447"]',
     "connect": 'write connect = ["tls/arm.local:7447"]',
-    "meet": 'write meet = ["tcp/127.0.0.1:7446"]',
+    "meet": 'write meet = ["unixsock-stream//run/cell/meet"]',
+    "key": 'write key = "cell.key"',
     "tls": "begin a table with [tls]",
     "access": "begin a table with [access]",
     "access.write": 'write write = ["arm"]',
@@ -266,6 +284,11 @@ def problems_of(settings: Settings, broken: set[str] | frozenset[str] = frozense
         problems.append(_problem("lease_s", f"{settings.lease_s} s is no time to wait", "take 0.2 to 60"))
     if not 0 <= settings.shared_memory <= 2**40:
         problems.append(_problem("shared_memory", f"{settings.shared_memory} bytes cannot be had", "take 0 for none"))
+    if settings.key and settings.tls is not None:
+        problems.append(_problem("key", "there is a table [tls] too", "take one of the two"))
+    if settings.tls is not None and not settings.tls.mutual and not settings.insecure:
+        what = "whoever connects proves nothing, and can run code as this user"
+        problems.append(_problem("tls.mutual", what, "leave it out, or write insecure = true"))
     for name in ("listen", "agents", "connect", "meet"):
         for address in getattr(settings, name):
             problems += _wrong_address(name, address, settings, tls_broken="tls" in broken)
@@ -277,7 +300,7 @@ def problems_of(settings: Settings, broken: set[str] | frozenset[str] = frozense
 def _wrong_address(name: str, address: str, settings: Settings, *, tls_broken: bool) -> list[SettingsProblem]:
     found = _ADDRESS.fullmatch(address)
     if found is None:
-        return [_problem(name, f'"{address}" is no address', 'write "protocol/host:port", as in tcp/127.0.0.1:7447')]
+        return [_problem(name, f'"{address}" is no address', 'write "protocol/host:port", as in tls/arm.local:7447')]
     protocol, place = found["protocol"], found["place"]
     if protocol not in _PROTOCOLS:
         return [_problem(name, f'"{address}": "{protocol}" is not spoken here', f"take {', '.join(_PROTOCOLS)}")]
@@ -290,11 +313,13 @@ def _wrong_address(name: str, address: str, settings: Settings, *, tls_broken: b
     problems = []
     if int(split["port"]) > _LAST_PORT:
         problems.append(_problem(name, f'"{address}": there is no port {split["port"]}', "take one below 65536"))
-    if protocol == "tls" and settings.tls is None and not tls_broken:
-        problems.append(_problem(name, f'"{address}" needs certificates', "add a table [tls]; hfg keys new makes some"))
-    if protocol == "tcp" and name in ("listen", "meet") and not is_loopback(address) and not settings.insecure:
-        what = f'"{address}" can be reached from other hosts, and anybody there could steer this one'
-        remedy = f'write "tls/{place}" with a table [tls], or insecure = true if all who can reach it are to be trusted'
+    if protocol == "tls" and settings.tls is None and not settings.key and not tls_broken:
+        what = f'"{address}" needs certificates or a key'
+        problems.append(_problem(name, what, "add a table [tls] or key = ...; hfg keys new makes some"))
+    if protocol == "tcp" and not settings.insecure:
+        who = "whoever connects there" if name in ("listen", "meet") else "whoever listens there"
+        what = f'"{address}" is open: {who}, other users of the same computer too, can run code as this user'
+        remedy = f'write "tls/{place}" with key = ... or [tls], or insecure = true if all of them are to be trusted'
         problems.append(_problem(name, what, remedy))
     return problems
 
@@ -320,6 +345,12 @@ def _wrong_access(settings: Settings, access: Access) -> list[SettingsProblem]:
             what = f'"{address}" asks for no certificate, so [access] would refuse all who come there'
             problems.append(_problem("listen", what, f'write "tls/{address.partition("/")[2]}"'))
     return problems
+
+
+def open_addresses(settings: Settings) -> list[str]:
+    """Return the addresses at which nobody proves who he is."""
+    named = (*settings.listen, *settings.agents, *settings.connect, *settings.meet)
+    return [address for address in dict.fromkeys(named) if address.startswith("tcp/")]
 
 
 def is_loopback(address: str) -> bool:

@@ -57,7 +57,7 @@ class ZenohTransport:
         """Begin a session on the running loop.
 
         Args:
-          settings: the network, or the file that says it; by default this computer alone.
+          settings: the network, or the file that says it.
           mode: see `open_session`.
           wait_s: see `open_session`.
           **fields: of `Settings`, in place of those of `settings`.
@@ -66,16 +66,45 @@ class ZenohTransport:
           TransportError: it cannot be opened, see `open_session`; or there is a program of another version.
           FileError: something is wrong with the file.
         """
-        if settings is None or isinstance(settings, Settings):
-            chosen = settings or Settings()
-        else:
-            chosen = await asyncio.to_thread(read_settings, settings)
-        if fields:
-            try:
-                chosen = msgspec.convert({**msgspec.structs.asdict(chosen), **fields}, Settings, from_attributes=True)
-            except (msgspec.ValidationError, TypeError) as error:
-                raise TransportError(f"{error}; see hfg_transports.zenoh.Settings") from None
+        chosen = await _chosen(settings, fields)
+        if not _names_an_address(chosen):
+            raise TransportError(
+                "these settings name no address: write listen, connect or meet, or open a session of transport "
+                '"local", which needs none on one computer'
+            )
         return await _in_thread(lambda: _open(chosen, mode, wait_s), asyncio.get_running_loop())
+
+    async def only_here(
+        self, *, settings: Settings | Path | str | None = None, mode: Mode = "peer", **fields: Any
+    ) -> dict[str, Any] | None:
+        """Return what opens a session of transport "local" instead; None if these settings name an address.
+
+        Raises:
+          FileError: something is wrong with the file.
+        """
+        del mode
+        chosen = await _chosen(settings, fields)
+        if _names_an_address(chosen):
+            return None
+        return {"realm": chosen.realm, "host": chosen.host, "largest_message": chosen.largest_message}
+
+
+async def _chosen(settings: Settings | Path | str | None, fields: dict[str, Any]) -> Settings:
+    """Return settings, read from their file if need be, with some fields replaced."""
+    if settings is None or isinstance(settings, Settings):
+        chosen = settings or Settings()
+    else:
+        chosen = await asyncio.to_thread(read_settings, settings)
+    if not fields:
+        return chosen
+    try:
+        return msgspec.convert({**msgspec.structs.asdict(chosen), **fields}, Settings, from_attributes=True)
+    except (msgspec.ValidationError, TypeError) as error:
+        raise TransportError(f"{error}; see hfg_transports.zenoh.Settings") from None
+
+
+def _names_an_address(settings: Settings) -> bool:
+    return bool(settings.listen or settings.connect or settings.agents or settings.meet)
 
 
 transport: Final = ZenohTransport()
