@@ -25,7 +25,7 @@ from hfg.logs import log
 from hfg.private import is_of_this_user
 from hfg.transport import Answer, Buffer, Message, Presence, Receive, Traffic, Watch, size_of
 
-__all__ = ["LocalSession", "LocalTransport", "transport"]
+__all__ = ["LocalPublisher", "LocalSession", "LocalTransport", "transport"]
 
 _OPENS_S: Final = 1.0  # how long opening waits for neighbours that stand still
 _CLOSES_S: Final = 1.0  # how long closing waits for neighbours that do not read
