@@ -139,7 +139,7 @@ class _Telling:
         for option in NODE_OPTIONS:
             value = getattr(node._options, option)
             if value != getattr(_PLAIN_NODE, option):
-                setattr(told, option, list(value) if option == "iterate_over" else value)
+                setattr(told, option, list(value) if isinstance(value, tuple) else value)
         told.gate = self.gate(node, level_of(node.place.graph))
         told.position, told.notes = self.notes(node, {})
         return told

@@ -217,6 +217,7 @@ class NodeDocument(msgspec.Struct, omit_defaults=True):
     restart_backoff_s: float = 0.1
     max_duration_s: float | None = None
     retries: int = 0
+    retry_on: list[str] = []
     retry_backoff_s: float = 0.1
     retry_backoff_max_s: float = 30.0
     retry_jitter: float = 0.0

@@ -32,7 +32,7 @@ from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.gating import set_gate
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.naming import need_name
-from hfg.graph.structure.options import DEFAULT_CAPACITY, GroupSpec, OnError, Overflow, Policy, Release
+from hfg.graph.structure.options import DEFAULT_CAPACITY, Errors, GroupSpec, OnError, Overflow, Policy, Release
 from hfg.graph.structure.pointing import node_at
 from hfg.graph.structure.promoting import promote
 from hfg.graph.structure.whole import Whole
@@ -151,6 +151,7 @@ class Graph:
         restart_backoff_s: float = 0.1,
         max_duration_s: float | None = None,
         retries: int = 0,
+        retry_on: Errors = (),
         retry_backoff_s: float = 0.1,
         retry_backoff_max_s: float = 30.0,
         retry_jitter: float = 0.0,
@@ -175,6 +176,8 @@ class Graph:
           restart_backoff_s: for "restart": the first pause.
           max_duration_s: the time limit of a firing, and of each attempt at it (rule X2).
           retries: how often a firing that fails is tried again with the same values, before `on_error` counts.
+          retry_on: only these errors, and those derived from them, are tried again: classes or their names,
+            "ConnectionError", "my_robot.nodes:NoAnswer"; by default all are.
           retry_backoff_s: the pause before the first retry; each further one is twice as long.
           retry_backoff_max_s: no pause is longer.
           retry_jitter: by which part of it a pause may be shorter, drawn by the run's seed: from 0, never, to 1.
@@ -200,6 +203,7 @@ class Graph:
             "restart_backoff_s": restart_backoff_s,
             "max_duration_s": max_duration_s,
             "retries": retries,
+            "retry_on": retry_on,
             "retry_backoff_s": retry_backoff_s,
             "retry_backoff_max_s": retry_backoff_max_s,
             "retry_jitter": retry_jitter,

@@ -309,7 +309,8 @@ class _Making:
             case "Tends" | "Beats":  # whose steps of one moment are in the order in which they were set
                 return {"pause_s": choose.one_of([0.003, 0.01])}
             case "Works":
-                manners = ["at once", "later", "tells", "fails", "resists", "clings", "long"]
+                manners = ["at once", "later", "tells", "fails", "long"]
+                manners += ["resists", "clings"] if self.allowed.clinging else []
                 return {"manner": choose.one_of(manners), "pause_s": choose.one_of([0.003, 0.01])}
             case "slow_double" | "Waiting" | "Unsteady":
                 return {"pause_s": choose.one_of([0.0, 0.003, 0.01])}
@@ -367,6 +368,8 @@ class _Making:
         options: dict[str, Any] = {"retries": choose.number(1, 4), "retry_backoff_s": choose.one_of([0.004, 0.0, 0.02])}
         if choose.chance(30):
             options["retry_backoff_max_s"] = 0.006
+        if choose.chance(25):
+            options["retry_on"] = choose.one_of([("OSError",), ("ValueError",), ("hfg.errors:FiringTimeout",)])
         if kind == "Unsteady" and choose.chance(20):
             options["max_duration_s"] = 0.005
         options["on_error"] = choose.one_of(["skip", "skip", "skip", "restart", "disable", "stop"])

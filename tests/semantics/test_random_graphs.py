@@ -29,7 +29,7 @@ SEVERAL_AT_ONCE = Allowed(concurrency=True)
 TRIED_AGAIN = Allowed(concurrency=True, retries=True)
 TENDING = Allowed(tasks=True, max_nodes=6)
 SENDING = Allowed(sending=True)
-DOING = Allowed(doing=True, max_nodes=5)
+DOING = Allowed(doing=True, clinging=True, max_nodes=5)
 THREADS = Allowed(threads=True, lossy=False, gates=False)
 
 

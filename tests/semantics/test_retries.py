@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sys
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import hfg
-from hfg import END, NO_MESSAGE
+from hfg import END, NO_MESSAGE, commands
 from hfg.testing import Recorder, reference_run
 from hfg.testing.nodes import Unsteady, script
 from hfg.trace import ErrorRaised, FiringEnded, FiringRetried, FiringStarted, TraceEvent
-from tests.semantics.nodes import Keep, drive, numbers, of_kind, run
+from tests.semantics.nodes import Keep, drive, named, numbers, of_kind, run
 from tests.semantics.readings import sent
 
 
@@ -287,3 +289,86 @@ def test_the_limit_of_time_is_for_each_attempt_and_the_pause_not_part_of_it(perf
 def test_the_oracle_says_that_it_draws_no_pauses() -> None:
     with pytest.raises(NotImplementedError, match='the pauses of "node" are shorter by chance'):
         reference_run(unsteady(1, retries=1, retry_jitter=0.5))
+
+
+# --- only some errors ---
+
+
+class NoAnswer(ConnectionError):
+    """An error of a type's own."""
+
+
+@hfg.node
+async def asks(value: int) -> int:
+    """Fail at each value, in one way or another."""
+    await asyncio.sleep(0)
+    raise [NoAnswer("busy"), ValueError("wrong")][value % 2]
+
+
+@pytest.mark.rule("X1")
+@CONCURRENCY
+@pytest.mark.parametrize(
+    ("retry_on", "retries"),
+    [
+        ((), [2, 2]),
+        (ConnectionError, [0, 2]),
+        (NoAnswer, [0, 2]),
+        ([NoAnswer, ValueError], [2, 2]),
+        ("ValueError", [2, 0]),
+        (f"{__name__}:NoAnswer", [0, 2]),
+        (["not.loaded:NoAnswer"], [0, 0]),
+        (TypeError, [0, 0]),
+    ],
+)
+def test_only_the_errors_that_are_named_are_tried_again(
+    retry_on: Any, retries: list[int], concurrency: int, fast: bool
+) -> None:
+    graph = hfg.Graph()
+    node = graph.add(asks(), retries=2, retry_on=retry_on, on_error="skip", concurrency=concurrency)
+    graph.connect(graph.add(numbers(count=2)).out, node.value)
+    trace: list[TraceEvent] = []
+    run(graph, fast, trace=trace)
+    retried = [event.number for event in of_kind(trace, FiringRetried)]
+    assert [retried.count(1), retried.count(2)] == retries
+
+
+@pytest.mark.rule("X1", "X2")
+def test_a_time_limit_is_an_error_like_others() -> None:
+    for error, retries in ((hfg.errors.FiringTimeout, 2), (OSError, 0)):
+        graph = hfg.Graph()
+        options: dict[str, Any] = {"max_duration_s": 0.5, "retries": 2, "retry_on": error, "on_error": "skip"}
+        node = graph.add(Device(), **options)
+        graph.connect(graph.add(numbers(count=1)).out, node.value)
+        assert run(graph).nodes["device"].retries == retries
+
+
+@pytest.mark.rule("X1", "L4")
+def test_a_file_names_them_and_brings_no_code_with_it(tmp_path: Path) -> None:
+    graph = hfg.Graph()
+    node = graph.add(asks(), name="asks", retries=2, retry_on=(NoAnswer, OSError, "not.loaded:Strange"))
+    graph.connect(graph.add(numbers(count=1)).out, node.value)
+    file = tmp_path / "asks.hfg.yaml"
+    hfg.save(graph, file)
+    assert f"- {__name__}:NoAnswer" in file.read_text()
+    again = hfg.load(file)
+    assert again["asks"]._options == node._options
+    assert "not.loaded" not in sys.modules
+    file.write_text(file.read_text().replace("OSError", "OSEror"))
+    with pytest.raises(hfg.errors.FileError, match='retry_on names "OSEror", and there is no such error'):
+        hfg.load(file)
+
+
+@pytest.mark.rule("X1", "R4", "G1")
+def test_edits_copies_and_boxes_keep_them() -> None:
+    graph = hfg.Graph()
+    options: dict[str, Any] = {"retries": 1, "retry_on": [f"{__name__}:NoAnswer"]}
+    graph.edit(commands.Add(named(asks), "asks", options=options))
+    wanted = graph["asks"]._options
+    assert wanted.retry_on == (f"{__name__}:NoAnswer",)
+    graph.edit(commands.Copy("asks", "more"))
+    assert graph["more"]._options == wanted
+    graph.edit(commands.Enclose(("more",), "box"))
+    assert graph["box/more"]._options == wanted
+    graph.undo()
+    graph.undo()
+    assert commands.decode(commands.encode([commands.Add(named(asks), "twin", options=options)]))

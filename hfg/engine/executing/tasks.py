@@ -126,7 +126,7 @@ class TaskRunner:
         code, core = self._code, self._core
         if task not in self.under_way:
             return  # it was left behind
-        if task.cancelled:
+        if task.cancelled or core.over:
             self._over(task, None, None)
             return
         worker = task.worker

@@ -51,7 +51,7 @@ def try_again(worker: Worker, attempts: Attempts, number: int, error: BaseExcept
       again: makes the next attempt.
     """
     options, core = worker.options, worker.core
-    if not isinstance(error, Exception) or not attempts.may_go_on(options.retries) or core.over:
+    if not _is_meant(error, options.retry_on) or not attempts.may_go_on(options.retries) or core.over:
         return False
     pause_s = _pause(worker, number, attempts.made)
     worker.count_retry()
@@ -70,6 +70,17 @@ def try_again(worker: Worker, attempts: Attempts, number: int, error: BaseExcept
         core.trace(FiringRetried(core.now(), worker.path, number, attempts.made, words, pause_s))
     attempts.rest(core.after(pause_s, again))
     return True
+
+
+def _is_meant(error: BaseException, names: tuple[str, ...]) -> bool:
+    """Whether such an error is tried again: it or a base of it is named, if any is."""
+    if not isinstance(error, Exception):
+        return False
+    return not names or any(_name(kind) in names for kind in type(error).__mro__)
+
+
+def _name(kind: type) -> str:
+    return kind.__qualname__ if kind.__module__ == "builtins" else f"{kind.__module__}:{kind.__qualname__}"
 
 
 def _pause(worker: Worker, number: int, made: int) -> float:

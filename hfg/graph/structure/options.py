@@ -6,8 +6,10 @@ nodes nor ports.
 
 from __future__ import annotations
 
+import builtins
 import functools
 import os
+import sys
 from collections.abc import Callable, Iterable
 from typing import Any, Final, Literal, TypeAlias, TypeGuard, TypeVar
 
@@ -18,6 +20,7 @@ from hfg.errors import GraphError, HfgError
 
 __all__ = [
     "EdgeOptions",
+    "Errors",
     "GroupSpec",
     "NodeOptions",
     "OnError",
@@ -32,6 +35,7 @@ __all__ = [
 
 OnError: TypeAlias = Literal["stop", "skip", "disable", "restart"]
 Release: TypeAlias = Literal["auto", "sequential", "pipelined"]
+Errors: TypeAlias = "Iterable[type[Exception] | str] | type[Exception] | str"
 Overflow: TypeAlias = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
 Policy: TypeAlias = Literal["fifo", "priority", "deadline", "fair", "random"]
 
@@ -54,6 +58,7 @@ class NodeOptions(msgspec.Struct, frozen=True, kw_only=True):
       on_error: what follows when its code fails (rule X1); the next two are for "restart".
       max_duration_s: the time limit of a firing, and of each attempt at it (rule X2).
       retries: how often a firing that fails is tried again before `on_error` says what follows (rule X1).
+      retry_on: names of the errors that are tried again, "ConnectionError" or "my_robot.nodes:NoAnswer"; () is all.
       retry_backoff_s: the pause before the first of them; each further one is twice as long.
       retry_backoff_max_s: no pause is longer.
       retry_jitter: by which part of it a pause may be shorter, by chance: from 0, never, to 1.
@@ -74,6 +79,7 @@ class NodeOptions(msgspec.Struct, frozen=True, kw_only=True):
     restart_backoff_s: float = 0.1
     max_duration_s: float | None = None
     retries: int = 0
+    retry_on: tuple[str, ...] = ()
     retry_backoff_s: float = 0.1
     retry_backoff_max_s: float = 30.0
     retry_jitter: float = 0.0
@@ -156,6 +162,7 @@ def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
     Raises:
       GraphError: a value is out of its range; the message begins with `where`.
     """
+    given["retry_on"] = error_names(where, given["retry_on"], retries=given["retries"])
     try:
         return _right_options(**given)
     except (GraphError, TypeError):  # the second: one that cannot be hashed, and so is none
@@ -185,6 +192,56 @@ def _checked(where: str, given: dict[str, Any]) -> NodeOptions:
             'declare it with graph.group("vision", threads=1)'
         )
     return NodeOptions(**given)
+
+
+def error_names(where: str, given: object, *, retries: object) -> tuple[str, ...]:
+    """Give the names of errors, which may be given as classes or by name; nothing is imported for them.
+
+    A name is compared with those of the error that was raised and of its bases, so one of a module that is not loaded
+    does no harm, and a graph file brings no code with it.
+
+    Raises:
+      GraphError: one of them is not an error, or nothing is tried again at all; the message begins with `where`.
+    """
+    if isinstance(given, str | type):
+        given = (given,)
+    if not isinstance(given, Iterable):
+        raise GraphError(f"{where}: retry_on takes errors, as in retry_on=(ConnectionError,), got {given!r}")
+    names = tuple(_error_name(where, error) for error in given)
+    if names and not retries:
+        raise GraphError(
+            f"{where}: retry_on=({', '.join(names)},) says which errors are tried again, and retries=0 tries none; "
+            "add retries=3"
+        )
+    return names
+
+
+def _error_name(where: str, error: object) -> str:
+    """Name one error; what has no module in its name is built in."""
+    if isinstance(error, str):
+        module, _, name = error.rpartition(":")
+        if module and module not in sys.modules:
+            return error  # what raises it brings its module, and until then nothing can
+        found: Any = sys.modules[module] if module else builtins
+        for part in name.split("."):
+            found = getattr(found, "__dict__", {}).get(part)  # which runs no code, as getattr might
+        if found is None:
+            raise GraphError(
+                f'{where}: retry_on names "{error}", and there is no such error; built-in ones are written '
+                '"ConnectionError", others with their module, "my_robot.nodes:NoAnswer"'
+            )
+    else:
+        found = error
+    if not isinstance(found, type) or not issubclass(found, Exception):
+        raise GraphError(
+            f"{where}: retry_on takes classes of errors, as in retry_on=(ConnectionError,), got {error!r}, which is "
+            "none" + (": what ends a task or the program on purpose is not tried again" if _is_exit(found) else "")
+        )
+    return found.__qualname__ if found.__module__ == "builtins" else f"{found.__module__}:{found.__qualname__}"
+
+
+def _is_exit(found: object) -> bool:
+    return isinstance(found, type) and issubclass(found, BaseException)
 
 
 def _need_pauses(where: str, given: dict[str, Any]) -> None:

@@ -456,9 +456,16 @@ class Firing(RunningCode):
         return (
             flight.kind == "process"
             and isinstance(error, Exception)
+            and self.is_tried_again(error, flight.station.leaf.options.retry_on)
             and 0 < flight.attempts <= flight.station.leaf.options.retries
             and not flight.triggered
         )
+
+    def is_tried_again(self, error: Exception, names: tuple[str, ...]) -> bool:
+        """Whether the error is one of those that are named, by its own name or that of a base."""
+        kinds = [(kind.__module__, kind.__qualname__) for kind in type(error).__mro__]
+        named = [tuple(name.split(":")) if ":" in name else ("builtins", name) for name in names]
+        return not named or any(kind in named for kind in kinds)
 
     def try_again(self, flight: Flight, error: BaseException) -> None:
         """Throw away what the attempt has written; after a pause, which doubles each time, there is another one."""
