@@ -15,6 +15,7 @@ from typing import Any, Final
 from hfg.errors import Failure
 from hfg.testing.reference import Move, ReferenceMachine
 from hfg.testing.reference.machine import TEARDOWN_LIMIT_S
+from hfg.testing.reference.state import Task
 from hfg.token import END, Token
 from hfg.trace import (
     ActivityChanged,
@@ -141,6 +142,7 @@ class Replay:
         self._paused = False  # time may go on although nodes are enabled (R3)
         self.expected: list[TraceEvent] = []
         self._delays: set[str] = set()
+        self._torn_down: dict[str, TraceEvent] = {}  # nodes whose do-activity has ended for an edit that is to come
         self._look_at_edges()
         self._expect(self.machine.start())
 
@@ -180,12 +182,17 @@ class Replay:
             return False
         index = self.machine.paths.get(event.node)
         doing = None if index is None else self.machine.activity_of(self.machine.stations[index])
-        return doing is None or (not doing.cancelled and bool(self.machine.held))
+        if doing is not None and doing.cancelled:
+            return False
+        if doing is not None:
+            self._torn_down[event.node] = event
+        return True
 
     def _follow_edit(self, event: StructureChanged) -> None:
         """The run is edited (R4): so is the reference."""
         mark = len(self.machine.observed)
         self.machine.edit(event.change)
+        self._torn_down.clear()
         self._look_at_edges()
         self._expect(self.machine.observed_since(mark))
 
@@ -222,6 +229,8 @@ class Replay:
         """
         if self.expected:
             raise Divergence("the run did not do all that follows", None, self)
+        if self._torn_down:
+            raise Divergence("a do-activity was cancelled for nothing", next(iter(self._torn_down.values())), self)
         if self.machine.outcome is None:
             raise Divergence("the run has no end", None, self)
 
@@ -291,9 +300,13 @@ class Replay:
         """Nobody sees tasks end that were cancelled, or a reset, but that their node begins something."""
         for move in self.machine.moves():
             task = self.machine.task_of(move) if move.kind == "task" else None
-            cancelled = task is not None and task.cancelled and not task.stepped  # else one sees that it ends (A15)
+            cancelled = task is not None and task.cancelled and self._ends_unseen(task)
             if move.node == node and (cancelled or self._resets(move)):
                 self._apply(move)
+
+    def _ends_unseen(self, task: Task) -> bool:
+        """Whether its end is not to be seen: one sees it of a do-activity that has begun (A15)."""
+        return not task.is_activity or (not task.stepped and self.machine.is_closing(task.station))
 
     def _resets(self, move: Move) -> bool:
         """Whether the node is reset by this, because a subgraph around it is (G2)."""

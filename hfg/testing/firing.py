@@ -20,6 +20,7 @@ from hfg.functions import NodeFunction
 from hfg.graph import Graph
 from hfg.graph.structure.naming import suggest
 from hfg.nodetype import Node, Place
+from hfg.ports.automatic import AUTOMATIC_EVENTS
 from hfg.testing.reference.waiting import hand_turned_loop
 from hfg.token import Token
 from hfg.types import accepts, describe, describe_value
@@ -79,7 +80,8 @@ def fire(
       node: belongs to no run at the moment.
       *unnamed: refused: values go by the names of inputs.
       slot: calls this slot instead, with `value=`, if it takes one.
-      hook: runs this hook instead: "end", "teardown", "on_activated" ...
+      hook: runs this hook instead: "end", "teardown", "on_activated", "do" ...; behind "do", which runs to its end,
+        the event `completed` is among the events.
       active: what `node.active` says from now on.
       parameters: are set before.
       debug: checks what goes in and comes out against the types of the ports.
@@ -205,7 +207,8 @@ class _Firing:
         self.ended = False
         for name in self.type.outputs:
             node.ports.outputs[name]._emit = self._writer(name)
-        for name in (*self.type.events, "processed", "activated", "deactivated", "failed", "timeout"):
+        automatic = (name for name in AUTOMATIC_EVENTS if name != "completed" or "do" in self.type.hooks)
+        for name in (*self.type.events, *automatic):
             port = node.ports.events[name] if not self.type.is_subgraph else None
             if port is not None:
                 port._emit = self._trigger(name)
@@ -248,6 +251,8 @@ class _Firing:
 
     def of_hook(self, name: str) -> Firing:
         answer = self.run(getattr(self.node, name))
+        if name == "do":  # it has returned by itself (A15)
+            self._trigger("completed")(answer, None, None)
         if name == "teardown":
             _SET_UP.discard(self.node)
         return replace(self.result(), answer=answer)

@@ -10,7 +10,7 @@ import pytest
 
 import hfg
 from hfg import commands
-from hfg.testing import replay
+from hfg.testing import fire, replay
 from hfg.trace import DoEnded, DoStarted, TokenSent, TraceEvent
 from tests.semantics.nodes import Ear, activity, drive, named, numbers, of_kind, run
 
@@ -602,3 +602,11 @@ def test_the_oracle_says_the_same(work: Work) -> None:
     events: list[TraceEvent] = []
     run(build(), trace=events)
     replay(build, events)
+
+
+@pytest.mark.rule("A15")
+def test_fire_runs_one_to_its_end() -> None:
+    fired = fire(Quick(), hook="do", active=True)
+    assert (fired.answer, fired.events) == ("quick", [("completed", "quick")])
+    with pytest.raises(hfg.errors.UsageError, match="waits for something that never comes"):
+        fire(Lasting(), hook="do")

@@ -168,7 +168,7 @@ class FollowPath(hfg.Node):
         speed = math.hypot(self.last.vx, self.last.vy) if self.last is not None else 0.0
         limits = Limits(speed=self.speed, near=self.near, aligned=self.aligned)
         twist = follow(self.way, localised, scan, speed, limits)
-        self._queue(scan.stamp, twist is None)
+        told = self._queue(scan.stamp, twist is None)
         if twist is None and self.way.waits:
             self.last, self.since = None, scan.stamp
             return Twist()
@@ -177,11 +177,12 @@ class FollowPath(hfg.Node):
             self.best = math.inf
             self.arrived.trigger()
             return Twist()
-        self._watch(localised, scan.stamp)
+        self._watch(localised, scan.stamp, told)
         self.last = twist
         return twist
 
-    def _queue(self, now: float, stands: bool) -> None:
+    def _queue(self, now: float, stands: bool) -> bool:
+        """Tell if it has waited for too long; whether it has told, for one firing gives the activity away only once."""
         if not self.way.waits:
             self.queues_since = None
         elif self.queues_since is None:
@@ -189,8 +190,10 @@ class FollowPath(hfg.Node):
         elif now - self.queues_since > self.queueing:
             self.queues_since = now
             self.blocked.trigger(0.0)
+            return True
+        return False
 
-    def _watch(self, localised: Localised, now: float) -> None:
+    def _watch(self, localised: Localised, now: float, told: bool) -> None:
         goal = self.way.points[-1]
         remaining = _ahead(self.way.points, localised.pose[:2], 0.0)[0]
         remaining += 0.3 * abs(float(wrapped(self.way.heading - localised.pose[2])))
@@ -201,7 +204,8 @@ class FollowPath(hfg.Node):
         elif now - self.since > self.patience:
             self.since = now
             self.best = remaining
-            self.blocked.trigger(remaining)
+            if not told:
+                self.blocked.trigger(remaining)
 
     def _goal(self) -> Any:
         return self.goal_was

@@ -18,7 +18,7 @@ from hfg.engine.executing.code import CodeRunner, speak_for
 from hfg.engine.model.core import PENDING, Core
 from hfg.engine.model.flights import current_flight
 from hfg.engine.model.tasks import Doing, Task, Tasks, current_task
-from hfg.engine.model.worker import DISABLED, ENDED, Worker
+from hfg.engine.model.worker import DISABLED, ENDED, TORN_DOWN, Worker
 from hfg.engine.rules import doing as do_activity
 from hfg.engine.rules import errors
 from hfg.errors import NodeError, NotRunning, UsageError
@@ -126,7 +126,9 @@ class TaskRunner:
         code, core = self._code, self._core
         if task not in self.under_way:
             return  # it was left behind
-        if task.cancelled or core.over:
+        if core.over or (task.doing is not None and task.worker.blocked & TORN_DOWN):
+            task.cancel()  # the run is over, or an edit has removed its node
+        if task.cancelled:
             self._over(task, None, None)
             return
         worker = task.worker

@@ -370,6 +370,16 @@ def test_who_has_waited_for_long_at_a_station_says_so() -> None:
     assert told == [(51, "blocked")]
 
 
+def test_one_firing_says_only_once_that_it_is_blocked() -> None:
+    """By an active edge each signal would lead the activity on, and one robot would be in two steps (rules A3, A13)."""
+    follower = FollowPath(queueing=8.0, patience=6.0)
+    fire(follower, slot="path", value=Path(np.array([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)]), 0.0, waits=True))
+    follower.last, follower.best, follower.goal_was = Twist(), 1.0, np.array([2.0, 0.0])
+    follower.since = follower.queues_since = 0.0  # since then no nearer, and since then queueing
+    fired = fire(follower, localised=sure(0, 0, 0), scan=Scan(NOWHERE.ranges, NOWHERE.angles, 20.0), active=True)
+    assert [name for name, _ in fired.events] == ["blocked"]
+
+
 def test_of_two_who_come_to_a_station_at_once_one_goes_on() -> None:
     goal, one, other = np.array([4.7, 0.0, 0.0]), np.array([4.3, 0.6, 0.0]), np.array([4.2, -0.6, 0.0])
     assert queue(one, goal, [standing(*other[:2])], 0.9) is None

@@ -9,7 +9,16 @@ import hfg
 from examples.fetch_delivery.mission import build
 from examples.fetch_delivery.world import Simulation
 from examples.fetch_delivery.world.robots import Robot
-from hfg.trace import ActivityChanged, EventTriggered, RunEnded, TraceEvent
+from hfg.trace import (
+    ActivityChanged,
+    CallEnded,
+    CallStarted,
+    EventTriggered,
+    FiringEnded,
+    FiringStarted,
+    RunEnded,
+    TraceEvent,
+)
 
 # How long each step may hold the activity: its time-out where it has one, else the moment it takes.
 LONGEST_S = {"go_to/plan": 8.2, "go_to/follow": 60.2, "position": 20.2, "dock": 10.2, "wait": 20.2, "leave": 6.2}
@@ -40,6 +49,7 @@ class Watch:
         self._chosen: dict[int, float] = {}
         self._active: dict[str, dict[str, float]] = {}
         self._now = 0.0
+        self._handed_on: dict[str, str | None] = {}  # by whose firing or call, and by which event, if it has
         self._stirred: dict[str, tuple[float, float, float]] = {}
 
     @property
@@ -83,6 +93,21 @@ class Watch:
         if isinstance(event, RunEnded):
             self._is_over()
         self._look(event)
+        self._follow_activity(event)
+
+    def _follow_activity(self, event: TraceEvent) -> None:
+        """One firing or call hands its activity on once: by A3 a second signal would make two of it."""
+        if isinstance(event, FiringStarted | CallStarted):
+            self._handed_on[event.node] = None
+        elif isinstance(event, FiringEnded | CallEnded):
+            self._handed_on.pop(event.node, None)
+        elif isinstance(event, EventTriggered) and event.token.activity == 1:
+            node, _, name = event.event.partition(".")
+            before = self._handed_on.get(node)
+            if before is not None:
+                self.found.append(f"at {event.time} s {node} hands its activity on by {before} and by {name}")
+            if node in self._handed_on:
+                self._handed_on[node] = name
 
     def _look(self, event: TraceEvent) -> None:
         """See which steps are active."""
