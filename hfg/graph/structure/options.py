@@ -162,7 +162,7 @@ def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
     Raises:
       GraphError: a value is out of its range; the message begins with `where`.
     """
-    given["retry_on"] = error_names(where, given["retry_on"], retries=given["retries"])
+    given["retry_on"] = _error_names(where, given["retry_on"], retries=given["retries"])
     try:
         return _right_options(**given)
     except (GraphError, TypeError):  # the second: one that cannot be hashed, and so is none
@@ -194,7 +194,7 @@ def _checked(where: str, given: dict[str, Any]) -> NodeOptions:
     return NodeOptions(**given)
 
 
-def error_names(where: str, given: object, *, retries: object) -> tuple[str, ...]:
+def _error_names(where: str, given: object, *, retries: object) -> tuple[str, ...]:
     """Give the names of errors, which may be given as classes or by name; nothing is imported for them.
 
     A name is compared with those of the error that was raised and of its bases, so one of a module that is not loaded
