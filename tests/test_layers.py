@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FLOORS = {
     "hfg.errors": 0,
     "hfg.bounds": 0,
+    "hfg.controls": 0,
     "hfg.generics": 0,
     "hfg.images": 0,
     "hfg.problem": 0,

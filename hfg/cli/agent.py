@@ -53,7 +53,7 @@ async def _serve(settings: dict[str, Any], folder: Path) -> int:
         with _ending() as ended:
             try:
                 await one.open()
-                sys.stdout.write(f'agent of host "{session.host}" is ready, process {os.getpid()}\n')
+                show.write(f'agent of host "{session.host}" is ready, process {os.getpid()}\n')
                 sys.stdout.flush()
                 await ended.wait()
             finally:

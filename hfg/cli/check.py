@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
@@ -50,10 +49,10 @@ def check(
         show.json(problems)
     else:
         for problem in problems:
-            sys.stdout.write(f"{problem} [{problem.check}]\n")
+            show.write(f"{problem} [{problem.check}]\n")
         name = target if graph is None else f'graph "{graph.name}"'
-        sys.stdout.write(f"{name}: {_count(counts['error'], 'error')}, {_count(counts['warning'], 'warning')}")
-        sys.stdout.write(f", {_count(counts['hint'], 'hint')}\n" if counts["hint"] else "\n")
+        show.write(f"{name}: {_count(counts['error'], 'error')}, {_count(counts['warning'], 'warning')}")
+        show.write(f", {_count(counts['hint'], 'hint')}\n" if counts["hint"] else "\n")
     return 1 if counts["error"] else 0
 
 

@@ -5,7 +5,6 @@ Stands on `target`, `show` and the files' floor.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -58,7 +57,7 @@ def convert(
         raise TargetError("--json tells what became of a file of CS::APEX; leave it out")
     graph = load_graph(target, arg or [], allow)
     if out is None:
-        sys.stdout.write(text_of(describe(graph, beside=Path("graph.hfg.yaml"))))
+        show.write(text_of(describe(graph, beside=Path("graph.hfg.yaml"))))
         return 0
     try:
         save(graph, out)
@@ -75,20 +74,20 @@ def _import_apex(target: str, out: Path | None, json: bool) -> int:
         if out is not None:
             write(document, out)
         elif not json:
-            sys.stdout.write(text_of(document))
+            show.write(text_of(document))
     except UsageError as error:
         show.sentence(str(error))
         return 2
     if json:
         show.json(report)
     else:
-        (sys.stderr if out is None else sys.stdout).write(f"{report}\n")
+        show.write(f"{report}\n", to_stderr=out is None)
     return 0
 
 
 def _write_schema(file: str | None) -> int:
     if file is None:
-        sys.stdout.write(schema())
+        show.write(schema())
         return 0
     try:
         write_whole(Path(file), lambda stream: stream.write(schema().encode()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -50,5 +49,5 @@ def draw(
         show.sentence(str(error))
         return 2
     if out is None:
-        sys.stdout.write(text)
+        show.write(text)
     return 0

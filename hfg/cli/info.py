@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -29,7 +28,7 @@ def info(
     if json:
         show.json(found)
     else:
-        sys.stdout.write("\n".join(_lines(found)) + "\n")
+        show.write("\n".join(_lines(found)) + "\n")
     return 0
 
 

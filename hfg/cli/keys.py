@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import secrets
 import socket
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from hfg.cli import show
 from hfg.cli.certificates import AUTHORITY, Kind, make_authority, make_certificate
 from hfg.errors import TargetError
 
@@ -43,7 +43,7 @@ def _secret(file: Annotated[Path, typer.Argument(help="where it is to lie; it mu
             stream.write(secrets.token_hex(32) + "\n")
     except OSError as error:
         raise TargetError(f"{file} cannot be written: {error.strerror}") from None
-    sys.stdout.write(f'{file} is there: copy it to all hosts, and write key = "{file.name}" in their settings\n')
+    show.write(f'{file} is there: copy it to all hosts, and write key = "{file.name}" in their settings\n')
     return 0
 
 
@@ -61,9 +61,7 @@ def _new(folder: Folder, host: Hosts = None, days: Days = 365) -> int:
     make_authority(folder, days=days)
     for name in ("agent", "worker", "viewer"):
         make_certificate(folder, name, name, hosts=_hosts(host), days=days)
-    sys.stdout.write(
-        _NEXT.format(folder=folder.as_posix(), authority=(folder / AUTHORITY).as_posix(), host=_hosts(host)[0])
-    )
+    show.write(_NEXT.format(folder=folder.as_posix(), authority=(folder / AUTHORITY).as_posix(), host=_hosts(host)[0]))
     return 0
 
 
@@ -77,7 +75,7 @@ def _add(
 ) -> int:
     """Make one more certificate by the authority that is there, as for the agent of another host."""
     make_certificate(folder, name, kind, hosts=_hosts(host), days=days)
-    sys.stdout.write(f"{folder / name}.pem and {folder / name}.key are there\n")
+    show.write(f"{folder / name}.pem and {folder / name}.key are there\n")
     return 0
 
 

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from hfg.cli import templates
+from hfg.cli import show, templates
 from hfg.errors import TargetError
 
 __all__ = ["new"]
@@ -50,9 +50,7 @@ def _plugin(
     words = _words(module) | {"distribution": folder.name}
     files = {folder / place.format(**words): text for place, text in templates.PLUGIN.items()}
     _write_all({file: text.format(**words) for file, text in files.items()})
-    sys.stdout.write(
-        f"{folder} is there; try pip install -e {folder}, then hfg nodes {words['Name']} and pytest {folder}\n"
-    )
+    show.write(f"{folder} is there; try pip install -e {folder}, then hfg nodes {words['Name']} and pytest {folder}\n")
     return 0
 
 
@@ -80,7 +78,7 @@ def _write(named: str, code: str, test: str, verb: str) -> int:
     words = _words(file.stem)
     _write_all({one: template.format(**words) for one, template in ((file, code), (tests, test))})
     next_step = f"hfg run {file}" if verb else f"hfg nodes {file}"
-    sys.stdout.write(f"{file} and {tests} are there; try {next_step} and pytest {tests}\n")
+    show.write(f"{file} and {tests} are there; try {next_step} and pytest {tests}\n")
     return 0
 
 

@@ -61,11 +61,11 @@ def nodes(
     if json:
         show.json(types)
     elif is_one and types:
-        sys.stdout.write("\n\n".join("\n".join(_page(one)) for one in types) + "\n")
+        show.write("\n\n".join("\n".join(_page(one)) for one in types) + "\n")
     elif types:
-        sys.stdout.write("\n".join(_list(types, by_category=search is None)) + "\n")
+        show.write("\n".join(_list(types, by_category=search is None)) + "\n")
     else:
-        sys.stdout.write(f"no node types in {what}\n")
+        show.write(f"no node types in {what}\n")
     return 0
 
 
@@ -85,18 +85,18 @@ def _installed(search: str | None, category: str | None) -> int:
     elif category is not None:
         entries = _of_category(entries, category)
     if entries:
-        sys.stdout.write("\n".join(_list(entries, by_category=search is None)) + "\n")
+        show.write("\n".join(_list(entries, by_category=search is None)) + "\n")
     elif search is not None:
-        sys.stdout.write(f'no node type of the category "{category}" matches "{search}"\n')
+        show.write(f'no node type of the category "{category}" matches "{search}"\n')
     else:
-        sys.stdout.write("no node types are installed; name a module or a file: hfg nodes robot.py\n")
+        show.write("no node types are installed; name a module or a file: hfg nodes robot.py\n")
     return 0
 
 
 def _nothing(index: Index, search: str) -> int:
     near = catalogue.near_words(index, search)
     hint = f"; search for {' or '.join(near)}?" if near else "; hfg nodes lists all"
-    sys.stdout.write(f'no node type matches "{search}"{hint}\n')
+    show.write(f'no node type matches "{search}"{hint}\n')
     return 0
 
 

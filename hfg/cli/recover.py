@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from hfg.cli import show
 from hfg.cli.info import told_losses
 from hfg.errors import TargetError, UsageError
 from hfg.recording import recover as recover_recording
@@ -27,5 +27,5 @@ def recover(
         raise TargetError(str(error)) from None
     found = f"{count:,} message{'s' * (count != 1)}"
     lines = [f"{output}: {found} of {file}", *(told_losses(losses) or ["nothing is lost"])]
-    sys.stdout.write("\n".join(lines) + "\n")
+    show.write("\n".join(lines) + "\n")
     return 0

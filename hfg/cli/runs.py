@@ -258,13 +258,13 @@ async def _deploy(settings: str | None, target: str, on: str | None, arguments: 
             has_failed = gone.result() if gone.done() else True  # else it is slow beyond all patience
             gone.cancel()
             told = await _ask_agent(realm, agent, ReadLog(order.run, 0), Chunk)
-            sys.stderr.write(told.text)
+            show.write(told.text, to_stderr=True)
             if not has_failed:
                 return 0  # it was over before anybody could look
             show.sentence(f'{target} has not begun on host "{host}"; what it wrote is above')
             return 1
         gone.cancel()
-    sys.stdout.write(f"{run}\n")
+    show.write(f"{run}\n")
     show.sentence(f'{target} runs on host "{host}": hfg logs {run}, hfg ps, hfg stop {run}')
     return 0
 
@@ -310,7 +310,7 @@ async def _logs(settings: str | None, name: str, follow: bool) -> int:
             for place, agent in sorted(realm.agents.items(), key=lambda item: item[1].host):
                 new += await _read_all(realm, place, agent, run, offsets)
             seen = seen or bool(new)
-            sys.stdout.write("".join(sorted(new, key=_time_of)))
+            show.write("".join(sorted(new, key=_time_of)))
             sys.stdout.flush()
             if not follow or is_over:
                 break

@@ -15,14 +15,16 @@ from typing import Any
 import msgspec
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from hfg.clock import current_elapsed
+from hfg.controls import escaped
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import Report
 from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
 from hfg.frames import is_machinery
 
-__all__ = ["Records", "failure", "json", "report", "sentence", "set_debug", "table", "user_traceback"]
+__all__ = ["Records", "failure", "json", "report", "sentence", "set_debug", "table", "user_traceback", "write"]
 
 _WIDTH_OF_A_FILE = 200
 _debug = False
@@ -77,16 +79,24 @@ class _StandardError:
     """Standard error as it is now: a live table stands in for it at times."""
 
     def write(self, text: str) -> None:
-        sys.stderr.write(text)
+        write(text, to_stderr=True)
 
     def flush(self) -> None:
         sys.stderr.flush()
 
 
+def write(text: str, *, to_stderr: bool = False) -> None:
+    """Write a text to standard output; whatever verbs write comes by here, so that no name or value steers a terminal.
+
+    What nodes print themselves does not.
+    """
+    (sys.stderr if to_stderr else sys.stdout).write(escaped(text))
+
+
 def sentence(text: str) -> None:
     """Write one sentence to standard error."""
     with suppress(OSError):  # the terminal has gone away: nobody reads it
-        sys.stderr.write(f"hfg: {text}\n")
+        write(f"hfg: {text}\n", to_stderr=True)
 
 
 def failure(error: BaseException) -> None:
@@ -95,7 +105,7 @@ def failure(error: BaseException) -> None:
         if isinstance(one, NodeError) or _debug:
             user_traceback(one.__cause__ or one)
         elif isinstance(one, EngineInternalError):
-            traceback.print_exception(one)
+            write("".join(traceback.format_exception(one)), to_stderr=True)
         sentence(str(one))
 
 
@@ -108,7 +118,7 @@ def user_traceback(error: BaseException | None) -> None:
         _filter(shown)
         if isinstance(error, HfgError) and not shown.stack:
             return  # nothing of the user's in it, and its sentence follows
-    sys.stderr.write("".join(shown.format()))
+    write("".join(shown.format()), to_stderr=True)
 
 
 def _filter(shown: traceback.TracebackException) -> None:
@@ -120,18 +130,18 @@ def _filter(shown: traceback.TracebackException) -> None:
 
 def json(value: Any) -> None:
     """Write JSON to standard output, indented for people."""
-    sys.stdout.write(msgspec.json.format(encode(value), indent=2).decode() + "\n")
+    write(msgspec.json.format(encode(value), indent=2).decode() + "\n")
 
 
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]], *, to_stderr: bool = False) -> None:
     """Write a table; numbers stand to the right."""
-    cells = [[str(cell) for cell in row] for row in rows]
-    drawn = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+    cells = [[escaped(str(cell)) for cell in row] for row in rows]
+    drawn = Table(title=Text(escaped(title)), title_justify="left", title_style="bold", box=None, pad_edge=False)
     for index, column in enumerate(columns):
         numbers = bool(cells) and all(row[index].replace(".", "").isdigit() for row in cells)
         drawn.add_column(column, justify="right" if numbers else "left", overflow="fold")
     for row in cells:
-        drawn.add_row(*(cell.replace("[", "\\[") for cell in row))
+        drawn.add_row(*map(Text, row))
     stream = sys.stderr if to_stderr else sys.stdout
     Console(file=stream, width=None if stream.isatty() else _WIDTH_OF_A_FILE).print(drawn)
 

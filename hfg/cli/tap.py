@@ -22,6 +22,7 @@ from hfg.cli.options import AllowOption, Clock, ClockOption, DebugOption, ParamO
 from hfg.cli.settings import set_parameters
 from hfg.cli.sockets import Line, find, is_process, runs, which
 from hfg.cli.target import SUFFIXES, load_graph
+from hfg.controls import escaped
 from hfg.engine import Run
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import line_of
@@ -105,7 +106,7 @@ def _look_at(name: str, question: Question, limit: int | None) -> int:
             raise TargetError(f"the run in process {name} does not answer: a node blocks its loop")
         try:
             for text in islice(line.lines(), limit):
-                sys.stdout.write(text)
+                show.write(text)
                 sys.stdout.flush()
             if limit is None:
                 show.sentence(f"the run in process {name} is over")
@@ -145,7 +146,7 @@ class _Printer:
         printed = 0
         try:
             async for token in looking:
-                self._out.write(line_of(token, looking.passed_s, json=self._json))
+                self._out.write(escaped(line_of(token, looking.passed_s, json=self._json)))
                 self._out.flush()
                 printed += 1
                 if printed == self._limit:

@@ -1,7 +1,7 @@
 """Lines at the foot of a terminal that change in place, below whatever else is printed meanwhile.
 
 What goes to standard output and standard error comes out exactly as it was written, above the lines. Nothing is left
-to restore when the process dies: the cursor stays as it is, and there is no second screen. Stands on nothing of ours.
+to restore when the process dies: the cursor stays as it is, and there is no second screen. Stands on `controls`.
 """
 
 from __future__ import annotations
@@ -16,20 +16,15 @@ from typing import Any, TextIO
 
 from rich.cells import cell_len
 
+from hfg import controls
+
 __all__ = ["Foot", "is_terminal"]
 
 
 def is_terminal(*streams: TextIO) -> bool:
     """Whether all of them go to a terminal that can move its cursor."""
     dumb = os.environ.get("TERM", "dumb" if os.name == "posix" else "") in ("dumb", "unknown")
-    return not dumb and all(_is_tty(stream) for stream in streams)
-
-
-def _is_tty(stream: TextIO | None) -> bool:
-    try:
-        return stream is not None and stream.isatty()
-    except ValueError:  # it is closed
-        return False
+    return not dumb and all(controls.is_terminal(stream) for stream in streams)
 
 
 class Foot:

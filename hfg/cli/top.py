@@ -75,7 +75,7 @@ def _once(line: Line | RealmLine, json: bool) -> int:
         head = {"graph": last.graph, "outcome": last.outcome, "duration_s": last.duration_s}
         show.json({**head, "nodes": [row._asdict() for row in view.rows()]})
     else:
-        sys.stdout.write("\n".join(view.lines(_PIPE_COLUMNS, len(last.nodes) + 10)) + "\n")
+        show.write("\n".join(view.lines(_PIPE_COLUMNS, len(last.nodes) + 10)) + "\n")
     return 0
 
 

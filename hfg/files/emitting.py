@@ -15,13 +15,12 @@ from typing import Any, Final
 __all__ = ["emit"]
 
 _WIDTH: Final = 100  # of a list on one line
-_PLAIN: Final = re.compile(
-    r"[A-Za-z_/.\u00c0-\u024f](?:[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufeff\u2028\u2029#:\\]|:(?=[^\s]))*"
-)
+_UNSEEN: Final = r"\x7f-\x9f\ud800-\udfff\ufeff\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
+_PLAIN: Final = re.compile(rf"[A-Za-z_/.\u00c0-\u024f](?:[^\x00-\x1f{_UNSEEN}#:\\]|:(?=[^\s]))*")
 _WORDS: Final = re.compile(r"(?i:y|n|yes|no|on|off|true|false|null|none|nan|inf|\.nan|[-+]?\.inf|\.|\.\.\.|~)")
 _NUMBER: Final = re.compile(r"[-+.]?[0-9].*|\.[0-9eE_].*")
-_BLOCK: Final = re.compile(r"[^\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufeff\u2028\u2029\t]*")
-_UNPRINTED: Final = re.compile(r"[\x7f-\x9f\ud800-\udfff\ufeff\u2028\u2029]")
+_BLOCK: Final = re.compile(rf"[^\x00-\x08\x0b-\x1f\t{_UNSEEN}]*")
+_UNPRINTED: Final = re.compile(f"[{_UNSEEN}]")
 
 
 def emit(data: Mapping[str, Any]) -> str:

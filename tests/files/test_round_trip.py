@@ -160,7 +160,7 @@ def test_machines_are_states_and_edges() -> None:
     assert hfg.StateMachine.of(again(door.graph())) == door
 
 
-@pytest.mark.parametrize("name", ["a b", "a -> b", "no", "1", "a: b", "ä", "- x", "'", "a\nb", " x "])
+@pytest.mark.parametrize("name", ["a b", "a -> b", "no", "1", "a: b", "ä", "- x", "'", " x "])
 def test_any_name_of_a_node_is_possible(name: str) -> None:
     graph = hfg.Graph("x")
     graph.connect(graph.add(numbers(), name=name).out, graph.add(double()).value)

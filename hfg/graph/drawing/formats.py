@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
+from hfg.controls import escaped
 from hfg.errors import GraphError, UsageError
 from hfg.graph.drawing.picture import EVERYTHING, Arrow, Box, Look, Picture, Shape, View, picture
 from hfg.graph.drawing.svg import svg
@@ -146,7 +147,7 @@ def mermaid(graph: Graph, view: View = EVERYTHING) -> str:
 
 
 def _quoted(text: str) -> str:
-    return f'"{text.translate(_ENTITIES)}"'
+    return f'"{escaped(text).translate(_ENTITIES)}"'
 
 
 def _mermaid_arrow(arrow: Arrow) -> str:
@@ -215,7 +216,7 @@ def dot(graph: Graph, view: View = EVERYTHING) -> str:
 
 
 def _escaped(text: str) -> str:
-    return f'"{text.translate(_ESCAPES)}"'
+    return f'"{escaped(text).translate(_ESCAPES)}"'
 
 
 def _dot_look(shape: Shape) -> str:

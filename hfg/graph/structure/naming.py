@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from hfg.controls import name_problem
 from hfg.errors import GraphError
 from hfg.nodetype import Node
 
@@ -15,10 +16,13 @@ def need_name(what: str, name: object) -> str:
     """Refuse what cannot be part of a path; `what` begins the message.
 
     Raises:
-      GraphError: it is no text, empty, or holds one of the two characters that paths are made of.
+      GraphError: it is no text, empty, has characters that steer a terminal, or one of the two that paths are made of.
     """
     if not isinstance(name, str) or not name:
         raise GraphError(f"{what} needs a name that is a text and not empty, got {name!r}")
+    problem = name_problem(name)
+    if problem is not None:
+        raise GraphError(f"{what} {problem}")
     for character in "/.":
         if character in name:
             better = name.replace("/", "_").replace(".", "_")

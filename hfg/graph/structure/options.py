@@ -16,6 +16,7 @@ from typing import Any, Final, Literal, TypeAlias, TypeGuard, TypeVar
 import msgspec
 
 from hfg import errors
+from hfg.controls import name_problem
 from hfg.errors import GraphError, HfgError
 
 __all__ = [
@@ -350,6 +351,9 @@ def group_spec(
     """
     if type(name) is not str or not name:
         raise GraphError(f"a group needs a name, got {name!r}")
+    problem = name_problem(name)
+    if problem is not None:
+        raise GraphError(f"a group {problem}")
     at = f'group "{name}"'
     host = "" if host is None else host
     _need_place(at, process, host)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
@@ -16,6 +15,7 @@ from annotated_types import Interval, MaxLen, Predicate
 from hfg.clock import now
 from hfg.functions import node
 from hfg.logs import log
+from hfg.nodes._printing import print_line
 from hfg.nodes.values.text import format_safely, is_a_format
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Parameter, State, slot
@@ -103,16 +103,6 @@ class TextDisplay(Node):
         else:
             print_line(text, error=self.to == "error")
         self.shown.trigger(text)
-
-
-def print_line(text: str, *, error: bool = False) -> None:
-    """Write a line to the program's output, whatever letters its terminal knows."""
-    stream = sys.stderr if error else sys.stdout
-    try:
-        stream.write(text + "\n")
-    except UnicodeError:
-        stream.write(text.encode("ascii", "backslashreplace").decode() + "\n")
-    stream.flush()
 
 
 @node

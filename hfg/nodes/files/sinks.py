@@ -9,7 +9,6 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,6 +21,7 @@ from annotated_types import Interval, MaxLen, MinLen, Predicate
 from hfg.clock import now
 from hfg.images import AnyImage
 from hfg.nodes._extras import require
+from hfg.nodes._printing import print_line
 from hfg.nodes.files.access import FilePath, is_a_path, named, reaching, write_whole
 from hfg.nodes.values.parsing import json_bytes
 from hfg.nodes.values.text import format_safely, is_a_format
@@ -509,6 +509,8 @@ class StackArrays(Node):
 class StandardOutput(Node):
     """Write texts to the standard output of the program, a line each, at once.
 
+    On a terminal, characters that would steer it are written out.
+
     Attributes:
       text: each line, without its end.
 
@@ -522,8 +524,4 @@ class StandardOutput(Node):
 
     def process(self, text: str) -> None:
         """Write it."""
-        try:
-            sys.stdout.write(text + "\n")
-        except UnicodeError:  # a terminal that does not know the letters
-            sys.stdout.write(text.encode("ascii", "backslashreplace").decode() + "\n")
-        sys.stdout.flush()
+        print_line(text)
