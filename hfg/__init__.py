@@ -9,13 +9,8 @@ Which floor stands on which; imports go down only, and asyncio begins on floor 5
     3  graph
     2  nodetype, functions  <-  declaration  <-  vectors, signature  <-  hints, description     registry
     1  ports                transport   sharedmemory
-<<<<<<< HEAD
-    0  errors  problem  token  types  values  limits  bounds  encoding  images  generics  clock  frames  logs  trace
-       starting  whole
-=======
     0  errors  problem  token  types  values  limits  bounds  controls  encoding  images  generics  clock  frames
-       logs  trace  starting
->>>>>>> 336363a (Names have no control characters, and whatever a verb writes has them written out (L4))
+       logs  trace  starting  whole
 
 A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
 """

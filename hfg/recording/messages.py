@@ -14,6 +14,7 @@ from typing import Any, Final, Literal
 import msgspec
 import numpy as np
 
+from hfg.encoding.pictures import need_fair_size
 from hfg.engine.observing.recorder import Told
 from hfg.errors import UsageError
 from hfg.recording import schemas
@@ -274,8 +275,13 @@ def _compress(value: np.ndarray[Any, Any], how: Images) -> bytes:
 
 def _decompress(data: str, shape: list[int]) -> np.ndarray[Any, Any]:
     cv2 = _opencv()
-    value: np.ndarray[Any, Any] = cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_UNCHANGED)
-    return value.reshape(shape)
+    packed = base64.b64decode(data)
+    need_fair_size(packed, "the picture")
+    value: Any = cv2.imdecode(np.frombuffer(packed, np.uint8), cv2.IMREAD_UNCHANGED)
+    if value is None:
+        raise CannotKeep("it is no picture that OpenCV can read, or it is not whole")
+    decoded: np.ndarray[Any, Any] = value.reshape(shape)
+    return decoded
 
 
 def _opencv() -> Any:

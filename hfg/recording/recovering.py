@@ -21,6 +21,7 @@ from hfg.recording.chunks import Damaged
 from hfg.recording.layout import read_record
 from hfg.recording.reading import RECOVERED, File, Loss
 from hfg.recording.writing import is_there
+from hfg.whole import write_whole
 
 __all__ = ["recover"]
 
@@ -46,39 +47,38 @@ def recover(
         raise UsageError(f"{output} is the recording itself: name another file, so that nothing more can be lost")
     if place.exists() and not force:
         raise is_there(place)
-    part = place.with_name(f"{place.name}.part")
-    try:
-        with File(file) as recording, part.open("wb") as stream:
-            found = _Recovering(recording).write(stream)
-        part.replace(place)
-    except OSError as error:
-        raise UsageError(f"{output} cannot be written: {error.strerror}") from None
-    finally:
-        part.unlink(missing_ok=True)
-    return found
+    with File(file) as recording:
+        recovering = _Recovering(recording)
+        try:
+            write_whole(place, recovering.write, overwrite=force)
+        except OSError as error:
+            raise UsageError(f"{output} cannot be written: {error.strerror}") from None
+    return recovering.count, recovering.losses
 
 
 class _Recovering:
-    """Copies what can be read."""
+    """Copies what can be read.
+
+    Attributes:
+      count: how many messages.
+      losses: what cannot be read.
+    """
 
     def __init__(self, recording: File) -> None:
         self._recording = recording
+        self.count = 0
+        self.losses = recording.losses()
 
-    def write(self, stream: BinaryIO) -> tuple[int, list[Loss]]:
-        recording = self._recording
-        losses = recording.losses()
-        layout = recording.layout
+    def write(self, stream: BinaryIO) -> None:
+        layout = self._recording.layout
         writer = Writer(stream, compression=CompressionType.LZ4, enable_data_crcs=True)
         writer.start(layout.profile, f"hfg {version('hfg')}")
-        losses += self._copy_what_is_beside(writer)
-        if losses:
-            said = {"from": str(recording.path.name), "losses": msgspec.json.encode(losses).decode()}
+        self.losses += self._copy_what_is_beside(writer)
+        if self.losses:
+            said = {"from": self._recording.path.name, "losses": msgspec.json.encode(self.losses).decode()}
             writer.add_metadata(RECOVERED, said)
-        count = self._copy_messages(writer)
+        self.count = self._copy_messages(writer)
         writer.finish()  # type: ignore[no-untyped-call]
-        stream.flush()
-        os.fsync(stream.fileno())
-        return count, losses
 
     def _copy_what_is_beside(self, writer: Writer) -> list[Loss]:
         layout = self._recording.layout

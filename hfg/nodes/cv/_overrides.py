@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Interval, Le, Len, MinLen, Predicate
 
+from hfg.encoding.pictures import need_fair_size
 from hfg.images import Color, Gray, Labels, Mask, Matrix, OneOf, Points, Rows
 from hfg.nodes._encodable import is_encodable
 from hfg.nodes.cv._stub import enumerations
@@ -1122,6 +1123,14 @@ def _finite(*names: str) -> Need:
     return Need(f"{' or '.join(names)} has NaN or infinity", wrong)
 
 
+def _picture_is_fair(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    try:
+        need_fair_size(bytes(inputs["buf"]), "the picture")
+    except ValueError as error:
+        return str(error)
+    return None
+
+
 def _shown(array: Any) -> str:
     return f"{array.shape[0]} x {array.shape[1]}"
 
@@ -1137,6 +1146,7 @@ _NEEDED: Final[tuple[tuple[str, Need], ...]] = (
         Need("the anchor is outside of the kernel", _anchor_is_inside),
     ),
     ("pow", Need("the array is of integers and the power is no whole number", _power_fits)),
+    ("imdecode", Need("the picture has more pixels than HFG_MOST_PICTURE_PIXELS, 134,217,728", _picture_is_fair)),
     ("convertMaps", Need("the maps have two sizes", _maps_are_alike)),
     ("drawChessboardCorners", Need("a board that was found has more or fewer corners", _corners_fill_the_board)),
     ("triangulatePoints", Need("the cameras do not see equally many points", _points_are_pairs)),

@@ -1,6 +1,6 @@
 """Reaching files: what goes wrong in one sentence, and whole files that are old or new, never half of each.
 
-Stands on `whole`.
+Stands on `whole` and bounds.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, Final, Literal, TypeAlias
+from typing import IO, Any, AnyStr, BinaryIO, Final, Literal, TypeAlias
 
 from hfg import whole
+from hfg.bounds import FILE_BYTES
 
-__all__ = ["FilePath", "find_files", "is_a_path", "named", "reaching", "write_whole"]
+__all__ = ["FilePath", "find_files", "is_a_path", "lines_of", "named", "reaching", "read_whole", "write_whole"]
 
 FilePath: TypeAlias = str | Path
 """Where a file is; relative ones begin in the working directory of the program."""
@@ -68,6 +69,35 @@ def reaching(path: FilePath, doing: Literal["read", "write"]) -> Iterator[None]:
         raise type(error)(f'cannot {doing} "{os.fspath(path)}"{where}: {reason}') from error
     except UnicodeError as error:
         raise ValueError(f'cannot {doing} "{os.fspath(path)}": {error}; set another encoding') from None
+
+
+def read_whole(path: Path) -> bytes:
+    """Read a file whole, if it is no longer than any may be; what has no end, such as a device, is refused as well.
+
+    Raises:
+      OSError: it cannot be read.
+      ValueError: it is too long.
+    """
+    most = FILE_BYTES.most
+    with reaching(path, "read"), path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        data = b"" if size > most else file.read(most + 1)
+    if max(size, len(data)) > most:
+        raise ValueError(f'"{path}" has {max(size, len(data)):,} bytes or more, {FILE_BYTES.remedy}')
+    return data
+
+
+def lines_of(file: IO[AnyStr], path: Path) -> Iterator[AnyStr]:
+    """Go through the lines of a file, none of which is longer than any may be.
+
+    Raises:
+      ValueError: one is.
+    """
+    most = FILE_BYTES.most
+    while line := file.readline(most + 1):
+        if len(line) > most:
+            raise ValueError(f'a line of "{path}" is longer than any may be, {FILE_BYTES.remedy}')
+        yield line
 
 
 def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:

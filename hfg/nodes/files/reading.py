@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias
@@ -14,10 +13,13 @@ import msgspec
 import numpy as np
 from annotated_types import MaxLen, MinLen
 
+from hfg.bounds import FILE_BYTES
+from hfg.encoding.pictures import need_fair_size
 from hfg.functions import node
 from hfg.images import AnyImage, Image
 from hfg.nodes._extras import require
-from hfg.nodes.files.access import FilePath, named, reaching
+from hfg.nodes.files.access import FilePath, named, reaching, read_whole
+from hfg.nodes.files.arrays import need_fair_arrays
 from hfg.types import Array
 
 __all__ = [
@@ -66,8 +68,9 @@ def read_text(path: FilePath, *, encoding: Encoding = "utf-8") -> str:
       ValueError: it is no text of that encoding, or the path is no path.
     """
     place = named(path)
-    with reaching(place, "read"), place.open(encoding=encoding) as file:
-        return file.read()
+    data = io.BytesIO(read_whole(place))
+    with reaching(place, "read"):
+        return io.TextIOWrapper(data, encoding=encoding).read()
 
 
 @node
@@ -83,9 +86,7 @@ def read_bytes(path: FilePath) -> bytes:
       OSError: the file cannot be read; the sentence says why.
       ValueError: the path is no path.
     """
-    place = named(path)
-    with reaching(place, "read"):
-        return place.read_bytes()
+    return read_whole(named(path))
 
 
 @node
@@ -162,6 +163,7 @@ def rows_of(
     """
     reader = csv.reader(lines, delimiter=delimiter)
     names: list[str] = []
+    lacking, most = 0, FILE_BYTES.most // 64  # of a table whose rows are shorter than its head
     try:
         for row in reader:
             if not row:
@@ -172,6 +174,9 @@ def rows_of(
                     continue
             if len(row) > len(names):
                 raise ValueError(f"it has {len(row)} values for {len(names)} columns")
+            lacking += len(names) - len(row)
+            if lacking > most:
+                raise ValueError(f"{lacking:,} values are missing up to here, {FILE_BYTES.remedy}")
             row += [""] * (len(names) - len(row))
             yield {name: _cell(cell, name, guess, columns) for name, cell in zip(names, row, strict=True)}
     except (csv.Error, ValueError) as error:
@@ -212,8 +217,11 @@ def load_array(path: Path, mode: Literal["r"] | None = None) -> Any:
         try:
             if is_zip and not zipfile.is_zipfile(path):
                 raise ValueError("its end is missing")  # numpy would leave it open
+            need_fair_arrays(path, is_zip=is_zip, whole=mode is None)
             return np.load(path, mmap_mode=mode, allow_pickle=False)
-        except (ValueError, EOFError, zipfile.BadZipFile, KeyError, SyntaxError) as error:
+        except OSError:
+            raise
+        except Exception as error:  # what numpy and zipfile raise, whatever is in a file: a dozen kinds
             raise ValueError(f'"{path}" is no file of numpy without Python objects: {error}') from None
 
 
@@ -257,7 +265,9 @@ def read_arrays(path: FilePath) -> dict[str, Array]:
     with found, reaching(place, "read"):
         try:
             return {name: found[name] for name in found.files}
-        except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        except OSError:
+            raise
+        except Exception as error:  # see `load_array`
             raise ValueError(f'"{path}" cannot be read: {error}') from None
 
 
@@ -269,7 +279,9 @@ def load_image(path: FilePath, mode: Literal["color", "gray", "raw"]) -> Any:
       ValueError: it is no picture.
     """
     cv2 = require("cv2", "vision")
-    data = np.frombuffer(read_bytes.function(path), dtype=np.uint8)
+    whole = read_bytes.function(path)
+    need_fair_size(whole, f'"{path}"')
+    data = np.frombuffer(whole, dtype=np.uint8)
     flag = {"color": cv2.IMREAD_COLOR, "gray": cv2.IMREAD_GRAYSCALE, "raw": cv2.IMREAD_UNCHANGED}[mode]
     try:
         image = cv2.imdecode(data, flag) if len(data) else None

@@ -14,7 +14,7 @@ from annotated_types import MaxLen, MinLen, Predicate
 
 from hfg.errors import EndOfStream
 from hfg.images import Image
-from hfg.nodes.files.access import find_files, is_a_path, named, reaching
+from hfg.nodes.files.access import find_files, is_a_path, lines_of, named, reaching
 from hfg.nodes.files.keyboard import lines_of_standard_input
 from hfg.nodes.files.reading import Column, json_of, load_array, load_image, rows_of
 from hfg.nodetype import Node
@@ -57,7 +57,7 @@ class TextLines(Node):
             while some:
                 some = False
                 with place.open(encoding=self.encoding) as file:
-                    for line in file:
+                    for line in lines_of(file, place):
                         some = self.loop  # an empty file has no lines to begin again with
                         yield line.removesuffix("\n")
 
@@ -95,7 +95,7 @@ class JsonLines(Node):
             while some:
                 some = False
                 with place.open("rb") as file:
-                    for number, line in enumerate(file, 1):
+                    for number, line in enumerate(lines_of(file, place), 1):
                         if not line.strip():
                             continue
                         some = self.loop
@@ -150,7 +150,8 @@ class CsvRows(Node):
             while some:
                 some = False
                 with place.open(encoding=self.encoding, newline="") as file:
-                    for row in rows_of(file, place, self.delimiter, self.header, self.guess, self.columns):
+                    lines = lines_of(file, place)
+                    for row in rows_of(lines, place, self.delimiter, self.header, self.guess, self.columns):
                         some = self.loop
                         yield row
 

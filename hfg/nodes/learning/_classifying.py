@@ -10,7 +10,7 @@ import numpy as np
 from annotated_types import MinLen, Predicate
 
 from hfg.nodes._pictures import refusal
-from hfg.nodes.files.access import is_a_path, named, reaching
+from hfg.nodes.files.access import is_a_path, named, read_whole
 from hfg.nodes.learning._models import model_of, table_of
 from hfg.nodes.learning._samples import Sample
 from hfg.nodetype import Node
@@ -78,9 +78,7 @@ class Classifier(Node):
         if not path.exists():
             self.missing.trigger(self.path)
             return
-        with reaching(path, "read"):
-            data = path.read_bytes()
-        self.model = model_of(data, self.path)
+        self.model = model_of(read_whole(path), self.path)
 
     def _votes(self, samples: Sequence[Sample]) -> list[dict[int, float]]:
         table = table_of(samples, self.model.getVarCount())

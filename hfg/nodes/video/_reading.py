@@ -7,17 +7,22 @@ waits for that thread, for OpenCV ends the process if a capture is released whil
 from __future__ import annotations
 
 import asyncio
+import glob
+import re
 import threading
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import cv2
 from annotated_types import Ge, Gt
 
 from hfg.clock import now
+from hfg.encoding.pictures import need_fair_size, pixels_problem
 from hfg.errors import EndOfStream
 from hfg.images import Image
 from hfg.nodes._encodable import need_encodable
+from hfg.nodes.files.access import find_files
 from hfg.nodetype import Node
 from hfg.ports import Output, Parameter, State
 
@@ -65,6 +70,25 @@ class _Capture:
             self._capture.release()
 
 
+_SIDES: Final = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
+_HEADER: Final = 2**16
+
+
+def _need_fair_pictures(pattern: str) -> None:
+    """Look at the pictures that a pattern like "pictures/%04d.png" names: OpenCV decodes them whole, whatever they are.
+
+    Raises:
+      ValueError: one is too large.
+    """
+    parts = re.split(r"%0?\d*d", pattern)
+    found: list[Path] = []
+    with suppress(FileNotFoundError):  # which OpenCV says as well
+        found = find_files("*".join(map(glob.escape, parts)), "name")
+    for path in found:
+        with path.open("rb") as file:
+            need_fair_size(file.read(_HEADER), f'"{path}"')
+
+
 class VideoFile(Node):
     """Read a video file, picture by picture.
 
@@ -84,7 +108,8 @@ class VideoFile(Node):
 
     Raises:
       FileNotFoundError: there is no such file.
-      ValueError: OpenCV cannot read the file as a video, or it is over before `start`.
+      ValueError: OpenCV cannot read the file as a video, a picture has more pixels than are allowed, or the video is
+        over before `start`.
     """
 
     path = Parameter("", pattern="*")
@@ -111,11 +136,17 @@ class VideoFile(Node):
 
     def _open(self) -> None:
         self._close()
+        if "%" in self.path:
+            _need_fair_pictures(self.path)
         capture = self.capture = _Capture(self.path)
         if not capture.is_open:
             raise ValueError(
                 f'"{self.path}" cannot be read as a video: it is damaged, or of a kind that this OpenCV does not know'
             )
+        problem = pixels_problem(*(int(capture.get(side)) for side in _SIDES))
+        if problem is not None:
+            self._close()
+            raise ValueError(f'"{self.path}" {problem}')
         rate = capture.get(cv2.CAP_PROP_FPS)
         self.frame_s = 1 / rate if 0 < rate < 10_000 else 1 / 25  # a sequence of pictures has no rate
         self.position = 0
