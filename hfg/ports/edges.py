@@ -391,6 +391,7 @@ class EventEdge(_QueueEdge):
       overflow: what happens to a token too many.
       full: a `wait` edge that holds `capacity` or more: its source starts nothing new (F8).
       grown: how often F8 made it longer.
+      ripening: how much its operators hold back until its time has come (P9).
       pipeline: feeds a token to the operators on the edge (P9), or None.
       complete: tells the operators that no more comes; None: there are none, or they know.
       renew: connects the operators afresh, for a node that starts afresh; or None.
@@ -407,6 +408,7 @@ class EventEdge(_QueueEdge):
         "overflow",
         "pipeline",
         "renew",
+        "ripening",
     )
 
     def __init__(
@@ -425,6 +427,7 @@ class EventEdge(_QueueEdge):
         self.overflow: Overflow = overflow
         self.full = False
         self.grown = 0
+        self.ripening = 0
         self.end_sent = False
         self.pipeline: Callable[[Token[Any]], None] | None = None
         self.complete: Callable[[], None] | None = None
@@ -461,6 +464,10 @@ class EventEdge(_QueueEdge):
         """F8: one more place."""
         self.capacity += 1
         self.grown += 1
+
+    def ripen(self, how_much: int) -> None:
+        """P9: its operators hold back so much more until its time has come."""
+        self.ripening += how_much
 
     def say_end(self) -> None:
         """F13: END is put on it, once; what comes later is dropped."""

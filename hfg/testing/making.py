@@ -90,6 +90,7 @@ class Allowed:
     retries: bool = False  # firings that fail are tried again
     tasks: bool = False  # nodes start something beside their firings, outside of subgraphs
     doing: bool = False  # nodes have do-activities
+    rings: bool = False  # of requests and answers, which only queues hold up, beside what goes on anyway
     through: bool = False  # operators on edges, with schedulers and without
     iteration: bool = False  # inside of iteration
     endings: bool = False  # last words, sources without end that work for who will have ended
@@ -177,8 +178,11 @@ _PAUSING = ("SpeaksLater", "SpeaksTwiceLater", "LendsLater", "PassingLater", "Ut
 FEEDS = ("red", "blue")
 """The inputs of graphs that are fed from outside."""
 
-_TENDING = ("Tends", "Beats")
+_TENDING = ("Tends", "Beats", "Gate", "Watch")
 """Whose code starts tasks."""
+
+_ANSWERING = ["slow_double", "slow_double", "double", "Waiting", "some", "Pulse", "add"]
+"""What stands between a question and its answer."""
 
 _WAITING = {
     "ascript",
@@ -267,6 +271,27 @@ class _Making:
             self.nodes.append(NodePlan(f"n{number}", kind, self._parameters(kind), self._options(kind)))
             if kind in _BEHIND:
                 self.nodes.append(NodePlan(f"n{number}behind", _BEHIND[kind]))
+
+    def make_rings(self) -> None:
+        """Requests that come back as answers into a slot, and beside them what lives on, whatever becomes of them."""
+        choose = self.choose
+        for number in range(choose.number(1, 2)):
+            gate, worker = f"gate{number}", f"worker{number}"
+            how = choose.one_of(["burst", "task", "both", "again"])
+            self.nodes.append(NodePlan(gate, "Gate", {"count": choose.number(1, 9), "how": how}))
+            kind = choose.one_of(_ANSWERING)
+            answering = NodePlan(worker, kind, self._parameters(kind), self._options(kind))
+            self.nodes.append(answering)
+            inputs, outputs = description(kind).inputs, description(kind).outputs
+            self._edge((gate, "event", "request"), (worker, "input", next(iter(inputs))))
+            if "b" in inputs:
+                self._edge((gate, "event", choose.one_of(["aside", "request"])), (worker, "input", "b"))
+            answer = (worker, "event", "pulse") if kind == "Pulse" else (worker, "output", next(iter(outputs)))
+            self._edge(answer, (gate, "slot", "answer"))
+            self._edge(("", "event", "start"), (gate, "slot", "begin"))
+        if choose.chance(80):
+            given = {"period_s": choose.one_of([0.02, 0.007]), "count": choose.number(2, 8)}
+            self.nodes.append(NodePlan("watch", "Watch", given))
 
     def _inner_kinds(self) -> list[str]:
         kinds = list(_INNER)
@@ -659,6 +684,8 @@ def make_plan(choose: Chooser, allowed: Allowed | None = None) -> GraphPlan:
     allowed = allowed or Allowed()
     making = _Making(choose, allowed)
     making.make_nodes()
+    if allowed.rings:
+        making.make_rings()
     making.make_edges()
     boxes = making.make_boxes() if allowed.boxes else []
     gates = making.make_gates() if allowed.gates else []

@@ -32,6 +32,7 @@ __all__ = [
     "EachOfThose",
     "Effort",
     "Failing",
+    "Gate",
     "Greeter",
     "Hums",
     "LastWord",
@@ -65,6 +66,7 @@ __all__ = [
     "Utters",
     "UttersLater",
     "Waiting",
+    "Watch",
     "Works",
     "add",
     "ascript",
@@ -1083,6 +1085,67 @@ class Works(hfg.Node):
             self.told.trigger(100 + int(self.active))
             if self.manner == "resists":
                 raise
+
+
+class Gate(hfg.Node):
+    """Asks by an event and hears the answers by a slot: a ring, held open by nothing but the queue of what it asks.
+
+    The `how` says what asks: the slot that begins, a task, both, or each answer once more.
+    """
+
+    request = hfg.Event(int)
+    aside = hfg.Event(int)
+    count = hfg.Parameter(5)
+    how = hfg.Parameter("burst")
+    begun: Any = hfg.State(0)
+    heard: Any = hfg.State(0)
+
+    @hfg.slot
+    def begin(self) -> None:
+        """Ask; once, so that rings end."""
+        self.begun += 1
+        if self.begun > 1:
+            return
+        if self.how in ("task", "both"):
+            self.start_soon(self.pump())
+        if self.how in ("burst", "both", "again"):
+            for number in range(self.count):
+                self.request.trigger(number)
+            self.aside.trigger(-1)
+
+    async def pump(self) -> None:
+        """Ask as fast as there is room, and say something else now and then."""
+        for number in range(self.count):
+            await self.request.trigger_wait(10 + number)
+            if number % 3 == 2:
+                self.aside.trigger(number)
+        self.aside.trigger(-2)
+
+    @hfg.slot
+    def answer(self, value: int) -> None:
+        """Count; perhaps ask twice more for each of the first answers."""
+        self.heard += 1
+        if self.how == "again" and self.heard <= 4:
+            self.request.trigger(value + 1)
+            self.request.trigger(value + 2)
+
+
+class Watch(hfg.Node):
+    """Lives beside everything else: a task that speaks to nobody in particular, for longer than most."""
+
+    tick = hfg.Event(int)
+    period_s = hfg.Parameter(0.02)
+    count = hfg.Parameter(6)
+
+    def setup(self) -> None:
+        """Begin."""
+        self.start_soon(self.ticks())
+
+    async def ticks(self) -> None:
+        """Tell the time."""
+        for number in range(self.count):
+            await asyncio.sleep(self.period_s)
+            self.tick.trigger(number)
 
 
 @hfg.node

@@ -339,6 +339,7 @@ class Core:
         self.tasks = 0
         self.iterating: list[Iteration] = []  # subgraphs amid a firing in which they iterate, inner ones behind (G4)
         self.full_edges = 0  # queues that hold their sources back (F8)
+        self.suspects: dict[Worker, None] = {}  # held back so, and perhaps in a ring that has closed
         self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
         self.timers = 0
         self.pumping = False

@@ -144,6 +144,7 @@ class Flight:
         if self.working:
             self.working = False
             self.worker.core.come_back()
+            self.worker.tell_watchers()
         return had
 
     def limit(self, timer: Timer) -> None:

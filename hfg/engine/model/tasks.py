@@ -170,6 +170,7 @@ class Tasks:
         """F8: so many more of them await `trigger_wait`."""
         self.waiting_room += how_many
         self._worker.core.waiting_room += how_many
+        self._worker.core.suspects[self._worker] = None
 
     def cancel(self) -> None:
         """Let all of them end; what is about to has been told once, and may take its time."""

@@ -162,6 +162,7 @@ class Worker(Vertex):
         "ticket",
         "unfit",
         "waiting_room",
+        "watchers",
         "written",
     )
 
@@ -196,6 +197,7 @@ class Worker(Vertex):
         self.full_edges = 0
         self.waiting_room = 0  # its code awaits trigger_wait
         self.room_waiters: list[Callable[[], None]] | None = None
+        self.watchers: dict[Worker, None] | None = None  # held back by full queues, and in no ring while this works
         self.on_idle: list[Callable[[], None]] | None = None  # what waits until it is not busy
 
     def _is_looked_at_by_nobody(self) -> None:
@@ -405,6 +407,8 @@ class Worker(Vertex):
         """The time has come for which a rate held it."""
         self.rate_timer = None
         self.blocked &= ~RATE
+        if self.watchers is not None:
+            self.tell_watchers()
 
     def forget_rate(self) -> None:
         """What the rate would have let start is gone."""
@@ -431,6 +435,7 @@ class Worker(Vertex):
         """F8: one more queue of its events is full."""
         self.full_edges += 1
         self.core.full_edges += 1
+        self.core.suspects[self] = None
         self.block(FULL)
 
     def queue_free(self) -> bool:
@@ -439,6 +444,8 @@ class Worker(Vertex):
         self.core.full_edges -= 1
         if self.full_edges:
             return False
+        if self.watchers is not None:
+            self.tell_watchers()
         self.room_for_all()
         return True
 
@@ -458,6 +465,19 @@ class Worker(Vertex):
         """F8: so much more of its own code awaits `trigger_wait`."""
         self.waiting_room += how_many
         self.core.waiting_room += how_many
+        self.core.suspects[self] = None
+
+    def be_watched_by(self, held: Worker) -> None:
+        """F8: what is held back by a full queue is in no ring as long as code of this one goes on, or its timer."""
+        if self.watchers is None:
+            self.watchers = {}
+        self.watchers[held] = None
+
+    def tell_watchers(self) -> None:
+        """F8: that is over, so they are looked at again."""
+        if self.watchers is not None:
+            self.core.suspects.update(self.watchers)
+            self.watchers = None
 
     # --- what is under way (F3, F9, X2) -----------------------------------------------------------------------------
 
@@ -631,6 +651,8 @@ class Worker(Vertex):
         """Its code is over, or given up; a node that a thread has worked with sees its activity again."""
         self.in_flight = False
         self.core.come_back()
+        if self.watchers is not None:
+            self.tell_watchers()
         if self.job is not None:
             self.leave_job()
 

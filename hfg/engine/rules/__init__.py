@@ -10,6 +10,7 @@ wiring      which edges are live         subgraphs   as wholes
 lifecycle   setup, teardown, restart, disable, enable
 sharing     what becomes of it when a value that is shared is changed
 ending      of one node                  sources     which rest, or work for nobody
+rings       queues that grow where nodes wait for each other (F8)
 quiet       what happens when nothing moves          errors  what becomes of failures
 iterating   when what iterates lets the next element in (G4)
 """

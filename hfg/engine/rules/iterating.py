@@ -12,7 +12,7 @@ from typing import Any
 from hfg.engine.model.core import Core
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import firing, quiet
+from hfg.engine.rules import firing, quiet, rings
 from hfg.engine.rules.releasing import take_from_reader
 from hfg.engine.rules.sending import put_outputs
 from hfg.token import NO_MESSAGE, Marker
@@ -56,12 +56,15 @@ def step(worker: Worker) -> None:
 
 
 def _settle(iteration: Iteration) -> bool:
-    """If the inside is quiet go on, by a longer queue if that is what is wanting there (F8); whether it was."""
+    """If the inside is quiet, and no ring there waits for a longer queue (F8), go on; whether it was."""
     core = iteration.worker.core
     if not iteration.is_under_way or core.over or iteration.is_moving():
         return False
-    if quiet.grow(core, iteration.members):
-        return True
+    if core.full_edges and any([rings.is_held(worker) for worker in iteration.members]):  # noqa: C419 - each sets its timer
+        if rings.resolve(core):
+            return True
+        if iteration.is_moving():
+            return False
     _go_on(iteration)
     return True
 

@@ -1,4 +1,4 @@
-"""What happens when nothing moves: queues grow, events end, the run ends or has stalled (rules F8, F13, P9, R5).
+"""What happens when nothing moves: events end, the run ends or has stalled (rules F13, P9, R5).
 
 Decides only; `run` asks when it sees that no code runs, no worker is queued and no timer is pending. Stands on
 `ending` and `sources`.
@@ -23,97 +23,28 @@ from hfg.engine.model.worker import (
     UNWIRED,
     Worker,
 )
-from hfg.engine.rules.agenda import freed, must_wait
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.modifiers import derive_scopes, receive
 from hfg.engine.rules.sending import enqueue, put_outputs
 from hfg.engine.rules.sources import judge_sources
-from hfg.errors import QueueLimit, Stalled
+from hfg.errors import Stalled
 from hfg.ports.edges import AnyEdge, EventEdge
 from hfg.token import END
-from hfg.trace import QueueGrown
 
 __all__ = [
     "complete_edge",
     "complete_operators",
     "end_events",
     "give_up",
-    "grow",
-    "grow_queue",
     "node_ended",
     "only_futile_in_flight",
     "only_waiting_for_room",
-    "smallest_full",
     "stall",
     "stalled",
     "stuck",
     "unread",
     "waits_for",
 ]
-
-
-def grow(core: Core, among: Sequence[Worker] | None = None) -> bool:
-    """F8: if only full queues hold nodes back, the smallest of them gets one more place; whether that was so.
-
-    Args:
-      core: the run.
-      among: those inside of a subgraph that iterates, where nothing else moves (G4); else all.
-    """
-    edge = smallest_full(core, among)
-    if edge is not None:
-        grow_queue(core, edge)
-    return edge is not None
-
-
-def smallest_full(core: Core, among: Sequence[Worker] | None = None) -> EventEdge | None:
-    """F8: give the queue that is to grow now that nothing moves, if that would let a node go on."""
-    if not core.full_edges:
-        return None
-    if among is None and any(reader.inputs_ready() for reader in core.readers):
-        return None  # somebody outside holds a node back: growing would not help, only fill memory
-    workers = core.workers if among is None else among
-    if any([_rate_holds(worker) for worker in workers]):  # noqa: C419 - each sets its timer
-        return None
-    held = [worker for worker in workers if _held_by_queue_alone(worker)]
-    full = [edge for worker in held for edge in worker.event_edges() if edge.full]
-    return min(full, key=lambda one: (one.capacity, one.index), default=None)
-
-
-def grow_queue(core: Core, edge: EventEdge) -> None:
-    """F8: this queue gets one more place, or the run fails, for it may not grow."""
-    if edge.capacity_limit is not None and edge.capacity >= edge.capacity_limit:
-        core.host.finish(
-            "failed",
-            QueueLimit(
-                f'queue of "{edge.label}" holds {len(edge.queue)} signals, nothing else can move, and its '
-                f"capacity_limit = "
-                f"{edge.capacity_limit} forbids it to grow: raise the limit or let the consumer take more "
-                f"than it is sent"
-            ),
-        )
-        return
-    edge.grow()
-    if core.seldom is not None:
-        core.seldom(QueueGrown(core.now(), edge.label, edge.capacity))
-    freed(edge)
-    core.host.kick()
-
-
-def _held_by_queue_alone(worker: Worker) -> bool:
-    if not worker.blocked & FULL:
-        return False
-    if worker.waiting_room or (worker.tasks is not None and worker.tasks.waiting_room):
-        return True
-    if worker.calls and FULL <= worker.blocked < BACKOFF:
-        return True
-    return worker.blocked == FULL and not worker.inputs.missing and not worker.outputs.missing
-
-
-def _rate_holds(worker: Worker) -> bool:
-    """Its rate holds it beside a full queue: that is to be over first, for a timer is pending (SEMANTICS "quiet")."""
-    if not worker.paced or worker.blocked != FULL or worker.inputs.missing or worker.outputs.missing:
-        return False
-    return must_wait(worker)
 
 
 def complete_operators(core: Core) -> bool:
@@ -204,7 +135,7 @@ def only_futile_in_flight(core: Core, *, threads_too: bool) -> bool:
 
 
 def only_waiting_for_room(core: Core) -> bool:
-    """F8: all code under way waits until a full queue has room, so it does not keep the graph from being quiet."""
+    """F8: all code under way waits until a full queue has room, which nothing brings now, so it keeps nobody up."""
     return sum(worker.codes_waiting_for_room() for worker in core.workers) >= core.in_flight + core.tasks
 
 

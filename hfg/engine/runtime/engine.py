@@ -26,7 +26,7 @@ from hfg.engine.model.policies import make_policy
 from hfg.engine.model.sharing import Sharing
 from hfg.engine.model.tasks import Doing
 from hfg.engine.model.worker import Worker
-from hfg.engine.rules import iterating, quiet
+from hfg.engine.rules import iterating, quiet, rings
 from hfg.engine.runtime import plan, rx
 from hfg.engine.runtime.callbacks import Callbacks
 from hfg.engine.runtime.settings import Settings
@@ -343,6 +343,8 @@ class Engine:
             call()
         if self.ended_how is not None or self._rests():
             return
+        if core.suspects:
+            rings.resolve(core)
         went_on = bool(self.core.iterating) and iterating.settle(self.core)
         if policy or self._ready_groups or went_on:
             self.kick()
@@ -524,14 +526,15 @@ class Engine:
         return quiet.only_futile_in_flight(self.core, threads_too=not self.virtual)
 
     def quiet(self) -> None:
-        """Nothing runs, nothing can start, no timer is pending (F8, P9, F13, R5)."""
+        """Nothing runs, nothing can start, no timer is pending (P9, F13, R5)."""
         core = self.core
         if any(not feed.outputs.missing for feed in self.senders):
             return  # a token is about to come
         if self._agreement is not None:
             self._agreement()
             return
-        if quiet.grow(core) or core.timers or self.is_held_open():
+        rings.look_at_all(core)
+        if rings.resolve(core) or core.timers or self.is_held_open():
             return
         if self.give_up() or self.complete_operators() or core.timers > 0 or self.end_events():
             return

@@ -83,13 +83,15 @@ class RunScheduler(PeriodicScheduler):
 class _EdgeScheduler(RunScheduler):
     """For operators on one edge: what is to be done now is done at once, one after the other (P9).
 
-    As reactivex does it where nobody names a scheduler. What never comes to an end lets the loop have its turn. Inside
-    of what iterates the next element waits until nothing is pending any more (G4).
+    As reactivex does it where nobody names a scheduler. What never comes to an end lets the loop have its turn. Who
+    waits for the edge waits for a timer while something is pending (F8), and so does the next element of what iterates
+    around it (G4).
     """
 
-    def __init__(self, host: Host, within: Iteration | None) -> None:
+    def __init__(self, host: Host, edge: EventEdge) -> None:
         super().__init__(host)
-        self._within = within
+        self._edge = edge
+        self._within: Iteration | None = edge.target.within
         self._due: deque[Callable[[], None]] = deque()
         self._at_work = False
 
@@ -109,12 +111,11 @@ class _EdgeScheduler(RunScheduler):
 
     @override
     def _at(self, when: float, action: abc.ScheduledAction[Any], state: Any) -> abc.DisposableBase:
-        within = self._within
-        if within is None:
-            return super()._at(when, action, state)
         pending = SingleAssignmentDisposable()
-        pending.disposable = Disposable(within.timer_over)  # once, whether it rings or is given up
-        within.set_timer()
+        pending.disposable = Disposable(self._over)  # once, whether it rings or is given up
+        self._edge.ripen(1)
+        if self._within is not None:
+            self._within.set_timer()
 
         def ring(scheduler: abc.SchedulerBase, state: Any) -> abc.DisposableBase | None:
             pending.dispose()
@@ -122,6 +123,11 @@ class _EdgeScheduler(RunScheduler):
 
         timer = super()._at(when, ring, state)
         return CompositeDisposable(timer, pending)
+
+    def _over(self) -> None:
+        self._edge.ripen(-1)
+        if self._within is not None:
+            self._within.timer_over()
 
     def _work(self) -> None:
         self._at_work = True
@@ -139,7 +145,7 @@ def pipe_edge(edge: EventEdge, operators: tuple[Any, ...], host: Host) -> Callab
     """Put operators on an event edge, in front of its queue; gives back what takes them off."""
     newest: float | None = None
     subscription = SerialDisposable()
-    scheduler = _EdgeScheduler(host, edge.target.within)
+    scheduler = _EdgeScheduler(host, edge)
 
     def connect() -> None:
         nonlocal newest

@@ -16,7 +16,7 @@ from typing import Any, Final, Protocol
 
 from hfg.engine.face.composition import Composition
 from hfg.engine.model.worker import ENDED, Worker
-from hfg.engine.rules import quiet
+from hfg.engine.rules import quiet, rings
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import HfgError, UsageError
@@ -515,7 +515,7 @@ class Part:
             case "lose":
                 return self._lose(question.value)
             case "fullest":
-                edge = quiet.smallest_full(engine.core)
+                edge = rings.smallest_at_rest(engine.core)
                 return None if edge is None else (edge.capacity, edge.index, edge.label)
             case "grow":
                 return self._grow(question.value)
@@ -546,7 +546,7 @@ class Part:
     def _grow(self, label: str) -> None:
         for edge in self.engine.core.edges:
             if edge.label == label and isinstance(edge, EventEdge):
-                quiet.grow_queue(self.engine.core, edge)
+                rings.grow_queue(self.engine.core, edge)
                 return
         raise Untrue(f'that queue "{label}" is to grow, which is none here')
 

@@ -1,9 +1,8 @@
 """The reference machine: which moves the rules permit, and what each of them does.
 
 `moves()` lists every decision that a scheduler may take now; `apply(move)` takes one and gives what an observer sees of
-it. Where it is quiet, the steps that
-follow from quiet alone are the moves: time goes on (R6), a queue grows (F8), operators complete (P9), events end (F13),
-  the run ends (R5).
+it. Where it is quiet, the steps that follow from quiet alone are the moves: time goes on (R6), operators complete (P9),
+events end (F13), the run ends (R5).
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from hfg.errors import QueueLimit, Stalled, UsageError
-from hfg.testing.reference.edits import Editing
+from hfg.testing.reference.rings import Rings
 from hfg.testing.reference.state import Flight, Line, Station, Task
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
@@ -90,7 +89,7 @@ class Move:
         return f'{self.kind} "{self.node}"' + (f" in firing {self.number}" if self.number else "")
 
 
-class ReferenceMachine(Editing):
+class ReferenceMachine(Rings):
     """A run of a graph whose every decision is taken from outside.
 
     Args:
@@ -178,10 +177,7 @@ class ReferenceMachine(Editing):
         return move.kind == "call" or (move.kind == "go on" and self.stations[index].is_calling)
 
     def working_moves(self, only: Collection[int] | None = None) -> list[Move]:
-        """Firings, calls, and what goes on in those under way; of all nodes, or `only` of some.
-
-        Also the queues that grow inside of what iterates, where it is quiet whatever the others do (F8, G4).
-        """
+        """Firings, calls, and what goes on in those under way, of all nodes or `only` of some; and rings that grow."""
         found = self.moves_at_the_border()
         for index, station in enumerate(self.stations):
             if only is not None and index not in only:
@@ -197,7 +193,7 @@ class ReferenceMachine(Editing):
         return found
 
     def moves_at_the_border(self) -> list[Move]:
-        """What comes from outside, what somebody outside takes, timers, and slots of the graph and of subgraphs."""
+        """What comes from outside or is taken there, timers, slots of the graph and of subgraphs, and rings (F8)."""
         found = [Move("feed", edge=name) for name, values in self.feeding.items() if values and self.can_feed(name)]
         found += self.timers_due()
         found += [Move("read", edge=line.edge.label) for line in self.lines if line.queue and self.is_read(line)]
@@ -205,7 +201,7 @@ class ReferenceMachine(Editing):
             line = self.next_call(owner)
             if line is not None and not self.full_lines(owner):
                 found.append(Move("call", self.path_of(owner), line.edge.label))
-        return found
+        return found + [Move("grow", edge=line.edge.label) for line in self.queues_to_grow()]
 
     def moves_of(self, flight: Flight, index: int, station: Station) -> list[Move]:
         """How a firing or call that is under way may go on."""
@@ -213,10 +209,6 @@ class ReferenceMachine(Editing):
         number = flight.number if station.is_concurrent and flight.what == "firing" else 0
         if self.can_go_on(flight):
             found.append(Move("go on", station.path, number=number))
-        elif flight.elements is not None:
-            inside = self.all_inside(index)
-            line = None if self.is_moving_inside(index, inside) else self.queue_to_grow(inside)
-            found += [] if line is None else [Move("grow", edge=line.edge.label)]
         limit = station.leaf.options.max_duration_s
         if limit is not None and self.is_limited(flight) and self.is_over(flight.began + limit):
             found.append(Move("time out", station.path, number=number))
@@ -249,10 +241,10 @@ class ReferenceMachine(Editing):
     def can_iterate(self, index: int) -> bool:
         """Whether the next element may go in: it is quiet inside (G4)."""
         inside = self.all_inside(index)
-        return not self.is_moving_inside(index, inside) and self.queue_to_grow(inside) is None
+        return not self.is_moving_inside(index, inside)
 
     def is_moving_inside(self, index: int, inside: Set[int]) -> bool:
-        """Whether something happens inside an iterating subgraph, or will when time goes on; full queues apart."""
+        """Whether something happens inside an iterating subgraph, or will when time goes on."""
         boxes = [box for box in self.structure.boxes if inside & set(box.members)]
         paths = {self.stations[number].path for number in inside} | {box.path for box in boxes}
         for move in self.working_moves(inside):
@@ -274,7 +266,14 @@ class ReferenceMachine(Editing):
         """Whether a node works, or waits for a time to come; not if its code waits until a queue has room (F8)."""
         station = self.stations[index]
         works = any(not work.waiting_for for work in station.work)
-        return works or station.resting_until is not None or self.may_fire(index, ignore="timers")
+        return works or station.resting_until is not None or self.waits_for_rate(index)
+
+    def waits_for_rate(self, index: int) -> bool:
+        """Whether it fires when its time has come, or is held by a full queue alone then."""
+        if self.may_fire(index, ignore="timers"):
+            return True
+        by_time = self.is_held_by_time(index) or self.is_resting(index)
+        return by_time and not self.stations[index].is_busy and self.may_fire(index, ignore="timers and queues")
 
     def all_inside(self, index: int) -> set[int]:
         """Give all nodes inside an iterating subgraph."""
@@ -325,15 +324,16 @@ class ReferenceMachine(Editing):
             if self.until_s is not None and due > self.until_s + MOMENT_S:
                 return [Move("finish", outcome="until", time=self.until_s)]
             return [Move("wait", time=due)]
-        line = self.queue_to_grow()
-        if line is not None:
-            return [Move("grow", edge=line.edge.label)]
         busy = any(
-            (bool(station.tasks) or any(flight.over is None for flight in station.flights))
+            (any(not task.waiting_for for task in station.tasks) or any(map(self.is_unfinished, station.flights)))
             and (index not in moot or station.is_calling)
             for index, station in enumerate(self.stations)
-        )  # but not what is over and waits for its turn behind a token that nobody takes (F14)
+        )
         return [] if busy or self.held_open else [self.closing_move()]
+
+    def is_unfinished(self, flight: Flight) -> bool:
+        """Whether more may come of it: not of what is over and waits for its turn (F14), nor of what waits for room."""
+        return flight.over is None and not flight.waiting_for
 
     def closing_move(self) -> Move:
         """What is next when only the end is left.
@@ -375,26 +375,6 @@ class ReferenceMachine(Editing):
             if line.operators is not None and (due := line.operators.due()) is not None:
                 times.append(max(due, self.now))
         return min((time for time in times if time is not None), default=None)
-
-    def queue_to_grow(self, only: Collection[int] | None = None) -> Line | None:
-        """F8: if only full queues hold nodes back, of all or `only` of some, the smallest of those queues."""
-        full: list[Line] = []
-        for index, station in enumerate(self.stations):
-            if only is not None and index not in only:
-                continue
-            waits = any(work.waiting_for for work in station.work)
-            held = (not station.is_busy and self.may_fire(index, ignore="queues")) or (
-                not (station.is_calling if station.is_concurrent else station.flights)
-                and self.next_call(index) is not None
-            )
-            if waits or (held and station.resting_until is None):
-                full += self.full_lines(index)
-        for box in self.structure.boxes:
-            if only is not None and not set(box.members) & set(only):
-                continue
-            if self.next_call(-2 - box.index) is not None:
-                full += self.full_lines(-2 - box.index)
-        return min(full, key=lambda line: (line.capacity, line.edge.index), default=None)
 
     def events_to_end(self) -> list[Line]:
         """F13: live event edges into inputs whose queues are empty, once an edge; who has ended needs no telling."""
