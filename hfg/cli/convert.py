@@ -5,6 +5,7 @@ Stands on `target`, `show` and the files' floor.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -33,7 +34,11 @@ def convert(
     arg: ArgOption = None,
     allow: AllowOption = None,
     json_schema: Annotated[
-        bool, typer.Option("--schema", help="Write the JSON schema of graph files, for editors, instead of a graph.")
+        bool,
+        typer.Option(
+            "--schema",
+            help="Write the JSON schema of graph files, for editors, with all installed or allowed node types.",
+        ),
     ] = False,
     json: Annotated[
         bool, typer.Option("--json", help="Of a file of CS::APEX: write what became of each part as JSON.")
@@ -48,7 +53,7 @@ def convert(
     if json_schema:
         if out is not None:
             raise TargetError("--schema needs no TARGET: write hfg convert --schema FILE, or leave FILE out")
-        return _write_schema(target)
+        return _write_schema(target, allow or ())
     if target is None:
         raise TargetError("there is no TARGET: write hfg convert graph.py graph.hfg.yaml")
     if target.endswith(SUFFIXES):
@@ -85,12 +90,13 @@ def _import_apex(target: str, out: Path | None, json: bool) -> int:
     return 0
 
 
-def _write_schema(file: str | None) -> int:
+def _write_schema(file: str | None, allow: Sequence[str]) -> int:
+    text = schema(types=True, allow=allow)
     if file is None:
-        show.write(schema())
+        show.write(text)
         return 0
     try:
-        write_whole(Path(file), lambda stream: stream.write(schema().encode()))
+        write_whole(Path(file), lambda stream: stream.write(text.encode()))
     except OSError as error:
         show.sentence(f"{file} cannot be written: {error.strerror}")
         return 2

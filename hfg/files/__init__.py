@@ -4,7 +4,7 @@
     building      a graph of a document        describing    a document of a graph
     reading       a document of a text         writing       a text of a document, into a file
     parsing       YAML with lines, in limits   emitting      YAML, one thing a line
-    document      what a file says, as structs schema        the same as a JSON schema
+    document      what a file says, as structs schema        the same as a JSON schema; typed: with node types
     boxes         types of subgraphs           missing       stands in for types that are not there
     allowed       what may be imported         values        parameters as plain data
     findings      what is wrong, where              apex           files of CS::APEX

@@ -139,11 +139,30 @@ def write(document: Document, path: str | os.PathLike[str]) -> None:
         raise UsageError(f"{file} cannot be written ({error.strerror}); what was there before is as it was") from error
 
 
-def schema() -> str:
-    """Give the JSON schema of graph files, as text."""
-    from hfg.files.schema import schema_text
+def schema(*, types: bool = False, allow: Iterable[str] = ()) -> str:
+    """Give the JSON schema of graph files, as text.
 
-    return schema_text()
+    Args:
+      types: whether it knows the installed node types with their parameters: editors complete and check these then.
+      allow: packages whose node types it knows too.
+
+    Raises:
+      UsageError: a package cannot be imported.
+    """
+    from hfg.files.schema import json_schema, schema_text
+
+    if not types and not allow:
+        return schema_text(json_schema())
+    from hfg.catalogue import installed, types_of
+    from hfg.files.typed import with_types
+
+    found = {one.reference: one for one in installed().types}
+    for package in _names(allow):
+        catalogue = types_of(package)
+        if not catalogue.types and catalogue.problems:
+            raise UsageError(f"{package} has no node types for the schema: {catalogue.problems[0]}")
+        found |= {one.reference: one for one in catalogue.types}
+    return schema_text(with_types(json_schema(), found.values()))
 
 
 def _path(path: str | os.PathLike[str]) -> Path:

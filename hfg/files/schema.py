@@ -1,6 +1,7 @@
 """The JSON schema of graph files, made of the structs of `document`; editors complete and check by it.
 
-`graph.schema.json` beside this is what it gives, for who has no Python at hand. Stands on `document`.
+`graph.schema.json` beside this is what it gives, for who has no Python at hand. `typed` adds node types.
+Stands on `document`.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ _LABEL: Final = {
 }
 
 
-def schema_text() -> str:
+def schema_text(schema: dict[str, Any]) -> str:
     """Give it as text."""
-    return json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
 def json_schema() -> dict[str, Any]:

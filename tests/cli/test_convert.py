@@ -34,9 +34,9 @@ def test_a_parameter_of_a_graph_file_is_set_for_a_run(command: Command) -> None:
 
 
 def test_the_schema_is_written(command: Command) -> None:
-    assert command("convert", "--schema").out == schema()
+    assert command("convert", "--schema").out == schema(types=True)
     assert command("convert", "--schema", "graph.schema.json").code == 0
-    assert Path("graph.schema.json").read_text() == schema()
+    assert Path("graph.schema.json").read_text() == schema(types=True)
     assert command("convert", "--schema", "no/such/folder.json").code == 2
 
 
