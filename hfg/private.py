@@ -12,11 +12,11 @@ import stat
 import struct
 import sys
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 from hfg.errors import TransportError
 
-__all__ = ["MACHINE", "check_parents", "is_of_this_user", "open_private", "state_folder"]
+__all__ = ["MACHINE", "Connected", "check_parents", "is_of_this_user", "open_private", "state_folder"]
 
 _PEER: Final = struct.Struct("3i")  # process, user and group of who is at the other end
 _OTHERS: Final = 0o077
@@ -35,8 +35,17 @@ MACHINE: Final = _machine()
 """Part of the names of folders with sockets: home directories may be shared by several machines."""
 
 
-def is_of_this_user(connected: socket.socket) -> bool:
-    """Ask the system who is at the other end, and return whether it is this user."""
+class Connected(Protocol):
+    """A local socket, or what asyncio shows of one."""
+
+    def getsockopt(self, level: int, option: int, size: int, /) -> bytes:
+        """As of a socket."""
+
+
+def is_of_this_user(connected: Connected) -> bool:
+    """Ask the system who is at the other end, and return whether it is this user; where it cannot tell, it is not."""
+    if sys.platform != "linux":
+        return False
     _, user, _ = _PEER.unpack(connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
     return bool(user == os.geteuid())
 
@@ -60,6 +69,7 @@ def open_private(folder: Path) -> int:
             "processes cannot meet on this system: it has no SO_PEERCRED, by which both ends of a local socket learn "
             "who the other is; run the graph in one process, or on Linux"
         )
+    check_parents(folder)
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
@@ -87,17 +97,21 @@ def open_private(folder: Path) -> int:
 
 
 def check_parents(folder: Path) -> None:
-    """Check that no other user can replace a folder on the way to this one.
+    """Check that no other user can replace a folder or a link on the way to this one, as far as the way exists.
 
     Raises:
       TransportError: another user can.
     """
-    for parent in folder.resolve().parents:
-        found = parent.stat()
-        is_trusted = found.st_uid in (0, os.geteuid())
+    folder = folder.absolute()
+    for parent in dict.fromkeys((*folder.parents, *folder.resolve().parents)):
+        try:
+            found = parent.lstat()
+        except FileNotFoundError:
+            continue
         is_of_group = found.st_mode & stat.S_IWGRP and found.st_gid not in (0, os.getegid())
-        is_replaceable = (found.st_mode & stat.S_IWOTH or is_of_group) and not found.st_mode & stat.S_ISVTX
-        if is_trusted and not is_replaceable:
+        may_be_written = not stat.S_ISLNK(found.st_mode) and (found.st_mode & stat.S_IWOTH or is_of_group)
+        is_replaceable = may_be_written and not found.st_mode & stat.S_ISVTX
+        if found.st_uid in (0, os.geteuid()) and not is_replaceable:
             continue
         raise TransportError(
             f"{folder}, in which programs of this user meet, is not safe: other users can replace folders in {parent}; "

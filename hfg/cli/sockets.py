@@ -16,6 +16,7 @@ from hfg.cli import show
 from hfg.engine.face.watching import Answer, Question, folder, sockets
 from hfg.engine.observing.encoding import encode
 from hfg.errors import TargetError
+from hfg.private import is_of_this_user
 
 __all__ = ["Line", "find", "is_process", "runs", "which"]
 
@@ -44,6 +45,9 @@ class Line:
             if isinstance(error, ConnectionRefusedError):
                 file.unlink(missing_ok=True)  # its process died without taking it away
             raise TargetError(_nothing_runs(name)) from None
+        if not is_of_this_user(self._socket):
+            self._socket.close()
+            raise TargetError(f"{file} is a socket of another user: remove it")
         self._heard = b""
         self._asked = False
 

@@ -29,6 +29,7 @@ from hfg.engine.observing.glance import Glance
 from hfg.engine.observing.taps import Tap
 from hfg.errors import HfgError, TargetError
 from hfg.logs import Log
+from hfg.private import is_of_this_user
 
 __all__ = ["Answer", "Door", "Question", "folder", "sockets", "watched"]
 
@@ -80,8 +81,11 @@ def folder() -> Path:
     Raises:
       TargetError: there is none that belongs to this user alone.
     """
-    if not hasattr(socket, "AF_UNIX") or not hasattr(os, "geteuid"):
-        raise TargetError("runs cannot be looked at from other processes here: that needs Unix domain sockets")
+    if not hasattr(socket, "SO_PEERCRED"):
+        raise TargetError(
+            "runs cannot be looked at from other processes here: that needs Unix domain sockets whose ends the system "
+            "can tell the user of (SO_PEERCRED)"
+        )
     own = os.environ.get("XDG_RUNTIME_DIR")
     place = Path(own, "hfg") if own and Path(own).is_dir() else Path(tempfile.gettempdir(), f"hfg-{os.geteuid()}")
     try:
@@ -231,6 +235,9 @@ class _Guest(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
+        if not is_of_this_user(transport.get_extra_info("socket")):
+            transport.abort()
+            return
         if self._door.closed or sum(guest.is_let_in for guest in self._door.guests) >= _MOST_GUESTS:
             transport.abort()
             return

@@ -34,7 +34,7 @@ _PENDING: Final = 16  # connections that the system keeps while the event loop i
 def user_folder(realm: str) -> Path:
     """Return the folder in which all programs of this user meet that name the same realm."""
     named = hashlib.blake2b(realm.encode("utf-8", "surrogatepass"), digest_size=8).hexdigest()
-    return state_folder() / f"meet-{MACHINE}" / named
+    return state_folder() / f"meet-{MACHINE}-{named}"
 
 
 class Place:
