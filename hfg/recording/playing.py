@@ -330,12 +330,19 @@ def _replace(graph: Graph, file: str, recorded: _Recorded, how: _How) -> list[co
             for edge in _edges_into(node)
             if edge.target.path not in kept
         ]
+        if _is_away(flat, nodes[path].options.group):  # what is played is read from the file here
+            edit.append(commands.Move(path, "loop"))
         hints = {port: _hint(node._type, name) for port, name in names.items()}
         edit.append(commands.Replace(path, _stand_in(node, file, names, hints, how)))
         done.played |= {port: recorded.mapped.get(port, port) for port in ports}
         done.silent += _silent(path, node, names, flat)
     done.live = [path for path, one in nodes.items() if one.node._type.is_source and path not in (*chosen, *done.rest)]
     return edit + [commands.Disable(path) for path in done.rest]
+
+
+def _is_away(flat: Any, group: str) -> bool:
+    spec = flat.groups.get(group)
+    return spec is not None and spec.process
 
 
 def _ports_of_nodes(recorded: _Recorded, nodes: Mapping[str, Any]) -> tuple[dict[str, dict[str, str]], list[str]]:

@@ -230,7 +230,8 @@ def record(
       force: write over a file that is there.
 
     Raises:
-      UsageError: no port fits, values of one cannot be recorded, or the file is there already or cannot be made.
+      UsageError: no port fits, one is in another process, values of one cannot be recorded, or the file is there
+        already or cannot be made.
       NotRunning: the run is over.
     """
     run._need_running("nothing will pass any more")
@@ -239,6 +240,7 @@ def record(
         raise UsageError('select= says which ports are recorded, as in select="camera/*"; it is empty')
     if images not in ("raw", "png", "jpeg"):
         raise UsageError(f'images= is "raw", "png" or "jpeg", got {images!r}')
+    run._need_here(lambda port: any(_fits(port, pattern) for pattern in patterns))
     path = Path(file)
     parts, engine = run._parts, run._engine
     probe = _Probe()

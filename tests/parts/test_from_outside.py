@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,6 +13,9 @@ from annotated_types import Interval
 
 import hfg
 from hfg.errors import NotRunning, UsageError
+from hfg.recording import File, play_into
+from hfg.recording import record as record_run
+from hfg.testing.nodes import sink
 from hfg.trace import FiringEnded, ParameterSet, RunEnded, RunStarted, TokenSent, TokenTaken, TraceEvent
 from tests.semantics.nodes import drive
 
@@ -451,8 +456,41 @@ def test_new_code_and_recordings_of_a_graph_in_several_processes_are_refused_and
         said = 'graph "fed" cannot be given new code while it runs in several processes .*"far".*: end the run'
         with pytest.raises(UsageError, match=said):
             await run.reload("tests")
-        with pytest.raises(UsageError, match=r"run.record writes .* in one: take process=True"):
-            run.record("never.mcap")
+        for record in (run.record, partial(record_run, run)):
+            for select in ("*", "scaler", ["scaler.large"]):
+                with pytest.raises(UsageError, match=r'(?s)\(group "far"\), .* without "scaler\..*take process=True'):
+                    record("never.mcap", select=select)
+        with pytest.raises(hfg.errors.HfgError):
+            run.graph.reload("tests")
         return await through(run, 1)
 
     assert with_run(fed(), body) == [2]
+    assert not Path("never.mcap").exists()
+
+
+@pytest.mark.rule("L1")
+def test_ports_of_the_main_process_are_recorded(tmp_path: Path) -> None:
+    graph = counted(count=5)
+    graph.add(sink(), name="here")
+    graph.connect(graph["numbers"].out, graph["here"].value)
+    hfg.run(graph, clock="virtual", begin=lambda run: run.record(tmp_path / "a.mcap", select="numbers"))
+    with File(tmp_path / "a.mcap") as recording:
+        assert [(port.path, port.values) for port in recording.info().ports] == [("numbers.out", 5)]
+
+
+@pytest.mark.rule("L1")
+def test_a_recorded_node_of_another_process_is_played_in_the_main_one(tmp_path: Path) -> None:
+    def build(group: str) -> hfg.Graph:
+        graph = hfg.Graph("played")
+        graph.group("far", process=True)
+        source, scaler = graph.add(numbers(count=3), group=group), graph.add(Scaler(), name="scaler", group="far")
+        graph.connect(source.out, scaler.value)
+        graph.connect(scaler.out, graph.output("out", int))
+        return graph
+
+    whole = build("loop")
+    whole.move("scaler", group="loop")
+    hfg.run(whole, clock="virtual", begin=lambda run: run.record(tmp_path / "a.mcap"))
+    graph = build("far")
+    play_into(graph, tmp_path / "a.mcap")
+    assert hfg.run(graph, clock="virtual").outputs["out"] == [0, 2, 4]

@@ -225,6 +225,9 @@ class Run:
         )
         return recording
 
+    def _need_here(self, chosen: Callable[[str], bool]) -> None:
+        """Refuse to record chosen ports, by their paths, that are in another process; here none is."""
+
     def report_page(self, file: str | os.PathLike[str], *, pictures: int = 24, picture_size: int = 320) -> RunPage:
         """Write a page about the run when it is over: one HTML file that needs nothing besides itself.
 

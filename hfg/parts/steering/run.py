@@ -8,8 +8,7 @@ of when they last said so for the others: asking makes them say it again, and `r
 from __future__ import annotations
 
 import asyncio
-import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any, Final, Literal, NoReturn, TypeVar
 
@@ -22,7 +21,6 @@ from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
 from hfg.engine.observing.consumers import Listener
 from hfg.engine.observing.glance import Glance
-from hfg.engine.observing.recorder import RunRecording
 from hfg.engine.observing.report import EdgeReport, NodeReport
 from hfg.engine.observing.statistics import EdgeStatistics, Statistics
 from hfg.engine.observing.taps import Tap, make_tap
@@ -485,21 +483,23 @@ class CutRun(Run):
         """Refuse it: code is changed in all processes at once, or in none."""
         self._refuse("given new code")
 
-    def record(
-        self,
-        file: str | os.PathLike[str],
-        *,
-        select: str | Iterable[str] = "*",
-        lossless: bool = True,
-        images: Literal["raw", "png", "jpeg"] = "raw",
-        pickle: bool = False,
-        force: bool = False,
-    ) -> RunRecording:
-        """Refuse it: what is recorded without loss holds its node back, which over a link nobody does yet."""
+    def _need_here(self, chosen: Callable[[str], bool]) -> None:
+        """Refuse to record ports of other processes: what is recorded without loss holds its node back."""
+        ports = [
+            port.path
+            for node in self._homes.far_nodes()
+            for port in (*node.ports.outputs.values(), *node.ports.events.values())
+            if chosen(port.path)
+        ]
+        if not ports:
+            return
         names = ", ".join(f'"{name}"' for name in self._asking.others)
+        more = f" and {len(ports) - 3} more ports" if len(ports) > 3 else ""
+        shown = ", ".join(f'"{path}"' for path in ports[:3])
         raise UsageError(
-            f'graph "{self.graph.name}" runs in several processes (group {names}), and run.record writes what passes '
-            "in one: take process=True from its groups to record it"
+            f'graph "{self.graph.name}" runs in several processes (group {names}), and a recording holds what passes '
+            f"in this one, without {shown}{more}: select ports of this process, with select= or --select, or take "
+            "process=True from the groups"
         )
 
     def _refuse(self, what: str) -> NoReturn:
