@@ -330,7 +330,7 @@ def _replace(graph: Graph, file: str, recorded: _Recorded, how: _How) -> list[co
             for edge in _edges_into(node)
             if edge.target.path not in kept
         ]
-        if _is_away(flat, nodes[path].options.group):  # what is played is read from the file here
+        if _is_away(flat, nodes[path].options.group or "loop"):  # what is played is read from the file here
             edit.append(commands.Move(path, "loop"))
         hints = {port: _hint(node._type, name) for port, name in names.items()}
         edit.append(commands.Replace(path, _stand_in(node, file, names, hints, how)))
