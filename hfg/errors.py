@@ -128,10 +128,12 @@ class FileError(HfgError):
 
     Attributes:
       problems: every finding, with its file and line, in their order.
+      wants: the modules that the file would import and may not, as `allow` names them.
     """
 
-    def __init__(self, sentence: str, problems: Sequence[Problem]) -> None:
+    def __init__(self, sentence: str, problems: Sequence[Problem], wants: Sequence[str] = ()) -> None:
         self.problems = tuple(problems)
+        self.wants = tuple(wants)
         lines = [f"  {problem}" for problem in self.problems[:_SHOWN]]
         if len(self.problems) > _SHOWN:
             lines.append(f"  ... and {len(self.problems) - _SHOWN} more: the error's problems hold them all")

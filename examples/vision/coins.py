@@ -7,7 +7,8 @@
 Shown: a whole graph of OpenCV's functions from `hfg.nodes.cv`. The photograph comes with scikit-image: Greek coins from
 Pompeii, in uneven light, so that a single threshold would not do. `python examples/vision/coins.py` says what was found
 and writes out/coins.png; the graph file coins.hfg.yaml is the same graph, made by
-`hfg convert examples/vision/coins.py examples/vision/coins.hfg.yaml`, and does the same by `hfg run`.
+`hfg convert examples/vision/coins.py examples/vision/coins.hfg.yaml`, and does the same by
+`hfg run examples/vision/coins.hfg.yaml --allow coins`.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ takes for a person, but does not move, is none. The video is vtest.avi of OpenCV
 
     apt-get install opencv-doc                                  # then it is found by itself
     python examples/vision/pedestrians.py [VIDEO]
-    hfg run examples/vision/pedestrians.hfg.yaml --param street.path=VIDEO
+    hfg run examples/vision/pedestrians.hfg.yaml --allow pedestrians --param street.path=VIDEO
 
 Without it a camera pans over a photograph of scikit-image, whose only person is so near that her face is looked for.
 What was found is said; out/pedestrians.avi shows all pictures, out/pedestrians.png the newest one. The graph file

@@ -113,6 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
       arguments: those behind "hfg"; the process's own if not given.
     """
+    show.set_arguments(sys.argv[1:] if arguments is None else arguments)
     with Interrupt.installed(), _streams():
         try:
             code = app(args=arguments, prog_name="hfg", standalone_mode=False)
@@ -126,6 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 2
         except FileError as error:
             show.sentence(str(error))
+            show.wants(error)
             return 2
         except HfgError as error:
             show.failure(error)

@@ -30,6 +30,7 @@ def check(
     """Look for mistakes in a graph without running it; exit code 1 if there are errors."""
     show.set_debug(debug)
     graph: Graph | None = None
+    refused_file: FileError | None = None
     with keep_refusals() as problems:
         try:
             graph = load_graph(target, arg or [], allow)
@@ -40,6 +41,7 @@ def check(
             problems += _unbuilt(target, error, error.__cause__)
         except FileError as error:
             problems += error.problems
+            refused_file = error
     if graph is not None:
         refused = {problem.path.rpartition(" -> ")[2] for problem in problems}  # what follows from that is no news
         found = graph.check()
@@ -53,6 +55,8 @@ def check(
         name = target if graph is None else f'graph "{graph.name}"'
         show.write(f"{name}: {_count(counts['error'], 'error')}, {_count(counts['warning'], 'warning')}")
         show.write(f", {_count(counts['hint'], 'hint')}\n" if counts["hint"] else "\n")
+    if refused_file is not None:
+        show.wants(refused_file)
     return 1 if counts["error"] else 0
 
 

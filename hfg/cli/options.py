@@ -66,7 +66,7 @@ AllowOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="PACKAGE",
-        help="A package whose node types a graph file may import, too; may be given several times.",
+        help="A module or package whose code a graph file may run; may be given several times.",
     ),
 ]
 SettingsOption = Annotated[

@@ -14,7 +14,16 @@ from hfg.cli import show
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.live import live_table
-from hfg.cli.options import ArgOption, Clock, ClockOption, DebugOption, ParamOption, UntilOption, VerboseOption
+from hfg.cli.options import (
+    AllowOption,
+    ArgOption,
+    Clock,
+    ClockOption,
+    DebugOption,
+    ParamOption,
+    UntilOption,
+    VerboseOption,
+)
 from hfg.cli.record import told
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
@@ -45,6 +54,7 @@ def play(
     until: UntilOption = None,
     param: ParamOption = None,
     arg: ArgOption = None,
+    allow: AllowOption = None,
     table: Annotated[bool, typer.Option(help="On a terminal and the real clock, a live table of nodes.")] = True,
     debug: DebugOption = False,
     verbose: VerboseOption = 0,
@@ -53,7 +63,7 @@ def play(
     show.set_debug(debug)
     records = show.Records(verbose, debug, virtual=clock is Clock.virtual)
     ports = dict(_pair(one) for one in mapped or [])
-    graph = load_graph(into, arg or [])
+    graph = load_graph(into, arg or [], allow)
     records.loaded()
     try:
         playing = play_into(graph, file, ports=ports or None, speed=_factor(speed), pickle=pickle)

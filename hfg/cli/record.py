@@ -17,7 +17,16 @@ from hfg.cli import show
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.live import live_table
-from hfg.cli.options import ArgOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
+from hfg.cli.options import (
+    AllowOption,
+    ArgOption,
+    Clock,
+    ClockOption,
+    DebugOption,
+    ParamOption,
+    TargetArgument,
+    UntilOption,
+)
 from hfg.cli.settings import set_parameters
 from hfg.cli.target import load_graph
 from hfg.engine import Run
@@ -53,13 +62,14 @@ def record(
     until: UntilOption = None,
     param: ParamOption = None,
     arg: ArgOption = None,
+    allow: AllowOption = None,
     table: Annotated[bool, typer.Option(help="On a terminal and the real clock, a live table of nodes.")] = True,
     debug: DebugOption = False,
 ) -> int:
     """Run a graph and record what passes its ports, for hfg play, hfg info and Foxglove; Ctrl-C ends it well."""
     show.set_debug(debug)
     records = show.Records(0, debug, virtual=clock is Clock.virtual)
-    graph = load_graph(target, arg or [])
+    graph = load_graph(target, arg or [], allow)
     records.loaded()
     set_parameters(graph, param or [])
     interrupt = Interrupt.current or Interrupt()

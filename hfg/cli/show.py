@@ -6,9 +6,10 @@ Stands on rich and `encoding`; knows reports and problems, no verbs.
 from __future__ import annotations
 
 import logging
+import shlex
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -21,13 +22,32 @@ from hfg.clock import current_elapsed
 from hfg.controls import escaped
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import Report
-from hfg.errors import EngineInternalError, HfgError, NodeError, TeardownError
+from hfg.errors import EngineInternalError, FileError, HfgError, NodeError, TeardownError
 from hfg.frames import is_machinery
 
-__all__ = ["Records", "failure", "json", "report", "sentence", "set_debug", "table", "user_traceback", "write"]
+__all__ = [
+    "Records",
+    "failure",
+    "json",
+    "report",
+    "sentence",
+    "set_arguments",
+    "set_debug",
+    "table",
+    "user_traceback",
+    "wants",
+    "write",
+]
 
 _WIDTH_OF_A_FILE = 200
 _debug = False
+_arguments: Sequence[str] = ()
+
+
+def set_arguments(arguments: Sequence[str]) -> None:
+    """Remember how the command was called."""
+    global _arguments  # one process, one command
+    _arguments = arguments
 
 
 def set_debug(debug: bool) -> None:
@@ -97,6 +117,14 @@ def sentence(text: str) -> None:
     """Write one sentence to standard error."""
     with suppress(OSError):  # the terminal has gone away: nobody reads it
         write(f"hfg: {text}\n", to_stderr=True)
+
+
+def wants(error: FileError) -> None:
+    """Say which command lets a graph file import what it wants to."""
+    if error.wants:
+        allowed = [part for module in error.wants for part in ("--allow", module)]
+        command = shlex.join(["hfg", *_arguments, *allowed])
+        sentence(f"it wants to run code of {', '.join(error.wants)}; if you trust that: {command}")
 
 
 def failure(error: BaseException) -> None:

@@ -1,7 +1,8 @@
-"""Which modules a graph file may have imported: reading a file runs no other code (docs/howto/files.md).
+"""Which modules a graph file may have imported: reading a file runs no other code (docs/howto/files.md, rule L4).
 
-Allowed are hfg itself, packages that installed node types (entry points `hfg.nodes`), modules of the file's own
-project, what the caller allows, and what the program has imported already. Stands on the catalogue's offers.
+Allowed are hfg itself, packages that installed node types (entry points `hfg.nodes`), what the program has imported
+already, and what the caller allows; a module beside the file is not, as it came with the file. Stands on the
+catalogue's offers.
 """
 
 from __future__ import annotations
@@ -42,52 +43,60 @@ class Allowed:
     """What one file, and those it includes, may import.
 
     Attributes:
-      project: the folder whose modules are allowed.
+      project: the folder in which modules that are allowed are looked for, and in which included files lie.
+      wanted: the modules that were refused, in order, as they would be allowed.
     """
 
     def __init__(self, file: Path, extra: Iterable[str] = ()) -> None:
         self.project = project_of(file)
         self._folder = file.resolve().parent
         self._extra = tuple(extra)
+        self.wanted: dict[str, None] = {}
 
     def refusal(self, module: str) -> str | None:
         """Say why a module must not be imported, with the remedy; None if it may be."""
-        if module in sys.modules or _is_in(module, (*_ALWAYS, *self._extra)):
+        if module in sys.modules or _is_in(module, _ALWAYS) or _is_in(module, installed_packages()):
             return None
         top = module.partition(".")[0]
-        if not top.isidentifier() or self._is_ours(top) or _is_in(module, installed_packages()):
+        if not top.isidentifier():
             return None  # what is no name is told by whoever looks for it
-        if _spec(top) is None:
+        spec, folder = _spec(top), None
+        if spec is None:
+            folder = self._folder_of(top)
+        if _is_in(module, self._extra):
+            if folder is not None:
+                sys.path.append(str(folder))
+                importlib.invalidate_caches()
+            return None
+        if spec is None and folder is None:
             return None  # there is none, which is told as well
+        self.wanted[top] = None
         return (
-            f'module "{module}" is not one that this file may import, as a file alone must not run code: it is neither '
-            f"in the project {self.project.name} nor installed for hfg; if you trust it allow it, with --allow "
-            f'{top} or hfg.load(..., allow=["{top}"])'
+            f'module "{module}" is not one that this file may import, as a file alone must not run code (it would come '
+            f"from {_place(spec, folder, top)}); if you trust it allow it, with --allow {top} or "
+            f'hfg.load(..., allow=["{top}"])'
         )
 
     def refusal_of_type(self, text: str) -> str | None:
         """Say the same of the modules that a type written as a text names."""
         return next((why for module in _modules_in(text) if (why := self.refusal(module)) is not None), None)
 
-    def _is_ours(self, top: str) -> bool:
-        """Whether a module lies in the project; one beside the file is made importable."""
-        spec = _spec(top)
-        if spec is None:
-            for folder in dict.fromkeys((self._folder, self.project, self.project / "src")):
-                if (folder / f"{top}.py").is_file() or (folder / top).is_dir():
-                    sys.path.append(str(folder))
-                    importlib.invalidate_caches()
-                    return True
-            return False
-        places = [spec.origin] if spec.origin else list(spec.submodule_search_locations or ())
-        return any(self._holds(Path(place)) for place in places)
+    def _folder_of(self, top: str) -> Path | None:
+        """The folder in which a module lies that Python does not find by itself."""
+        for folder in dict.fromkeys((self._folder, self.project, self.project / "src")):
+            if (folder / f"{top}.py").is_file() or (folder / top).is_dir():
+                return folder
+        return None
 
-    def _holds(self, place: Path) -> bool:
-        try:
-            within = place.resolve().relative_to(self.project)
-        except ValueError:
-            return False
-        return not {"site-packages", "dist-packages"} & set(within.parts)
+
+def _place(spec: ModuleSpec | None, folder: Path | None, top: str) -> str:
+    """Where a module would come from."""
+    if folder is not None:
+        file = folder / f"{top}.py"
+        return str(file if file.is_file() else folder / top)
+    if spec is None:
+        return "nowhere"
+    return spec.origin or next(iter(spec.submodule_search_locations or ()), "built in")
 
 
 def _is_in(module: str, packages: Iterable[str]) -> bool:

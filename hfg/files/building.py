@@ -122,7 +122,7 @@ class _Loading:
         document, key = read.document, ()
         parts = self.parts(read, path, [path])
         if not self.may_import(read):
-            self.findings.reject(f"{read.file} cannot be loaded")
+            self.findings.reject(f"{read.file} cannot be loaded", self.allowed.wanted)
         for kind in ("events", "slots", "parameters", "promotes"):
             for name in getattr(document, kind):
                 line = read.lines.get((kind, name), 0)
@@ -140,7 +140,7 @@ class _Loading:
         if self.findings.problems:  # else the graph has them in their places, and its check reports them
             for file, line, at, why in self.absent:
                 self.findings.add(file, line, at, f"its type is not there: {why}; install what has it, or correct it")
-        self.findings.reject(f"{read.file} cannot be loaded")
+        self.findings.reject(f"{read.file} cannot be loaded", self.allowed.wanted)
         return graph
 
     @contextmanager

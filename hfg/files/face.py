@@ -19,15 +19,16 @@ __all__ = ["build", "describe", "load", "read", "save", "schema", "text_of", "wr
 def load(path: str | os.PathLike[str], *, allow: Iterable[str] = ()) -> Graph:
     """Make the graph that a file describes.
 
-    Only the modules that it names are imported, and only from hfg, packages with node types, its own project, and what
-    is allowed here (docs/howto/files.md). A node whose type is not there keeps its place, and `graph.check()` says so.
+    Only the modules that it names are imported, and only from hfg, packages with node types, and what is allowed here,
+    not what lies beside the file (docs/howto/files.md). A node whose type is not there keeps its place, and
+    `graph.check()` says so.
 
     Args:
       path: of a file that ends in ".hfg.yaml".
       allow: further packages whose node types may be imported.
 
     Raises:
-      FileError: it describes no graph; `problems` holds every finding with its line.
+      FileError: it describes no graph; `problems` holds every finding with its line, `wants` what it may not import.
     """
     from hfg.files import building
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
 from hfg.errors import FileError
@@ -51,8 +51,12 @@ class Findings:
             )
         )
 
-    def reject(self, sentence: str) -> None:
+    def reject(self, sentence: str, wants: Iterable[str] = ()) -> None:
         """Raise if there are any.
+
+        Args:
+          sentence: what becomes of it.
+          wants: modules that may not be imported.
 
         Raises:
           FileError: with all of them, in the order of files and lines.
@@ -60,7 +64,7 @@ class Findings:
         if self.problems:
             files = list(dict.fromkeys(one.file for one in self.problems))
             found = sorted(dict.fromkeys(self.problems), key=lambda one: (files.index(one.file), one.line))
-            raise FileError(sentence, found)
+            raise FileError(sentence, found, tuple(wants))
 
 
 def split(sentence: str) -> tuple[str, str]:

@@ -271,6 +271,49 @@ def test_no_code_is_run_but_that_of_allowed_modules(monkeypatch: pytest.MonkeyPa
     assert read(file).nodes["n"].type == "evil_module:n"
 
 
+@pytest.mark.rule("L4")
+@pytest.mark.parametrize("verb", ["run", "check", "draw", "convert", "record", "play", "tap"])
+def test_code_beside_a_file_runs_only_if_it_is_allowed(
+    verb: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each verb says what the file would import and from where, and gives the command that allows it."""
+    write("[project]", "project/pyproject.toml")
+    write("import hfg\n@hfg.node\ndef beside() -> int: return 1\nraise RuntimeError", "project/code_beside.py")
+    write("raise RuntimeError", "project/src/code_too/__init__.py")
+    write(
+        "hfg: 1\nnodes:\n  n: {type: 'code_beside:beside'}\n  m: {type: 'code_too.nodes:other'}", "project/a.hfg.yaml"
+    )
+    monkeypatch.setattr("sys.path", [*sys.path])
+    rest = {"record": ["-o", "x.mcap"], "play": ["--into"], "tap": []}.get(verb, [])
+    file = "project/a.hfg.yaml"
+    given = (
+        ["play", "x.mcap", "--into", file] if verb == "play" else [verb, file, *(["n.out"] if verb == "tap" else rest)]
+    )
+    code = main(given)
+    told = capsys.readouterr()
+    assert code == (1 if verb == "check" else 2)
+    assert f"(it would come from {Path('project/code_beside.py').resolve()})" in told.out + told.err
+    assert f"(it would come from {Path('project/src/code_too').resolve()})" in told.out + told.err
+    command = f"hfg {' '.join(given)} --allow code_beside --allow code_too"
+    assert told.err.endswith(f"it wants to run code of code_beside, code_too; if you trust that: {command}\n")
+    assert not {"code_beside", "code_too"} & set(sys.modules)
+
+
+@pytest.mark.rule("L4")
+def test_code_beside_a_file_is_found_when_it_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    write("[project]", "project/pyproject.toml")
+    write("import hfg\n@hfg.node\ndef beside() -> int: return 1\n", "project/code_found.py")
+    write("import hfg\n@hfg.node\ndef other() -> int: return 1\n", "project/src/code_found_too.py")
+    nodes = "nodes:\n  n: {type: 'code_found:beside'}\n  m: {type: 'code_found_too:other'}"
+    file = write(f"hfg: 1\n{nodes}", "project/graphs/a.hfg.yaml")
+    monkeypatch.setattr("sys.path", [*sys.path])
+    with pytest.raises(hfg.errors.FileError) as refused:
+        hfg.load(file, allow=["code_found"])
+    assert refused.value.wants == ("code_found_too",)
+    assert list(hfg.load(file, allow=["code_found", "code_found_too"]).nodes) == ["n", "m"]
+    assert list(hfg.load(file).nodes) == ["n", "m"]  # what the program has imported, it may name
+
+
 def test_an_allowed_package_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
     write("import hfg\n@hfg.node\ndef given() -> int: return 1\n", "elsewhere/given_module.py")
     write("[project]", "project/pyproject.toml")

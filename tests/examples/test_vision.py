@@ -39,7 +39,7 @@ def code(name: str, *given: str) -> hfg.Graph:
 
 
 def file(name: str) -> hfg.Graph:
-    return load_graph(f"{FOLDER / name}.hfg.yaml")
+    return load_graph(f"{FOLDER / name}.hfg.yaml", allow=[name])
 
 
 def results(graph: hfg.Graph) -> tuple[str, dict[str, bytes]]:
@@ -75,7 +75,9 @@ def test_code_and_file_say_the_same_and_write_the_same(name: str) -> None:
     assert results(file(name)) == (said, written)
 
 
-@pytest.mark.parametrize("command", [["coins.py"], ["-m", "hfg", "run", "coins.hfg.yaml"]], ids=["python", "hfg run"])
+@pytest.mark.parametrize(
+    "command", [["coins.py"], ["-m", "hfg", "run", "--allow", "coins", "coins.hfg.yaml"]], ids=["python", "hfg run"]
+)
 def test_both_run_as_a_reader_would_run_them(command: list[str]) -> None:
     *before, last = command
     ran = subprocess.run(
