@@ -26,6 +26,8 @@ from hfg.trace import (
     ActivityChanged,
     CallEnded,
     CallStarted,
+    DoEnded,
+    DoStarted,
     ErrorRaised,
     EventTriggered,
     FiringEnded,
@@ -101,7 +103,7 @@ class Timeline:
         self._closed = False
         self._origin: float | None = None
         self._now = 0.0
-        self._open: dict[str, dict[int, _Box]] = {}  # by node, then by number of the firing; 0 is a slot call
+        self._open: dict[str, dict[int, _Box]] = {}  # by node, then by number of the firing; 0: a call, -1: do()
         self._rows: dict[str, list[str | None]] = {}  # per group: who is on each of its rows
         self._row_ids: dict[tuple[str, int], int] = {}
         self._group_order = list(dict.fromkeys(_group(node) for node in self._nodes.values()))
@@ -131,6 +133,10 @@ class Timeline:
                 self._end(node, number, outcome)
             case CallEnded(node=node, outcome=outcome):
                 self._end(node, 0, outcome)
+            case DoStarted(node=node):
+                self._begin(node, -1, f"{node}.do", "do", {})
+            case DoEnded(node=node, outcome=outcome):
+                self._end(node, -1, outcome)
             case EventTriggered(event=label):
                 self._events.add(label)
             case TokenSent(edge=edge, token=token):

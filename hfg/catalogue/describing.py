@@ -14,7 +14,7 @@ import annotated_types
 import msgspec
 
 from hfg.catalogue.documentation import Documentation, read_documentation
-from hfg.description import NodeType
+from hfg.description import EventSpec, NodeType
 from hfg.functions import NodeFunction
 from hfg.limits import Inside
 from hfg.nodetype import Node
@@ -211,12 +211,21 @@ def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any], *, offered
         subgraph=kind.is_subgraph,
         inputs=tuple(_ports(kind.inputs.values(), kind, read)),
         outputs=tuple(_ports(kind.outputs.values(), kind, read)),
-        events=tuple(_ports(kind.events.values(), kind, read)),
+        events=tuple(_ports(kind.events.values(), kind, read)) + _completed(kind, read),
         slots=tuple(_ports(kind.slots.values(), kind, read)),
         parameters=tuple(_parameter(spec, kind, read) for spec in kind.parameters.values()),
         errors=tuple(ErrorDescription(name, when) for name, when in read.errors),
         apex=read.apex,
     )
+
+
+def _completed(kind: NodeType, read: Documentation) -> tuple[PortDescription, ...]:
+    """Describe the automatic event that belongs to a do-activity (rule A15)."""
+    if "do" not in kind.hooks:
+        return ()
+    (made,) = _ports([EventSpec("completed", kind.completes)], kind, read)
+    words = made.doc or "The do-activity has returned; with the returned value."
+    return (msgspec.structs.replace(made, doc=words),)
 
 
 def undocumented(described: TypeDescription) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import typing
 from typing import Any
 
 import msgspec
@@ -26,6 +27,7 @@ from hfg.parts.model.messages import (
     OfAnEdge,
     Parcel,
     Passed,
+    PlainEvent,
     Rests,
     Result,
     Seen,
@@ -191,3 +193,12 @@ def test_each_event_of_an_edge_between_parts_is_told_by_one_of_them(label: str) 
     assert who_tells(TokenProcessed(0.0, label)) == [edge.source]
     assert who_tells(TokenTaken(0.0, label, Token(1))) == [edge.target]
     assert who_tells(NodeEnded(0.0, "relay0")) == list(cutting.parts), "each has such events of its own nodes only"
+
+
+@pytest.mark.rule("R7", "L1")
+def test_each_kind_of_event_of_a_trace_can_be_told_to_another_process() -> None:
+    """A part that tells of one that the others do not know is not believed any more."""
+    by_passed = {"TokenSent", "TokenTaken", "TokenDropped", "TokenDrained", "EventTriggered", "ParameterSet"}
+    told = {kind.__name__ for kind in typing.get_args(PlainEvent)} | by_passed
+    kinds = {kind.__name__ for kind in TraceEvent.__subclasses__() if kind.__module__ == "hfg.trace"}
+    assert kinds == told

@@ -10,6 +10,7 @@ import pytest
 
 import hfg
 from hfg import commands
+from hfg.catalogue import describe_type
 from hfg.testing import fire, replay
 from hfg.trace import DoEnded, DoStarted, TokenSent, TraceEvent
 from tests.semantics.nodes import Ear, activity, drive, named, numbers, of_kind, run
@@ -610,3 +611,40 @@ def test_fire_runs_one_to_its_end() -> None:
     assert (fired.answer, fired.events) == ("quick", [("completed", "quick")])
     with pytest.raises(hfg.errors.UsageError, match="waits for something that never comes"):
         fire(Lasting(), hook="do")
+
+
+@pytest.mark.rule("A15")
+def test_descriptions_and_drawings_show_it() -> None:
+    event = describe_type(Lasting).events[-1]
+    assert (event.name, event.type, event.doc) == (
+        "completed",
+        "str",
+        "The do-activity has returned; with the returned value.",
+    )
+    graph = hfg.Graph()
+    graph.add(Lasting(), name="node")
+    assert "do" in graph.draw()
+
+
+@pytest.mark.rule("A15", "L2")
+def test_the_check_refuses_one_in_a_group_with_a_ledger() -> None:
+    graph = hfg.Graph()
+    graph.group("kept", process=True, ledger=True)
+    graph.start.activates(graph.add(Lasting(), group="kept").hear)
+    assert any("it has a do-activity, and activity is not kept" in problem.what for problem in graph.check())
+
+
+@pytest.mark.rule("A15", "L1")
+def test_in_another_process_it_is_as_here() -> None:
+    """`completed` leads the activity over the cut."""
+    graph, ear = hfg.Graph(), Ear()
+    graph.group("away", process=True)
+    node = graph.add(Quick(), name="node", group="away")
+    graph.add(ear, name="ear")
+    graph.start.activates(node.hear)
+    graph.connect(node.completed, ear.hear, active=True)
+    events: list[TraceEvent] = []
+    assert run(graph, trace=events).outcome == "done"
+    assert activity(events, "node") == [True, False]
+    assert activity(events, "ear") == [True]
+    assert begun_and_ended(events) == [(0, "DoStarted"), (1, "DoEnded")]

@@ -44,6 +44,8 @@ def doing(worker: Worker) -> str:
     """Say what a node does or waits for now, in the words of `NodeStatistics.waiting`."""
     if worker.busy or worker.is_flying():
         return "working"
+    if worker.tasks is not None and worker.tasks.doing.task is not None:
+        return "do"
     blocked = worker.blocked
     if worker.queued and not blocked & TORN_DOWN:
         return "turn"

@@ -54,7 +54,7 @@ class NodeStatistics(msgspec.Struct, frozen=True):
       waiting: seconds of the run's clock by what it waited for: "turn" (others of its group are at work), "input x"
         (a token there), "output x" (its token there is not processed yet), "rate", "queue" (one of its events' is
         full), "recorder" (without loss, of its ports), "gate", "ready", "restart", "signal" (it has slots only),
-        "start", "unconnected", "disabled", "ended".
+        "do" (its do-activity is under way), "start", "unconnected", "disabled", "ended".
       active_share: of the time since measuring began, how much it was active.
       queued: untaken tokens in front of it.
       tasks: what its code has started by `start_soon` and is under way, by name.

@@ -53,6 +53,8 @@ def _of_node(group: str, node: FlatNode) -> Iterator[Problem]:
         yield _wrong(group, node.path, "enabled=False, and whether it is disabled is not kept")
     if options.active_for_s is not None:
         yield _wrong(group, node.path, "active_for_s is said, and activity is not kept")
+    if "do" in node.node._type.hooks:
+        yield _wrong(group, node.path, "it has a do-activity, and activity is not kept")
 
 
 def _of_edge(group: str, edge: FlatEdge) -> Iterator[Problem]:

@@ -18,7 +18,7 @@ from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.options import DEFAULT_CAPACITY, EdgeOptions, NodeOptions
 from hfg.graph.structure.subgraph import inside, is_box
-from hfg.nodetype import Node
+from hfg.nodetype import Node, NodeType
 from hfg.ports import InnerSource, InnerTarget, Port
 
 if TYPE_CHECKING:
@@ -229,7 +229,7 @@ class _Look:
                 if inner is None or inner not in insides or not (inner.nodes or ports):
                     self._node(depth, name, node, group)
                     continue
-                said = _details(options), inner.path, node._type.qualname, group
+                said = _details(options, node._type), inner.path, node._type.qualname, group
                 box = Box(f"g{self.boxes}", name, *said, self._is_active(node), options.enabled)
                 self.picture.items.append((depth, box))
                 self.boxes += 1
@@ -258,7 +258,7 @@ class _Look:
             "node",
             type_name=node._type.qualname,
             is_active=self._is_active(node),
-            details=_details(node._options),
+            details=_details(node._options, node._type),
             path=path_of(node),
             group=group,
             pins=[Pin(*port, order) for port, order in declared.items() if port[0] != "parameter"],
@@ -414,8 +414,8 @@ def _declared(node: Node) -> dict[tuple[str, str], int]:
 # --- labels ---
 
 
-def _details(options: NodeOptions) -> list[str]:
-    said = []
+def _details(options: NodeOptions, kind: NodeType) -> list[str]:
+    said = ["do"] if "do" in kind.hooks else []
     if options.max_rate_hz is not None:
         said.append(f"{options.max_rate_hz:g} Hz")
     if options.active_for_s is not None:

@@ -22,6 +22,8 @@ from hfg.trace import (
     ActivityLost,
     CallEnded,
     CallStarted,
+    DoEnded,
+    DoStarted,
     EditWaits,
     ErrorRaised,
     FiringEnded,
@@ -266,6 +268,8 @@ PlainEvent: TypeAlias = (
     | ActivityLost
     | CallEnded
     | CallStarted
+    | DoEnded
+    | DoStarted
     | EditWaits
     | ErrorRaised
     | FiringEnded
