@@ -19,6 +19,7 @@ import typer
 
 from hfg.cli import show
 from hfg.cli.options import SettingsOption
+from hfg.errors import TargetError
 from hfg.parts.hosts.agent import Agent
 from hfg.parts.hosts.hosting import Computer, Journal, logs_folder
 from hfg.parts.running.rings import sweep_runs
@@ -36,11 +37,18 @@ def session_settings(settings: str | None) -> dict[str, Any]:
 
 def agent(
     settings: SettingsOption = None,
+    insecure: Annotated[
+        bool,
+        typer.Option("--insecure", help="Listen at tcp/ addresses of the settings, where nobody proves who he is."),
+    ] = False,
     verbose: Annotated[int, typer.Option("-v", "--verbose", count=True, help="Tell of each part.")] = 0,
 ) -> int:
     """Let this host run parts of graphs, as processes, until Ctrl-C; modules are found from the working directory."""
     show.Records(max(verbose, 0), debug=False).loaded()
-    return asyncio.run(_serve(session_settings(settings), Path.cwd()))
+    said = session_settings(settings)
+    if insecure and not said:
+        raise TargetError("--insecure is for addresses, and without --settings there are none; leave it out")
+    return asyncio.run(_serve(said | ({"insecure": True} if insecure else {}), Path.cwd()))
 
 
 async def _serve(settings: dict[str, Any], folder: Path) -> int:

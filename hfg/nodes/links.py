@@ -3,8 +3,8 @@
     hfg.publish("camera/front", camera.out)          # in one program
     hfg.subscribe("camera/front", viewer.picture)    # in another
 
-Both ends have the type of the port that they are connected to, and say it when they meet. Nothing else is needed on
-this computer but `pip install 'hfg[zenoh]'`; other hosts are reached with a settings file.
+Both ends have the type of the port that they are connected to, and say it when they meet. Programs of one user on one
+computer need nothing else; other hosts and users are reached over Zenoh, with a settings file that names addresses.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ class Publish(Node):
       outbox: a file that keeps what is published and not done, on the disk before it leaves: a program that is killed
         and begun again goes on with it, and subscribers that have lived on get each value once. It waits as with
         absent="wait"; empty: what was on its way is lost with the program.
-      transport: "zenoh" or "memory"; empty: the environment variable HFG_TRANSPORT, else Zenoh, and memory in virtual
-        time.
-      settings: the settings file of Zenoh, or the name of a network in memory; empty: HFG_SETTINGS, else this computer
-        alone.
+      transport: "local", "zenoh" or "memory"; empty: the environment variable HFG_TRANSPORT, else memory in virtual
+        time, Zenoh if settings name an address, and local sockets if not.
+      settings: the settings file of Zenoh, or the name of a network in memory; empty: HFG_SETTINGS, else none: programs
+        of this user on this computer.
 
     Raises:
       UsageError: it is connected to no port whose values can cross, the name is none, or an outbox is asked for with
