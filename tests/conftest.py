@@ -12,9 +12,11 @@ import pytest
 from hypothesis import settings
 
 from hfg.engine.runtime import settings as run_settings
+from tests.limits import patience
 
-settings.register_profile("suite", derandomize=True)
-settings.register_profile("soak", derandomize=False, print_blob=True)
+# No deadline: how long an example takes says something of the machine only.
+settings.register_profile("suite", derandomize=True, deadline=None)
+settings.register_profile("soak", derandomize=False, print_blob=True, deadline=None)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -27,6 +29,15 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.option.fuse_after is not None:
         run_settings.FUSE_AFTER = config.option.fuse_after
     settings.load_profile("soak" if config.option.markexpr == "soak" else "suite")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Limits end what hangs, and nothing else: they are longer on a slow machine."""
+    usual = float(config.getini("timeout") or 0)
+    for item in items:
+        marker = item.get_closest_marker("timeout")
+        seconds = marker.args[0] if marker is not None and marker.args else usual
+        item.add_marker(pytest.mark.timeout(patience(seconds)), append=False)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.limits import patience
+
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = sorted(file for file in (ROOT / "examples").glob("*.py") if not file.name.startswith("_"))
 ON_PICTURES = sorted((ROOT / "examples" / "vision").glob("*.py"))  # tests/examples/test_vision.py runs them
@@ -17,7 +19,12 @@ ON_PICTURES = sorted((ROOT / "examples" / "vision").glob("*.py"))  # tests/examp
 
 def hfg(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "hfg", *arguments], cwd=ROOT, capture_output=True, text=True, check=False, timeout=50
+        [sys.executable, "-m", "hfg", *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=patience(50),
     )
 
 

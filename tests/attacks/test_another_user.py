@@ -34,6 +34,7 @@ from tests.attacks.another_user import (
     spoils,
     unix_names,
 )
+from tests.limits import patience
 
 pytestmark = [
     pytest.mark.rule("L5"),
@@ -151,7 +152,7 @@ class Victims:
             program.terminate()
         for program in self.programs.values():
             with contextlib.suppress(subprocess.TimeoutExpired):
-                program.communicate(timeout=60)
+                program.communicate(timeout=patience(60))
             program.kill()
 
 
@@ -279,7 +280,7 @@ def test_a_place_that_another_user_has_made_first_is_refused_in_a_sentence(how: 
             env=os.environ | {"XDG_STATE_HOME": str(squatted), "TMPDIR": str(folder)},
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=patience(120),
             check=False,
         )
         assert begun.returncode == 1

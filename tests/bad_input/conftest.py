@@ -9,6 +9,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.limits import patience
+
 
 def group_threads() -> list[str]:
     """The threads of thread groups that live."""
@@ -37,7 +39,7 @@ def _nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(asyncio.Runner, "close", closing)
     yield
     assert left == []
-    until = time.monotonic() + 5
+    until = time.monotonic() + patience(5)
     while group_threads() and time.monotonic() < until:
         time.sleep(0.01)
     assert group_threads() == []

@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.limits import patience
+
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 
 PROGRAM = """
@@ -97,7 +99,7 @@ def interrupted(where: str, presses: int) -> Ended:
         if presses == 2:
             time.sleep(0.1)
             process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=40)
+        out, error = process.communicate(timeout=patience(40))
         return Ended(process.returncode, said + out.splitlines(), error)
     finally:
         if process.poll() is None:

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from hfg.starting import is_command
+from tests.limits import patience
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 
@@ -87,7 +88,7 @@ class Process:
     def end(self) -> tuple[int, str]:
         """Give the exit code, and what went to standard error."""
         assert self._process is not None
-        out, err = self._process.communicate(timeout=40)
+        out, err = self._process.communicate(timeout=patience(40))
         self.said += out.split()
         return self._process.returncode, err
 

@@ -21,6 +21,7 @@ from hfg.cli.live import EVERY_S, Live, live_table
 from hfg.cli.terminal import Foot
 from tests.cli.conftest import STEPS, Command
 from tests.cli.screen import Screen
+from tests.limits import patience
 
 
 @hfg.node
@@ -146,7 +147,7 @@ class Terminal:
 
     def read_until(self, text: str) -> None:
         """Read until this has been seen since the last call, or the process is over."""
-        until = time.monotonic() + 20
+        until = time.monotonic() + patience(20)
         begun = len(self.seen)
         while text not in self.seen[begun:]:
             assert time.monotonic() < until, self.seen
@@ -162,7 +163,7 @@ class Terminal:
     def end(self) -> int:
         """Read all that comes; give the exit code."""
         self.read_until("\0")
-        return self.process.wait(10)
+        return self.process.wait(patience(10))
 
     def go_away(self) -> None:
         """Close the terminal, and say so as a kernel would."""
@@ -218,7 +219,7 @@ def test_a_process_that_is_to_end_tears_down(folder: Path, terminals: list[Termi
         assert terminal.end() == 1
     else:
         terminal.go_away()
-        assert terminal.process.wait(10) == 1
+        assert terminal.process.wait(patience(10)) == 1
     assert (folder / "torn down").exists()
 
 

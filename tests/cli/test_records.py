@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.limits import patience
+
 LOUD = """
 import logging
 from collections.abc import Iterator
@@ -63,7 +65,7 @@ def errors_of(folder: Path, *arguments: str, configuration: str = "") -> list[st
         text=True,
         check=False,
         env={**os.environ, "NO_COLOR": "1"},
-        timeout=50,
+        timeout=patience(50),
     )
     assert done.returncode == 0, done.stderr
     return done.stderr.splitlines()

@@ -12,6 +12,7 @@ import pytest
 
 from hfg.cli.terminal import Foot, is_terminal
 from tests.cli.screen import Screen
+from tests.limits import patience
 
 
 @pytest.fixture
@@ -162,11 +163,11 @@ def test_whoever_leaves_at_once_leaves_no_lines_and_waits_for_nobody(screen: Scr
         def draw() -> None:
             with foot._lock:
                 drawing.set()
-                done.wait(10)
+                done.wait(patience(10))
 
         thread = threading.Thread(target=draw)
         thread.start()
-        drawing.wait(10)
+        drawing.wait(patience(10))
         foot.leave()  # somebody draws at the moment, and the terminal does not take it
         done.set()
         thread.join()

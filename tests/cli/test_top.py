@@ -22,6 +22,7 @@ from hfg.engine.face import watching
 from hfg.engine.face.watching import Question
 from hfg.errors import TargetError
 from tests.cli.conftest import Command
+from tests.limits import patience
 
 pytestmark = pytest.mark.skipif(not hasattr(socket, "AF_UNIX"), reason="there are no Unix domain sockets")
 
@@ -59,12 +60,12 @@ def running(name: str = "ticking") -> Iterator[asyncio.AbstractEventLoop]:
 
     thread = threading.Thread(target=lambda: asyncio.run(live()))
     thread.start()
-    assert ready.wait(10)
+    assert ready.wait(patience(10))
     try:
         yield loops[0]
     finally:
         loops[0].call_soon_threadsafe(ends[0].set)
-        thread.join(10)
+        thread.join(patience(10))
 
 
 @contextmanager

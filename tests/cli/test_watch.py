@@ -24,6 +24,7 @@ from hfg.cli import top
 from hfg.cli.sockets import Line, runs
 from hfg.engine.face.watching import Question
 from tests.cli.conftest import Command
+from tests.limits import patience
 
 needs_sockets = pytest.mark.skipif(not hasattr(socket, "AF_UNIX"), reason="there are no Unix domain sockets")
 
@@ -63,13 +64,13 @@ def program(**options: Any) -> Iterator[None]:
 
     thread = threading.Thread(target=lambda: hfg.run(ticking(), begin=begin, **options))
     thread.start()
-    assert ready.wait(10)
+    assert ready.wait(patience(10))
     try:
         yield
     finally:
         loop, run = begun[0]
         loop.call_soon_threadsafe(run.stop)
-        thread.join(10)
+        thread.join(patience(10))
 
 
 @needs_sockets
@@ -172,7 +173,7 @@ def test_tap_ends_with_the_run_and_says_so(command: Command) -> None:
         thread.start()
         while not any(guest for guest in runs()):
             pass
-    thread.join(10)
+    thread.join(patience(10))
     assert shown[0].code in (0, 2)  # it came before the end, or behind it
     assert "is over" in shown[0].err or "no graph" in shown[0].err
 
@@ -255,4 +256,4 @@ def test_whoever_reads_may_have_enough(tmp_path: Path, flush: str) -> None:
         assert process.stdout.readline() == b"line 1\n"
         process.stdout.close()
         assert process.stderr.read() == b""
-        assert process.wait(20) == 1
+        assert process.wait(patience(20)) == 1

@@ -16,6 +16,7 @@ import hfg
 from hfg.testing import Recorder
 from hfg.testing.nodes import Relay, double, script, sink
 from hfg.trace import FiringEnded, FiringStarted, RunEnded, RunStarted, TokenSent, TraceEvent
+from tests.limits import patience
 
 T = TypeVar("T")
 
@@ -177,7 +178,7 @@ def test_a_consumer_that_blocks_has_a_thread_of_its_own() -> None:
         may = threading.Event()
 
         def consumer(event: TraceEvent) -> None:
-            may.wait(10)
+            may.wait(patience(10))
             threads.append(threading.current_thread().name)
             if isinstance(event, TokenSent):
                 sent.append(event.token.sequence)

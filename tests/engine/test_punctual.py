@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import hfg
+from tests.limits import patience
 
 needs_epoll = pytest.mark.skipif(not hasattr(selectors, "EpollSelector"), reason="only epoll waits by the millisecond")
 
@@ -62,7 +63,7 @@ def test_what_comes_from_another_thread_wakes_it() -> None:
         loop = asyncio.get_running_loop()
         came: asyncio.Future[str] = loop.create_future()
         threading.Thread(target=lambda: loop.call_soon_threadsafe(came.set_result, "woken")).start()
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             return await came
 
     with asyncio.Runner(loop_factory=hfg.PunctualLoop) as runner:

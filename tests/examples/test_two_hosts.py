@@ -10,6 +10,7 @@ import pytest
 
 import hfg
 from hfg.cli.target import load_graph
+from tests.limits import patience
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "two_hosts"
 
@@ -27,7 +28,7 @@ def test_a_cable_that_is_pulled_loses_nothing() -> None:
         [sys.executable, str(FOLDER / "two_hosts.py"), "--count", "100", "--out", "2"],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=patience(120),
         check=False,
     )
     if told.returncode == 2:

@@ -21,6 +21,7 @@ from hfg.files import text_of
 from hfg.files.describing import describe
 from hfg.nodes import vision
 from hfg.testing import fire
+from tests.limits import patience
 
 FOLDER = Path(__file__).parents[2] / "examples" / "vision"
 NAMES = ("codes", "coins", "pedestrians", "stereo")
@@ -81,7 +82,7 @@ def test_code_and_file_say_the_same_and_write_the_same(name: str) -> None:
 def test_both_run_as_a_reader_would_run_them(command: list[str]) -> None:
     *before, last = command
     ran = subprocess.run(
-        [sys.executable, *before, str(FOLDER / last)], capture_output=True, text=True, check=False, timeout=50
+        [sys.executable, *before, str(FOLDER / last)], capture_output=True, text=True, check=False, timeout=patience(50)
     )
     assert (ran.returncode, ran.stdout.strip()) == (0, COINS), ran.stderr
     assert Path("out/coins.png").is_file()

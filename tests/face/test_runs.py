@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import pytest
 
 import hfg
+from tests.limits import patience
 
 
 class Pose(NamedTuple):
@@ -220,7 +221,7 @@ def test_threads_send_in_order(fetch: Fetch, drive: Any) -> None:
 
                 def driver() -> None:
                     futures = [feed.send_from_thread(number) for number in range(5)]
-                    futures[-1].result(timeout=5)
+                    futures[-1].result(timeout=patience(5))
                     assert all(future.done() for future in futures)
 
                 await asyncio.to_thread(driver)
@@ -515,7 +516,7 @@ def test_thread_of_a_driver_may_trigger_events(drive: Any, debug: bool) -> None:
             self.thread.start()
 
         def teardown(self) -> None:
-            self.thread.join(5)
+            self.thread.join(patience(5))
 
         def work(self) -> None:
             for number in range(5):

@@ -22,6 +22,7 @@ from hfg.links.local.place import NAME_SIZE, Place
 from hfg.links.local.proof import CLAIM_SIZE, NONCE_SIZE, Caller, Listener, Refused, Seals
 from hfg.links.local.wire import LONG, Frame, Inflow, Kind, frame
 from hfg.transport import Message, Traffic
+from tests.limits import patience
 
 pytestmark = [pytest.mark.skipif(sys.platform != "linux", reason="the sockets are Linux's"), pytest.mark.rule("L5")]
 
@@ -47,7 +48,7 @@ class Heard:
         return [bytes(header) for header, _ in self.messages]
 
     async def wait(self, true: Callable[[], object]) -> None:
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             while not true():
                 self._more.clear()
                 await self._more.wait()
@@ -65,7 +66,7 @@ class Two:
 
     async def is_known(self) -> None:
         """Wait until the one knows what the other wants."""
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             while not self.exact.wanted:
                 await asyncio.sleep(0)
 
@@ -223,14 +224,14 @@ def test_who_knocks_too_often_is_turned_away_at_once_and_no_one_waits_for_ever(
 
     async def scenario(both: Two) -> None:
         strangers = []
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             while not both.there.refused:
                 try:
                     strangers.append(both.here._place.connect(both.there._name))
                 except BlockingIOError:  # more wait than the system keeps
                     await asyncio.sleep(0)
         assert both.there._greeted <= session._MOST_GREETED
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             while both.there._greeted:
                 await asyncio.sleep(0.01)
         for one in strangers:

@@ -40,6 +40,7 @@ from hfg.nodes.files import (
 from hfg.nodes.video import VideoFile
 from hfg.recording.messages import TokenReader
 from hfg.testing import fire
+from tests.limits import patience
 
 pytestmark = pytest.mark.rule("L4")
 
@@ -233,7 +234,7 @@ def test_files_of_some_kilobytes_cost_no_gigabytes(tmp_path: Path) -> None:
     (tmp_path / "a.npy").write_bytes(ARRAYS["says that a terabyte follows"])
     (tmp_path / "a.npz").write_bytes(npz(a=npy("(134217729,)", data=bytes(2**20))))
     files = [str(tmp_path / name) for name in ("a.png", "a.npy", "a.npz")]
-    done = subprocess.run([sys.executable, "-c", _BOMBS, *files], capture_output=True, text=True, timeout=300)
+    done = subprocess.run([sys.executable, "-c", _BOMBS, *files], capture_output=True, text=True, timeout=patience(300))
     *said, more = done.stdout.splitlines()
     assert [line.partition(" ")[0] for line in said] == ["ValueError"] * 3, done.stderr
     assert int(more) < 100, f"{more} MiB"

@@ -19,6 +19,7 @@ import pytest
 import hfg
 from hfg.nodes import collections, files, flow, values
 from hfg.testing import fire
+from tests.limits import patience
 
 PICTURE = np.arange(6 * 8 * 3, dtype=np.uint8).reshape(6, 8, 3)
 
@@ -667,14 +668,14 @@ def test_a_program_answers_each_line_of_a_pipe_as_it_comes() -> None:
             running.stdin.write(line + "\n")
             running.stdin.flush()
             assert running.stdout.readline() == line.upper() + "\n"  # before the next one is sent
-        rest, errors = running.communicate("drei\nvier", timeout=60)
+        rest, errors = running.communicate("drei\nvier", timeout=patience(60))
     assert (rest, errors, running.returncode) == ("DREI\nVIER\ndone\n", "", 0)
 
 
 def test_a_program_that_is_stopped_does_not_wait_for_the_keyboard() -> None:
     with program(ECHO.replace("hfg.run(graph)", "hfg.run(graph, until_s=0.2)")) as running:
         try:
-            assert running.wait(timeout=60) == 0  # nothing was sent, and the pipe is still open
+            assert running.wait(timeout=patience(60)) == 0  # nothing was sent, and the pipe is still open
         finally:
             running.kill()
         assert running.stdout is not None

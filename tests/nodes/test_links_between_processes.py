@@ -14,10 +14,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.limits import patience
+
 pytest.importorskip("zenoh", reason="needs pip install 'hfg[zenoh]'")
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE_S = 60
+PATIENCE_S = patience(60)
 
 
 def free_port() -> int:

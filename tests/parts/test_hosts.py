@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 from hfg.cli import main
+from tests.limits import patience
 from tests.transports.zenoh.conftest import free_port
 
 pytest.importorskip("zenoh", reason="hosts speak over Zenoh")
@@ -140,7 +141,7 @@ def is_there(process: int) -> bool:
 
 def wait_for(condition: Callable[[], object], within_s: float = 120.0) -> None:
     """Look until it holds; how fast that is depends on the machine alone."""
-    end = time.monotonic() + within_s
+    end = time.monotonic() + patience(within_s)
     while not condition():
         assert time.monotonic() < end, "it never came true"
         time.sleep(0.02)
@@ -213,7 +214,7 @@ def test_a_run_is_deployed_looked_at_restarted_and_stopped_from_another_host(
     for agent in agents:
         agent.terminate()
     for agent in agents:
-        assert agent.wait(timeout=60) == 0
+        assert agent.wait(timeout=patience(60)) == 0
     assert shared_memory() <= before
 
 
@@ -235,8 +236,8 @@ def test_whoever_is_killed_nothing_is_left_and_the_rest_goes_on(cell: Cell) -> N
     (agent,) = cell.agents("arm")  # at the same port
     cell.come(20)
     run.send_signal(signal.SIGINT)
-    assert run.wait(timeout=60) == 1
+    assert run.wait(timeout=patience(60)) == 1
     assert cell.values() == list(range(len(cell.values())))
     wait_for(lambda: not cell.processes())
     agent.send_signal(signal.SIGINT)
-    assert agent.wait(timeout=60) == 0
+    assert agent.wait(timeout=patience(60)) == 0

@@ -17,6 +17,7 @@ import pytest
 
 from hfg.parts.processes import launching
 from hfg.parts.processes.meeting import MeetingPlace
+from tests.limits import patience
 
 pytest.importorskip("zenoh", reason="processes speak over Zenoh")
 
@@ -71,7 +72,7 @@ def program(folder: Path, body: str) -> subprocess.Popen[str]:
 
 def wait_for(condition: Callable[[], object], within_s: float = 30.0) -> None:
     """Look until it holds; how fast that is depends on the machine alone."""
-    end = time.monotonic() + within_s
+    end = time.monotonic() + patience(within_s)
     while not condition():
         assert time.monotonic() < end, "it never came true"
         time.sleep(0.02)
@@ -172,7 +173,7 @@ def test_who_leaves_at_once_without_an_end_leaves_no_folder(tmp_path: Path, leav
         [sys.executable, "-c", textwrap.dedent(leaves)],
         env=os.environ | {"TMPDIR": str(tmp_path)},
         stderr=subprocess.PIPE,
-        timeout=60,
+        timeout=patience(60),
     )
     assert b"KeyboardInterrupt" in left.stderr or b"interrupted twice: left at once" in left.stderr
     assert not list(tmp_path.glob("hfg-meet-*"))
@@ -214,7 +215,7 @@ def test_a_process_that_is_forked_from_a_run_leaves_its_folder_alone(tmp_path: P
         assert place.folder.exists()
     """
     left = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(forks)], env=os.environ | {"TMPDIR": str(tmp_path)}, timeout=60
+        [sys.executable, "-c", textwrap.dedent(forks)], env=os.environ | {"TMPDIR": str(tmp_path)}, timeout=patience(60)
     )
     assert left.returncode == 0
     assert not list(tmp_path.iterdir())
@@ -238,7 +239,7 @@ def test_a_process_that_dies_is_begun_again_and_nothing_is_lost(tmp_path: Path, 
         print(report.errors)
     """,
     )
-    out, err = running.communicate(timeout=60)
+    out, err = running.communicate(timeout=patience(60))
     assert running.returncode == 0, err
     assert 'the process of group "far" was begun again 1 times' in out
     assert ("has ended with code 3" if how == "exit" else "was ended by SIGKILL") in err
@@ -289,7 +290,7 @@ def test_a_process_that_waits_already_takes_the_place_of_one_that_dies(tmp_path:
         print(*found, spare())
     """,
     )
-    out, err = running.communicate(timeout=60)
+    out, err = running.communicate(timeout=patience(60))
     assert running.returncode == 0, err
     *processes, last_spare = map(int, out.split())
     assert last_spare == 0
@@ -312,7 +313,7 @@ def test_a_process_whose_loop_stands_still_is_ended_and_begun_again(tmp_path: Pa
         assert hfg.run(graph).outputs == {{"out": list(range(200))}}
     """,
     )
-    _, err = running.communicate(timeout=60)
+    _, err = running.communicate(timeout=patience(60))
     assert running.returncode == 0, err
     assert "was ended by SIGKILL, for its event loop has not gone round for" in err
     nothing_is_left(tmp_path, pids)
@@ -372,7 +373,7 @@ def test_a_real_process_is_edited_dies_and_is_as_it_was_edited(tmp_path: Path) -
         asyncio.run(main())
     """,
     )
-    _, err = running.communicate(timeout=60)
+    _, err = running.communicate(timeout=patience(60))
     assert running.returncode == 0, err
 
 
@@ -391,7 +392,7 @@ def test_however_the_main_process_ends_nothing_is_left(tmp_path: Path, how: sign
     try:
         wait_for(lambda: pids.exists() and len(pids.read_text().split()) > 10)
         running.send_signal(how)
-        running.communicate(timeout=30)
+        running.communicate(timeout=patience(30))
     finally:
         running.kill()
     nothing_is_left(tmp_path, pids)
@@ -414,7 +415,7 @@ def test_a_program_that_cannot_be_imported_by_its_workers_is_told_so_in_one_sent
         print(error)
     """,
     )
-    out, err = running.communicate(timeout=60)
+    out, err = running.communicate(timeout=patience(60))
     assert 'the process of group "far" cannot import' in out, err
     assert "not here" in out
 
@@ -433,7 +434,7 @@ def test_what_nodes_print_and_log_elsewhere_is_seen_here(tmp_path: Path) -> None
         hfg.run(graph)
     """,
     )
-    out, err = running.communicate(timeout=60)
+    out, err = running.communicate(timeout=patience(60))
     assert running.returncode == 0, err
     assert out.split("\n") == ["printed 0", "printed 1", ""]
     assert [line for line in err.split("\n") if "logged" in line] == [

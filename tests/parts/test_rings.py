@@ -21,6 +21,7 @@ from hfg.parts.model.messages import Sees, Shares
 from hfg.parts.running.rings import Borrowing, Lending, LendingCounts, segment_of, segments_of, sweep_run, sweep_runs
 from hfg.sharedmemory import Ring, unavailable
 from hfg.token import Token
+from tests.limits import patience
 
 PROGRAM = Path(__file__).with_name("pictures.py")
 pytestmark = pytest.mark.skipif(unavailable() is not None, reason=str(unavailable()))
@@ -278,7 +279,7 @@ def run_program(
     pytest.importorskip("hfg_transports.zenoh")
     arguments = json.dumps([count, keeps, flip_dies_at, str(mark), judge_dies_at])
     done = subprocess.run(
-        [sys.executable, str(PROGRAM), arguments], capture_output=True, text=True, timeout=100, check=False
+        [sys.executable, str(PROGRAM), arguments], capture_output=True, text=True, timeout=patience(100), check=False
     )
     return done, [json.loads(line) for line in done.stdout.splitlines()]
 

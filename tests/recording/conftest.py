@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import hfg
+from tests.limits import patience
 
 PROGRAM = """
 from collections.abc import Iterator
@@ -79,7 +80,7 @@ def command(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
             capture_output=True,
             text=True,
             env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
-            timeout=60,
+            timeout=patience(60),
             check=False,
         )
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from hfg.recording import File
+from tests.limits import patience
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -89,7 +90,7 @@ def test_a_recorder_that_is_killed_or_interrupted_leaves_a_file_that_opens(
             except subprocess.TimeoutExpired:
                 continue
         process.send_signal(how)
-        code = process.wait(30)
+        code = process.wait(patience(30))
     with File(file) as recording:
         found = recording.info()
     assert found.whole is whole

@@ -22,6 +22,7 @@ from hfg.recording import File, RecordingInfo, play_into, recover
 from hfg.recording.layout import Layout
 from hfg.recording.reading import RawMessage
 from hfg.recording.values import CannotKeep, Codec
+from tests.limits import patience
 from tests.recording import damage
 from tests.recording.conftest import build
 
@@ -261,7 +262,11 @@ def test_a_few_kilobytes_cost_no_gigabytes(tmp_path: Path) -> None:
         files.append(tmp_path / f"{number}.mcap")
         files[-1].write_bytes(damage.hostile(name))
     done = subprocess.run(
-        [sys.executable, "-c", _BOUNDED, *map(str, files)], capture_output=True, text=True, check=True, timeout=300
+        [sys.executable, "-c", _BOUNDED, *map(str, files)],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=patience(300),
     )
     assert int(done.stdout) < 100, f"{done.stdout} MiB more than before"
 

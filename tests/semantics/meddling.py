@@ -11,11 +11,12 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 import hfg
+from tests.limits import patience
 from tests.semantics.nodes import Keep, forward, numbers, scale
 
 __all__ = ["MEMBERS", "PATIENCE_S", "Gate", "Turns", "chain"]
 
-PATIENCE_S = 20.0
+PATIENCE_S = patience(20.0)
 MEMBERS = ("forward", "stops", "scale", "last")
 
 

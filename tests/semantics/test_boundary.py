@@ -7,6 +7,7 @@ import asyncio
 import pytest
 
 import hfg
+from tests.limits import patience
 from tests.semantics.nodes import (
     Burst,
     Ear,
@@ -187,7 +188,7 @@ def test_values_come_from_other_threads_in_order(fast: bool) -> None:
 
                 def work() -> None:
                     for future in [feed.send_from_thread(number) for number in range(20)]:
-                        future.result(5)
+                        future.result(patience(5))
 
                 await asyncio.to_thread(work)
             await run.wait_finished()

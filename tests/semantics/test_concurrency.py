@@ -23,6 +23,7 @@ from hfg.trace import (
     TokenTaken,
     TraceEvent,
 )
+from tests.limits import patience
 from tests.semantics.nodes import Ear, Keep, drive, gaps, numbers, of_kind, run, sent, traced
 
 
@@ -487,7 +488,7 @@ def test_writing_twice_or_behind_the_end_of_a_firing_is_an_error(fast: bool) -> 
 @pytest.mark.parametrize("ordered", [True, False])
 def test_firings_of_one_node_share_the_threads_of_its_group(clock: Any, ordered: bool, fast: bool) -> None:
     """Each waits until all three have come, which they can only at the same time."""
-    together = threading.Barrier(3, timeout=10)
+    together = threading.Barrier(3, timeout=patience(10))
     names: set[str] = set()
 
     @hfg.node
@@ -508,7 +509,7 @@ def test_firings_of_one_node_share_the_threads_of_its_group(clock: Any, ordered:
 
 @pytest.mark.rule("R1")
 def test_two_nodes_of_a_group_with_two_threads_run_at_once_and_none_beside_itself(fast: bool) -> None:
-    together = threading.Barrier(2, timeout=10)
+    together = threading.Barrier(2, timeout=patience(10))
     inside: list[object] = []
 
     def meet(name: str) -> Any:
@@ -536,7 +537,7 @@ def test_a_thread_that_does_not_come_back_costs_one_firing(fast: bool) -> None:
     @hfg.node
     def sometimes(value: int) -> int:
         if value == 2:
-            stuck.wait(30)
+            stuck.wait(patience(30))
         return value
 
     graph, sink = asking(sometimes(), 6, concurrency=2, group="work", max_duration_s=0.05, on_error="skip")

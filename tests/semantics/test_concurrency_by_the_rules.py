@@ -17,6 +17,7 @@ from hfg import END, NO_MESSAGE
 from hfg.testing import Recorder, replay
 from hfg.testing.nodes import Doubter, Tally, add, ascript, script, sink, slow_double
 from hfg.trace import CallEnded, CallStarted, ErrorRaised, FiringEnded, NodeEnabled
+from tests.limits import patience
 from tests.semantics.nodes import drive
 from tests.semantics.readings import by_engine, sent, starts
 
@@ -502,7 +503,7 @@ def test_in_a_group_with_several_threads_they_really_run_at_the_same_time() -> N
     meeting = threading.Barrier(3)
 
     def meets(value: int) -> int:
-        meeting.wait(30)
+        meeting.wait(patience(30))
         return value
 
     graph = hfg.Graph()

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import hfg
+from tests.limits import patience
 from tests.semantics.nodes import (
     Ear,
     Keep,
@@ -43,7 +44,7 @@ def test_nodes_of_one_thread_group_share_its_thread_and_never_run_at_the_same_ti
 
 @pytest.mark.rule("R1")
 def test_different_groups_really_run_at_the_same_time() -> None:
-    barrier = threading.Barrier(2, timeout=5)
+    barrier = threading.Barrier(2, timeout=patience(5))
     Meets.barrier = barrier
     graph = hfg.Graph()
     source = graph.add(numbers(count=3))

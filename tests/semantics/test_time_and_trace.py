@@ -26,6 +26,7 @@ from hfg.trace import (
     TokenTaken,
     TraceEvent,
 )
+from tests.limits import patience
 from tests.semantics.nodes import (
     Clock,
     Countdown,
@@ -54,7 +55,7 @@ class Looking(hfg.Node):
 
     def process(self, value: int) -> None:
         self.begun.set()
-        self.may_look.wait(10.0)
+        self.may_look.wait(patience(10.0))
         self.seen.append(self.active)
 
 

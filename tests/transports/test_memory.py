@@ -15,6 +15,7 @@ from hfg.errors import MessageTooLarge, NoAnswer, TransportError
 from hfg.testing.transports import Collected, TransportTests
 from hfg.transport import Presence, Session, Traffic, Transport
 from hfg_transports.memory import Faults, MemorySession, Network, transport
+from tests.limits import patience
 
 BAD = Faults(loss=0.2, repetition=0.1, reordering=0.1, delay_s=(0.0, 0.005))
 
@@ -187,9 +188,9 @@ def test_sessions_on_loops_of_several_threads_hear_each_other() -> None:
     results: list[list[bytes]] = []
     thread = threading.Thread(target=lambda: results.append(asyncio.run(elsewhere())))
     thread.start()
-    assert ready.wait(10.0)
+    assert ready.wait(patience(10.0))
     back = asyncio.run(here())
-    thread.join(10.0)
+    thread.join(patience(10.0))
     assert results == [[b"%d" % number for number in range(1000)]]
     assert back == [b"%d!" % number for number in range(1000)]
 

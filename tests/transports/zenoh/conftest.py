@@ -15,10 +15,11 @@ import pytest_asyncio
 
 from hfg.cli.certificates import make_authority, make_certificate
 from hfg_transports.zenoh import Settings, Tls, ZenohSession, ZenohTransport
+from tests.limits import patience
 
 T = TypeVar("T")
 
-PATIENCE_S = 20.0
+PATIENCE_S = patience(20.0)
 """How long a slow machine may take for what takes milliseconds."""
 
 

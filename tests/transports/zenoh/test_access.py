@@ -14,6 +14,7 @@ from hfg.errors import NoAnswer
 from hfg.transport import Message, Presence, Traffic
 from hfg_transports.zenoh import Access, ZenohSession
 from hfg_transports.zenoh.names import Keys
+from tests.limits import patience
 from tests.transports.zenoh.conftest import Certificates, Open, free_port, into, put_until, soon, until
 
 pytestmark = pytest.mark.asyncio
@@ -64,7 +65,7 @@ async def test_a_viewer_sees_values_and_who_is_there_and_asks_for_what_may_be_re
 
 async def answered(session: ZenohSession, name: str) -> bytes:
     """Ask until the answerer has got around."""
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(patience(20)):
         while True:
             try:
                 return await session.ask(name)

@@ -11,6 +11,7 @@ import pytest
 
 from hfg_transports.zenoh import inbox as module
 from hfg_transports.zenoh.inbox import Inbox, Mailbox
+from tests.limits import patience
 
 
 class CountingLoop:
@@ -158,7 +159,7 @@ def test_threads_that_hurry_lose_nothing_and_keep_their_order() -> None:
         workers = [threading.Thread(target=work, args=(mailbox,)) for mailbox in mailboxes]
         for worker in workers:
             worker.start()
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(patience(30)):
             await complete.wait()
         for worker in workers:
             worker.join()
