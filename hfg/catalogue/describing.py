@@ -74,6 +74,7 @@ class ParameterDescription(msgspec.Struct, frozen=True):
       limits: by name: "gt", "ge", "lt", "le", "multiple_of", "min_length", "max_length", "predicate".
       choices: the only allowed values, or members of them, or None.
       labels: what to call the choices.
+      unit: "m/s"; "1" of a number without one, "of the value" of one that has the unit of what comes in.
       step: by how much an editor moves the value.
       group: what it is shown with.
       shown_if: when it is shown, in words, as in "mode is 'custom'".
@@ -114,8 +115,14 @@ class ParameterDescription(msgspec.Struct, frozen=True):
 
     def facts(self) -> list[str]:
         """Say what goes for it beside its meaning: limits, the unit, when it is shown."""
-        said = [*self.limits_in_words(), *([f"in {self.unit}"] if self.unit else [])]
+        said = [*self.limits_in_words(), *([_unit_in_words(self.unit)] if self.unit else [])]
         return said + ([f"shown if {' and '.join(self.shown_if)}"] if self.shown_if else [])
+
+
+def _unit_in_words(unit: str) -> str:
+    if unit == "1":
+        return "a plain number"
+    return f"in the unit {unit}" if unit.startswith("of ") else f"in {unit}"
 
 
 class ErrorDescription(msgspec.Struct, frozen=True):

@@ -10,15 +10,18 @@ import inspect
 import keyword
 import re
 import textwrap
+import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
+
+from annotated_types import Unit
 
 from hfg.declaration import RESERVED
 from hfg.functions import NodeFunction, make_type
 from hfg.ports.specs import REQUIRED
 
-__all__ = ["Port", "Recipe", "Setting", "make", "port_name"]
+__all__ = ["Port", "Recipe", "Setting", "holds_reals", "make", "port_name"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,7 @@ class Setting:
     hint: Any
     default: Any
     about: str
+    unit: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +75,7 @@ def make(recipe: Recipe, module: str, qualname: str, doc: str | None = None) -> 
 
     single = [port.name for port in recipe.outputs] == ["out"]
     hints = {port.name: port.hint | None if port.optional else port.hint for port in recipe.inputs}
-    hints |= {setting.name: setting.hint for setting in recipe.settings}
+    hints |= {setting.name: _with_unit(setting) for setting in recipe.settings}
     hints["return"] = recipe.outputs[0].hint if single else None if not recipe.outputs else Any
     arguments = [
         inspect.Parameter(
@@ -97,6 +101,15 @@ def make(recipe: Recipe, module: str, qualname: str, doc: str | None = None) -> 
     setattr(function, "__signature__", inspect.Signature(arguments))  # noqa: B010 - type checkers do not know it
     outputs = None if single or not recipe.outputs else {port.name: port.hint for port in recipe.outputs}
     return make_type(function, module, outputs=outputs)
+
+
+def holds_reals(hint: Any) -> bool:
+    """Say whether a value of this type is, or consists of, real numbers: those need a unit."""
+    return hint is float or (typing.get_origin(hint) is not Literal and any(map(holds_reals, typing.get_args(hint))))
+
+
+def _with_unit(setting: Setting) -> Any:
+    return setting.hint if setting.unit is None else Annotated[setting.hint, Unit(setting.unit)]
 
 
 def docstring(recipe: Recipe) -> str:

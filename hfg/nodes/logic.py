@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, Final, Literal, TypeVar
 
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.nodes._equality import same
@@ -203,7 +203,7 @@ def compare(
     b: float,
     *,
     operation: Literal["==", "!=", "<", "<=", ">", ">="] = "==",
-    tolerance: Annotated[float, Interval(ge=0)] = 0.0,
+    tolerance: Annotated[float, Interval(ge=0), Unit("of the value")] = 0.0,
 ) -> bool:
     """Compare two numbers.
 
@@ -238,7 +238,7 @@ def equal(a: object, b: object) -> bool:
 
 
 @node
-def threshold(value: float, *, threshold: float = 0.5) -> bool:
+def threshold(value: float, *, threshold: Annotated[float, Unit("of the value")] = 0.5) -> bool:
     """Say whether a number is larger than a threshold.
 
     The threshold itself is not larger, and a NaN never is. A value that trembles around it makes a result that
@@ -257,8 +257,8 @@ def threshold(value: float, *, threshold: float = 0.5) -> bool:
 def in_range(
     value: float,
     *,
-    lower: float = 0.0,
-    upper: float = 1.0,
+    lower: Annotated[float, Unit("of the value")] = 0.0,
+    upper: Annotated[float, Unit("of the value")] = 1.0,
     closed: Literal["both", "lower", "upper", "neither"] = "both",
 ) -> bool:
     """Say whether a number lies between two limits.
@@ -299,8 +299,8 @@ class Hysteresis(Node):
     is_high = Output(bool)
     rose = Event(float)
     fell = Event(float)
-    low = Parameter(0.4)
-    high = Parameter(0.6)
+    low = Parameter(0.4, unit="of the value")
+    high = Parameter(0.6, unit="of the value")
     initially = Parameter(False)
     answer = State[bool | None](None)
 

@@ -42,7 +42,7 @@ class Playback(Node):
 
     file = Parameter(Path("recording.mcap"))
     port = Parameter("")
-    speed = Parameter(1.0, Ge(0.0), step=0.5)
+    speed = Parameter(1.0, Ge(0.0), step=0.5, unit="1")
     out = Output(Any)
     signal = Event(Any)
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import AsyncIterator
-from typing import Any
+from typing import Annotated, Any
 
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, Unit
 
 from hfg import clock
 from hfg.functions import node
@@ -206,7 +206,7 @@ class SetStamp(Node):
 
 
 @node
-def shift(time: float, *, offset_s: float = 0.0) -> float:
+def shift(time: float, *, offset_s: Annotated[float, Unit("s")] = 0.0) -> float:
     """Add an offset to a time.
 
     Args:

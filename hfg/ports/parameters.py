@@ -319,7 +319,7 @@ def _opened(hint: Any) -> Any:
     if bare is hint or typing.get_origin(bare) is not Annotated or not accepts(None, hint):
         return hint
     opened: Any = typing.Union[typing.get_args(bare)[0], None]  # noqa: UP007 - some hints know no |
-    for item in bare.__metadata__:
+    for item in (*bare.__metadata__, *getattr(hint, "__metadata__", ())):  # inside of the union, and around it
         opened = Annotated[opened, item]
     return opened
 

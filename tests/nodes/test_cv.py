@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ from hfg.nodes import cv
 from hfg.nodes.cv import _docs, _overrides, _recipes, _stub
 from hfg.ports.specs import REQUIRED
 from hfg.testing import fire
-from hfg.types import compatible, describe
+from hfg.types import accepts, compatible, describe
 from hfg.values import Colour
 from tests.nodes.cv_samples import PARAMETERS, picture, sample
 
@@ -563,3 +564,113 @@ def test_importing_the_family_makes_no_type() -> None:
     program = "from hfg.nodes import cv; print(sum(type(one).__name__ == 'NodeFunction' for one in vars(cv).values()))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "0"
+
+
+# --- what the texts promise ---
+
+_DEPTHS = {
+    "8U": "uint8",
+    "8S": "int8",
+    "16U": "uint16",
+    "16S": "int16",
+    "32S": "int32",
+    "32F": "float32",
+    "64F": "float64",
+}
+
+
+def promises(text: str) -> set[tuple[str, int]]:
+    """Read which pixels, and how many channels of them, the description of an input speaks of."""
+    found = set()
+    for depth, channels in re.findall(r"CV_(8U|8S|16U|16S|32S|32F|64F)(?:C(\d))?", text):
+        found.add((_DEPTHS[depth], int(channels) if channels else 1))
+    if re.search(r"gr[ae]y-?scale image", text):
+        found.add(("uint8", 1))
+    bits = re.search(r"\b8-bit", text)
+    if bits and not re.search(r"float", text):
+        counts = re.findall(r"(\d)(?: or (\d))?(?:, or (\d))?-channel", text)
+        wanted = {int(one) for each in counts for one in each if one} or {1}
+        found |= {("uint8", count) for count in wanted}
+    return found
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_an_input_takes_what_its_text_promises(name: str) -> None:
+    for one in describe_type(getattr(cv, name)).inputs:
+        hint = getattr(cv, name)._type.inputs[one.name].type
+        for dtype, channels in promises(one.doc):
+            shapes: list[tuple[int, ...]] = [(6, channels), (6, 1, channels), (1, 6, channels), (6, 6, channels)]
+            shapes += [(6, 6), (6, 2)] if channels == 1 else []
+            shapes += [(3, 1, channels), (4, 1, channels), (256,), (1, 256)]
+            values = [np.ones(shape, dtype) for shape in shapes]
+            assert any(accepts(value, hint) or accepts([value], hint) for value in values), (
+                f"{name}.{one.name} promises {dtype} of {channels} channels ({one.doc}), and is {describe(hint)}"
+            )
+
+
+def test_a_mask_is_a_shape_as_well_as_a_contour() -> None:
+    mask = np.zeros((24, 32), np.uint8)
+    mask[5:9, 6:12] = 255
+    assert fire(cv.bounding_rect(), array=mask).outputs["out"] == cv2.boundingRect(mask) == (6, 5, 6, 4)
+    assert fire(cv.moments(), array=mask).outputs["out"] == cv2.moments(mask)
+    assert fire(cv.moments(binary_image=True), array=mask).outputs["out"]["m00"] == 24
+    assert fire(cv.match_shapes(), contour1=mask, contour2=mask).outputs["out"] == 0
+    corners = np.array([[1, 2], [5, 9]], np.int32)
+    assert fire(cv.bounding_rect(), array=corners).outputs["out"] == (1, 2, 5, 8)
+
+
+def test_points_may_be_rows_or_pairs() -> None:
+    points = np.array([[4, 4], [40, 5], [6, 38]], np.float32)
+    left, right = np.eye(3, 4), np.eye(3, 4)
+    right[0, 3] = -1
+    rows, pairs = (
+        fire(
+            cv.triangulate_points(),
+            proj_matr1=left,
+            proj_matr2=right,
+            proj_points1=one,
+            proj_points2=one + np.float32(1),
+        )
+        for one in (points, points.reshape(-1, 1, 2))
+    )
+    assert rows.outputs["out"].shape == (4, 3)
+    assert np.array_equal(rows.outputs["out"], pairs.outputs["out"])
+
+
+# --- what would end the process ---
+
+FEW = np.ones((6, 5), np.float32)
+WITH_NAN = np.where(np.eye(6, 5) > 0, np.nan, FEW).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("node", "given", "sentence"),
+    [
+        (cv.filter_2d(), {"src": FEW, "kernel": np.full((3, 3), np.nan)}, "filter_2d: kernel has NaN or infinity"),
+        (
+            cv.sep_filter_2d(),
+            {"src": FEW, "kernel_x": np.array([1, np.inf, 1]), "kernel_y": np.ones(3)},
+            "sep_filter_2d: kernel_x has NaN or infinity",
+        ),
+        (cv.bilateral_filter(), {"src": WITH_NAN}, "bilateral_filter: src has a number that is not within 1e15"),
+        (cv.bilateral_filter(), {"src": FEW * 1e30}, "clip it, or replace NaN and infinity, first"),
+        (cv.check_range(), {"a": np.ones((4, 4), np.float16)}, 'input "a" of check_range: expected Array['),
+    ],
+)
+def test_values_that_end_the_process_are_refused(node: Any, given: Any, sentence: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=re.escape(sentence)):
+        fire(node, debug=False, **given)
+
+
+@pytest.mark.parametrize(
+    ("node", "parameters"),
+    [
+        (cv.put_text, {"text": "\ud800"}),
+        (cv.good_features_to_track, {"min_distance": 1e30}),
+        (cv.kmeans, {"criteria": (3, 1e300)}),
+        (cv.fast_nl_means_denoising_multi, {"img_to_denoise_index": 2**31 - 1}),
+    ],
+)
+def test_parameters_that_end_the_process_are_refused(node: Any, parameters: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="must (be|satisfy)"):
+        node(**parameters)

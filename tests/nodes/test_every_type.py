@@ -5,10 +5,14 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from hfg.catalogue import Catalogue, installed, undocumented
 from hfg.catalogue.offers import Offer
+from hfg.nodes._making import holds_reals
+from hfg.registry import find
 from hfg.testing import Trial
 from hfg.testing.usable import try_all
 
@@ -51,3 +55,45 @@ def test_names_are_not_taken_twice_in_a_family(library: Catalogue) -> None:
     names = [(one.category, one.name) for one in library.types]
     doubled = sorted({name for name in names if names.count(name) > 1})
     assert not doubled, "two types have the same name in snake case"
+
+
+def test_every_real_number_has_a_unit_or_is_declared_a_plain_number(library: Catalogue) -> None:
+    """`unit="1"` is a plain number, "of the value" the unit of what comes in; what else there is, people can read."""
+    missing = [
+        f"{one.reference}.{name}"
+        for one in library.types
+        for name, spec in find(one.reference)._type.parameters.items()
+        if holds_reals(spec.type) and not spec.unit
+    ]
+    assert not missing, "\n".join(missing)
+    assert _units(library) <= {"1", "s", "1/s", "m", "px", "rad", "deg", "mm", "Hz", "m/s", "rad/s"} | OF
+
+
+OF = {"of the value", "of the result", "of the points", "of the command", "of the pixel, squared"}
+
+
+def _units(library: Catalogue) -> set[str]:
+    return {one.unit for each in library.types for one in each.parameters if one.unit is not None}
+
+
+RAW = re.compile(
+    r"\\|@\w|\$|\^|<http|\bcv2?[.:]|::|\b(?:param|note|brief|sa) |\b[Tt]h(?:e|is) function\b|overloaded member|^Wrap |"
+    r"^Same as|[Mm]odification of|bindings|\.\.\.$"
+)
+"""What is left of a manual that was written for another tool, or says nothing without the page around it."""
+
+
+def test_the_first_line_of_every_type_is_plain_english(library: Catalogue) -> None:
+    raw = [f"{one.reference}: {one.summary}" for one in library.types if RAW.search(one.summary)]
+    long = [f"{one.reference}: {one.summary}" for one in library.types if len(one.summary) > 160]
+    assert not raw + long, "\n".join(raw + long)
+
+
+DOXYGEN = re.compile(r"\\f[\[$]|\\[a-z]+\{|@(?:param|note|sa|brief|ref|cite|code|snippet|return)\b|\bparam \w+ [A-Z]")
+
+
+def test_no_text_of_the_library_has_markup_of_another_tool(library: Catalogue) -> None:
+    texts = [(one, text) for one in library.types for text in (one.text, *(port.doc for _, port in one.ports()))]
+    texts += [(one, each.doc) for one in library.types for each in one.parameters]
+    raw = [f"{one.reference}: {text}" for one, text in texts if DOXYGEN.search(text)]
+    assert not raw, "\n".join(raw)

@@ -524,5 +524,42 @@ def test_windows_of_time_follow_the_stamps() -> None:
     assert time_windows([]) == []
 
 
+RATES_HZ = (1.0, 3.0, 7.0, 10.0, 24.0, 25.0, 30000 / 1001, 30.0, 50.0, 60.0, 99.9, 100.0, 120.0, 200.0, 1000.0)
+OFFSETS_S = (0.0, 0.1, 1 / 3, 17.77, 1000.1, 86_400.0 + 1e-3, 1.7e9, 1.7e9 + 0.3)
+"""Of stamps: from the start of a run, or of a clock that counts from 1970."""
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+@pytest.mark.parametrize("offset_s", OFFSETS_S)
+def test_a_window_of_time_always_has_the_same_number_of_samples(rate_hz: float, offset_s: float) -> None:
+    """0.3 s at 10 Hz are three values, though 3 * 0.1 is more than 0.3 and 0.7 - 0.4 is less."""
+    stamps = [offset_s + number / rate_hz for number in range(60)]
+    for count in (1, 3, 7):
+        seconds = count / rate_hz
+        side_by_side, sliding = flow.TimeWindow(seconds=seconds), flow.TimeWindow(seconds=seconds, step_s=1 / rate_hz)
+        recent, sizes = flow.Recent(seconds=seconds), []
+        heard: dict[str, list[int]] = {"side by side": [], "sliding": []}
+        for number, stamp in enumerate(stamps):
+            token = hfg.Token(number, 0, stamp)
+            sizes.append(len(fire(recent, value=token).outputs["values"]))
+            for name, node in (("side by side", side_by_side), ("sliding", sliding)):
+                heard[name] += [len(values) for _, values in fire(node, value=token).events]
+        assert set(sizes[count - 1 :]) == {count}
+        assert len(heard["side by side"]) == (len(stamps) - 1) // count
+        assert set(heard["side by side"]) == {count}
+        assert set(heard["sliding"]) == {count}
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_what_is_apart_by_the_tolerance_is_joined_however_stamps_are_rounded(rate_hz: float) -> None:
+    for offset_s in OFFSETS_S:
+        for number in range(20):
+            node = flow.JoinByStamp(values=2, tolerance_s=1 / rate_hz)
+            first = hfg.Token(1, 0, offset_s + number / rate_hz)
+            second = hfg.Token(2, 0, offset_s + (number + 1) / rate_hz)
+            told = fire(node, slot="values[0]", value=first).events + fire(node, slot="values[1]", value=second).events
+            assert told == [("joined", [1, 2])]
+
+
 def test_a_value_whose_windows_are_over_is_left_out() -> None:
     assert time_windows([0.0, 2.5, 0.5, 2.6]) == [[0.0], [2.5, 2.6]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import statistics
 from typing import Any
 
 import numpy as np
@@ -499,8 +500,8 @@ def test_lengths_do_not_overflow_where_squares_would() -> None:
         ("sum", 10),
         ("mean", 2.5),
         ("median", 2.5),
-        ("std", math.sqrt(1.25)),
-        ("variance", 1.25),
+        ("std", math.sqrt(5 / 3)),
+        ("variance", 5 / 3),
         ("minimum", 1),
         ("maximum", 4),
         ("product", 24),
@@ -508,6 +509,19 @@ def test_lengths_do_not_overflow_where_squares_would() -> None:
 )
 def test_one_number_stands_for_a_vector(by: Any, expected: float) -> None:
     assert result(values.summarize(by=by), values=[1, 2, 3, 4]) == pytest.approx(expected)
+
+
+def test_a_standard_deviation_is_that_of_a_sample_everywhere() -> None:
+    numbers = [1.0, 2.0, 4.0, 8.5]
+    wanted = statistics.stdev(numbers)
+    running, window = values.Statistics(), values.WindowStatistics()
+    for number in numbers:
+        last, last_window = fire(running, value=number).outputs, fire(window, value=number).outputs
+    assert last["std"] == pytest.approx(wanted)
+    assert last_window["std"] == pytest.approx(wanted)
+    assert result(values.summarize(by="std"), values=numbers) == pytest.approx(wanted)
+    assert result(values.summarize(by="variance"), values=numbers) == pytest.approx(wanted**2)
+    assert result(values.summarize(by="std"), values=[3.0]) == 0.0
 
 
 def test_noise_of_a_vector_is_in_proportion() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -12,7 +13,7 @@ import skimage.data
 
 import hfg
 from hfg.images import Gray
-from hfg.nodes import vision
+from hfg.nodes import video, vision
 from hfg.testing import fire
 
 
@@ -255,3 +256,22 @@ def test_a_qr_code_is_read_however_it_is_turned() -> None:
         turn[:, 2] += code.shape[0] / 2
         seen = cv2.GaussianBlur(cv2.warpAffine(code, turn, (side, side), borderValue=255), (3, 3), 0)
         assert len(fire(vision.BarcodeReader(kinds="qr"), image=seen).outputs["texts"]) == 1, angle
+
+
+def test_a_text_with_half_of_a_character_is_refused_and_does_not_end_the_process() -> None:
+    with pytest.raises(ValueError, match="the text '\\\\ud800' has half of a character"):
+        fire(vision.qr_code(), text="\ud800")
+    with pytest.raises(ValueError, match="the path"):
+        fire(video.VideoFile(path="a%d\udcff.png"))
+    with pytest.raises(ValueError, match="the path"):
+        fire(video.WriteVideo(path="a\udcff.avi"), image=np.zeros((8, 8), np.uint8))
+
+
+def test_pictures_that_are_too_small_for_native_code_are_refused() -> None:
+    with pytest.raises(ValueError, match="AKAZE needs a picture of at least two rows"):
+        fire(vision.KeypointDetector(method="AKAZE"), image=np.zeros((1, 40), np.uint8))
+
+
+def test_a_video_that_is_too_narrow_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="MJPG needs pictures that are at least 8 pixels wide, got 5 x 9"):
+        fire(video.WriteVideo(path=str(tmp_path / "a.avi")), image=np.zeros((9, 5), np.uint8))

@@ -168,7 +168,7 @@ def _need_sound(node: str, inlet: Inlet, value: Any, deadly: frozenset[tuple[str
                     f'input "{inlet.port.name}" of {node}: {describe_value(array)} ends the process in this version of '
                     "OpenCV; convert it first"
                 )
-        elif inlet.is_points and array.size < 100_000 and _is_far(array):
+        elif inlet.is_points and array.shape[-1] in (2, 3) and array.size < 100_000 and _is_far(array):
             raise ValueError(f'input "{inlet.port.name}" of {node} has a point that is not within {_FARTHEST} pixels')
 
 

@@ -12,6 +12,8 @@ _SIGNATURE = re.compile(r"^\w+\((.*?)\) -> (.+)$")
 _TAG = re.compile(
     r"^@(brief|param|return|returns|note|sa|see|overload|code|endcode|snippet|include)\b\s*", re.MULTILINE
 )
+_DECORATION = re.compile(r"^[*/]+\s*")
+"""What some comments begin their lines with."""
 _LONGEST = 320
 
 
@@ -61,7 +63,7 @@ def _blocks(text: str) -> list[tuple[tuple[str, ...], tuple[str, ...], str]]:
             names = tuple(name.strip() for name in signature[2].split(","))
             blocks.append((arguments, () if names == ("None",) else names, []))
         elif blocks:
-            blocks[-1][2].append(line.removeprefix(".").strip())
+            blocks[-1][2].append(_DECORATION.sub("", line.removeprefix(".").strip()).replace("\\brief", "@brief"))
     return [(arguments, outputs, "\n".join(lines)) for arguments, outputs, lines in blocks]
 
 

@@ -17,6 +17,7 @@ from annotated_types import Ge, Gt, Interval, Le, Len, MinLen, Predicate
 from hfg.encoding.pictures import need_fair_size
 from hfg.images import Color, Gray, Labels, Mask, Matrix, OneOf, Points, Rows
 from hfg.nodes._encodable import is_encodable
+from hfg.nodes._making import port_name
 from hfg.nodes.cv._stub import enumerations
 from hfg.ports.specs import REQUIRED
 from hfg.types import Named, Pixels, Shape
@@ -84,6 +85,14 @@ Bytes: TypeAlias = Annotated[npt.NDArray[np.uint8], OneOf((None,), (1, None), (N
 RealImage: TypeAlias = Annotated[npt.NDArray[Reals], Pixels(), Named("RealImage")]
 RealPlane: TypeAlias = Annotated[npt.NDArray[Reals], Pixels(1), Named("RealPlane")]
 FloatPlane: TypeAlias = Annotated[npt.NDArray[np.float32], Pixels(1), Named("FloatPlane")]
+
+
+ShapeOrPoints: TypeAlias = (
+    Points | Annotated[npt.NDArray[np.uint8 | np.uint16 | np.int16 | Reals], Pixels(1), Named("Plane")]
+)
+"""A contour, or an image of which the pixels that are not 0 are meant."""
+GrayOrPoints: TypeAlias = Points | Gray
+OneOrThree: TypeAlias = Annotated[npt.NDArray[np.uint8], Pixels(1, 3), Named("Mask")]
 
 
 def is_odd(value: int) -> bool:
@@ -499,7 +508,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "bilateralFilter": {"d": _int(5, -1, 25), "sigmaColor": _float(50.0, 0.0), "sigmaSpace": _float(50.0, 0.0, 100.0)},
     "blendLinear": {"weights1": Say(FloatPlane), "weights2": Say(FloatPlane)},
     "blur": {"ksize": _sizes((3, 3))},
-    "boundingRect": {"array": Say(Points)},
+    "boundingRect": {"array": Say(GrayOrPoints)},
     "boxFilter": {"ksize": _sizes((3, 3))},
     "sqrBoxFilter": {"ksize": _sizes((3, 3)), "ddepth": _dtype("float32", "float32", "float64", "same")},
     "buildOpticalFlowPyramid": {
@@ -549,6 +558,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "circle": {"radius": _int(8, 0, 16384)},
     "colorChange": {
         "src": Say(Color),
+        "mask": Say(OneOrThree),
         "red_mul": _float(1.0, 0.0, 2.5),
         "green_mul": _float(1.0, 0.0, 2.5),
         "blue_mul": _float(1.0, 0.0, 2.5),
@@ -783,7 +793,12 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "hconcat": {"src": Say(Annotated[list[Color], MinLen(1)])},
     "vconcat": {"src": Say(Annotated[list[Color], MinLen(1)])},
     "merge": {"mv": Say(Annotated[list[Gray], Len(1, 4)])},
-    "illuminationChange": {"src": Say(Color), "alpha": _float(0.2, 0.0, 2.0), "beta": _float(0.4, 0.0, 2.0)},
+    "illuminationChange": {
+        "src": Say(Color),
+        "mask": Say(OneOrThree),
+        "alpha": _float(0.2, 0.0, 2.0),
+        "beta": _float(0.4, 0.0, 2.0),
+    },
     "imdecode": {"buf": Say(Bytes), "flags": _words("IMREAD_ COLOR GRAYSCALE UNCHANGED ANYDEPTH", "COLOR")},
     "imencode": {"ext": Say(Literal[".png", ".jpg", ".bmp", ".tiff", ".webp"], ".png"), "params": DROP},
     "inRange": {
@@ -812,13 +827,14 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "linearPolar": {"center": MIDDLE, "maxRadius": _float(100.0, above=0.0), "flags": INTERPOLATION},
     "logPolar": {"center": MIDDLE, "M": _float(20.0, above=0.0), "flags": INTERPOLATION},
     "matchShapes": {
+        **dict.fromkeys(["contour1", "contour2"], Say(GrayOrPoints)),
         "method": _pick("ShapeMatchModes", "I1", "CONTOURS_MATCH_"),
         "parameter": Say(drop=True, given=0.0),
     },
     "matchTemplate": {"method": _pick("TemplateMatchModes", "CCOEFF_NORMED"), "mask": DROP},
     "medianBlur": {"ksize": _int(3, 1, 255, odd=True)},
     "minEnclosingConvexPolygon": {"points": Say(Corners), "k": _int(4, 4, 100)},  # 3 reads at address 0
-    "moments": {"array": Say(Points), "binaryImage": DROP},
+    "moments": {"array": Say(ShapeOrPoints), "binaryImage": Say(bool, False)},
     "mulTransposed": {"src": Say(Matrix), "aTa": Say(bool, True), "delta": DROP},
     "norm": {"mask": Say(Mask, convert=_with_room)},
     "normalize": {
@@ -886,6 +902,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "seamlessClone": {
         "src": Say(Color),
         "dst": Say(Color),
+        "mask": Say(Annotated[npt.NDArray[np.uint8], Pixels(1, 3, 4), Named("Mask")]),
         "p": Say(Position | None, None, _in_the_middle_of_dst),
         "flags": _words("- NORMAL_CLONE MIXED_CLONE MONOCHROME_TRANSFER", "NORMAL_CLONE"),
     },
@@ -926,6 +943,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "stylization": {"src": Say(Color), "sigma_s": _float(60.0, 0.0, 200.0), "sigma_r": _float(0.45, 0.0, 1.0)},
     "textureFlattening": {
         "src": Say(Color),
+        "mask": Say(OneOrThree),
         "low_threshold": _float(30.0, 0.0),
         "high_threshold": _float(45.0, 0.0),
         "kernel_size": Say(Literal[3, 5, 7], 3),
@@ -979,7 +997,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "watershed": {"image": Say(Color), "markers": Say(Labels)},
     "convertScaleAbs": {},
     "convertFp16": {"src": Say(FloatPlane)},
-    "copyTo": {},
+    "copyTo": {"mask": Say(Annotated[npt.NDArray[np.uint8], Pixels(1, 2, 3, 4), Named("Mask")])},
     "preCornerDetect": {"ksize": Say(Literal[1, 3, 5, 7], 3)},
     "cornerEigenValsAndVecs": {"ksize": Say(Literal[1, 3, 5, 7], 3)},
     "cornerMinEigenVal": {"ksize": Say(Literal[1, 3, 5, 7], 3)},
@@ -1117,10 +1135,10 @@ def _finite(*names: str) -> Need:
         for name in names:
             array = inputs.get(name)
             if array is not None and array.dtype.kind == "f" and not bool(np.isfinite(array).all()):
-                return f"{name} has NaN or infinity; replace it first, as patch_nans does for NaN"
+                return f"{port_name(name)} has NaN or infinity; replace it first, as patch_nans does for NaN"
         return None
 
-    return Need(f"{' or '.join(names)} has NaN or infinity", wrong)
+    return Need(f"{' or '.join(map(port_name, names))} has NaN or infinity", wrong)
 
 
 def _picture_is_fair(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:

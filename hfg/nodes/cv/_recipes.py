@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import operator
+import types
 import typing
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
@@ -20,13 +21,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hfg.images import Color, Gray, Image, Rows
-from hfg.nodes._making import Port, Recipe, Setting, port_name
+from hfg.nodes._making import Port, Recipe, Setting, holds_reals, port_name
 from hfg.nodes.cv import _overrides as overrides
 from hfg.nodes.cv._calling import Calling, Inlet, Knob
 from hfg.nodes.cv._docs import Documentation, read
 from hfg.nodes.cv._overrides import Say
 from hfg.nodes.cv._stub import Argument, Overload, overloads
-from hfg.nodes.cv._words import ABOUT, APEX, CATEGORIES, NO_NODES, OUTPUTS, OVERLOADS
+from hfg.nodes.cv._words import ABOUT, APEX, CATEGORIES, ENTRIES, NO_NODES, OUTPUTS, OVERLOADS, unit_of
 from hfg.ports.specs import REQUIRED
 from hfg.types import Array, Pixels, array_facts
 
@@ -186,7 +187,7 @@ def _arguments(
         elif argument.optional and (argument.name in told.outputs or argument.name in _MADE):
             continue  # an array to write into, which OpenCV makes if nobody gives one
         elif _is_input(argument, say):
-            inlets.append(_inlet(argument, say, told, seen))
+            inlets.append(_inlet(name, argument, say, told, seen))
         elif argument.type in _VALUES or say.hint is not None:
             knobs.append(_knob(name, argument, say, told))
     inlets.sort(key=lambda inlet: inlet.port.optional)  # Python wants those with a default last
@@ -224,12 +225,12 @@ def _about(name: str, told: Documentation) -> str:
     return words if words.endswith((".", "!", "?")) else f"{words}."
 
 
-def _entry(name: str, told: Documentation) -> str:
-    text = told.arguments.get(name) or f"{name} of OpenCV's function."
+def _entry(function: str, name: str, told: Documentation) -> str:
+    text = ENTRIES.get((function, name)) or told.arguments.get(name) or f"{name} of OpenCV's function."
     return text if text.endswith((".", "!", "?", "...")) else f"{text}."
 
 
-def _inlet(argument: Argument, say: Say, told: Documentation, seen: Measured) -> Inlet:
+def _inlet(function: str, argument: Argument, say: Say, told: Documentation, seen: Measured) -> Inlet:
     is_image = say.hint is None
     hint = say.hint or _image_hint(seen)
     if argument.type in _LISTS and say.hint is None and say.convert is None:  # which makes a list of one image
@@ -238,15 +239,18 @@ def _inlet(argument: Argument, say: Say, told: Documentation, seen: Measured) ->
     # What is given back under its own name was written into; so was what "dst" is, where it must be given.
     written = argument.name in told.outputs or argument.name == "dst"
     copied = written and not argument.optional and argument.type in _ARRAYS
-    port = Port(port_name(argument.name), hint, _entry(argument.name, told), optional)
+    port = Port(port_name(argument.name), hint, _entry(function, argument.name, told), optional)
     return Inlet(port, argument.name, say, copied, not argument.optional, is_image, _is_points(hint))
 
 
 def _is_points(hint: Any) -> bool:
-    """Say whether a type is that of points, or of lists of them."""
+    """Say whether a type is that of points, of lists of them, or of points or something else."""
     if any(isinstance(item, Rows) for item in getattr(hint, "__metadata__", ())):
         return True
-    return typing.get_origin(hint) in (list, Annotated) and _is_points(typing.get_args(hint)[0])
+    return typing.get_origin(hint) in _AROUND and any(map(_is_points, typing.get_args(hint)))
+
+
+_AROUND: Final = (list, Annotated, typing.Union, types.UnionType)
 
 
 def _knob(function: str, argument: Argument, say: Say, told: Documentation) -> Knob:
@@ -255,7 +259,8 @@ def _knob(function: str, argument: Argument, say: Say, told: Documentation) -> K
     own = default is REQUIRED and argument.optional
     if own:
         default, hint = None, hint | None
-    setting = Setting(port_name(argument.name), hint, default, _entry(argument.name, told))
+    unit = unit_of(function, argument.name) if holds_reals(hint) else None
+    setting = Setting(port_name(argument.name), hint, default, _entry(function, argument.name, told), unit)
     return Knob(setting, argument.name, say, own)
 
 

@@ -215,8 +215,105 @@ OUTPUTS: Final[Mapping[str, Mapping[str, str]]] = {
 ABOUT: Final[Mapping[str, str]] = {
     "imencode": "Encode an image as a file of the given kind holds it.",
     "imdecode": "Decode an image from the bytes of a file.",
+    "approxPolyDP": "Approximate a curve by one with fewer corners (Douglas and Peucker).",
+    "applyColorMap": "Colour a gray picture by a colour map.",
+    "batchDistance": "Find the nearest rows of a table for each row of another one, by trying all.",
+    "blendLinear": "Blend two pictures, each weighted pixel by pixel.",
+    "calcBackProject": "Replace each pixel by the value of its histogram bin: how likely it is one of those.",
+    "calcCovarMatrix": "Calculate the covariance matrix of samples, and their mean.",
+    "calcHist": "Calculate the histogram of an image.",
+    "checkChessboard": "Check quickly whether a picture shows a chessboard.",
+    "clipLine": "Clip a line segment against a rectangle.",
+    "colorChange": "Change the colours of a region of a picture without visible borders.",
+    "connectedComponents": "Label connected regions of a binary image.",
+    "connectedComponentsWithAlgorithm": "Label connected regions of a binary image by a chosen algorithm.",
+    "connectedComponentsWithStats": "Label connected regions of a binary image, with box, area and centroid of each.",
+    "connectedComponentsWithStatsWithAlgorithm": (
+        "Label connected regions of a binary image by a chosen algorithm, with box, area and centroid of each."
+    ),
+    "copyTo": "Copy the pixels of an image that a mask selects; the others are 0.",
+    "cornerHarris": "Calculate how much each pixel looks like a corner (Harris).",
+    "demosaicing": "Make a colour or gray picture of the Bayer pattern of a camera's sensor.",
+    "detailEnhance": "Enhance the details of a picture.",
+    "distanceTransform": "Calculate the distance from each pixel to the nearest zero pixel.",
+    "drawFrameAxes": "Draw the axes of a coordinate system whose pose is known.",
+    "drawMatchesKnn": "Draw the matches of keypoints in two pictures, several for each keypoint.",
+    "edgePreservingFilter": "Smooth a picture but keep its edges.",
+    "extractChannel": "Take one channel out of an image.",
+    "fastNlMeansDenoising": "Remove noise from a picture by comparing patches of it (non-local means).",
+    "fastNlMeansDenoisingColored": "Remove noise from a colour picture by comparing patches of it (non-local means).",
+    "fastNlMeansDenoisingColoredMulti": (
+        "Remove noise from a colour picture by comparing patches of it and its neighbours in time (non-local means)."
+    ),
+    "fastNlMeansDenoisingMulti": (
+        "Remove noise from a picture by comparing patches of it and of its neighbours in time (non-local means)."
+    ),
+    "findChessboardCornersSB": "Find the inner corners of a chessboard by a method that looks at sectors.",
+    "findContoursLinkRuns": "Find contours in a binary image, by linking runs of pixels.",
+    "findTransformECC": "Find the transform that aligns two pictures best (enhanced correlation coefficient).",
+    "findTransformECCMultiScale": "Find the transform that aligns two pictures best, from coarse to fine scales.",
+    "flipND": "Flip an array along one axis.",
+    "getAffineTransform": "Calculate the affine transform that maps three points to three others.",
+    "goodFeaturesToTrackWithQuality": "Find strong corners in a picture, and how strong each is.",
+    "groupRectangles": "Merge rectangles that lie close to each other.",
+    "hconcat": "Put pictures of one height side by side.",
+    "HoughCirclesWithAccumulator": "Find circles in a gray picture (Hough transform), and how many points are on each.",
+    "HoughLinesWithAccumulator": "Find lines in a binary picture (Hough transform), and how many points are on each.",
+    "HuMoments": "Calculate the seven invariants of Hu from moments: numbers that stay when a shape turns.",
+    "illuminationChange": "Change the light of a region of a picture without visible borders.",
+    "insertChannel": "Put one channel into an image.",
+    "integral": "Calculate the sums over all rectangles that begin at the upper left corner (integral image).",
+    "integral2": "Calculate the integral image of a picture and that of its squares.",
+    "integral3": "Calculate the integral images of a picture, of its squares, and turned by 45 degrees.",
+    "merge": "Make one image of several channels.",
+    "meanStdDev": "Calculate mean and standard deviation of each channel; the latter of a population, divided by n.",
+    "PCACompute": "Find the principal components of samples.",
+    "PCACompute2": "Find the principal components of samples, and how much each of them explains.",
+    "pencilSketch": "Draw a picture as with a pencil.",
+    "phaseCorrelate": "Find by how much one picture is shifted against another, by their phases.",
+    "rectangleIntersectionArea": "Calculate the area in which two rectangles overlap.",
+    "rotatedRectangleIntersection": "Find the region in which two rotated rectangles overlap.",
+    "recoverPose": "Find how a camera has turned and moved, from an essential matrix and points in two pictures.",
+    "reduceArgMax": "Find where the largest element along an axis is.",
+    "reduceArgMin": "Find where the smallest element along an axis is.",
+    "solveP3P": "Find the poses of an object that three of its points in a picture allow.",
+    "solvePnP": "Find the pose of an object from its points in a picture.",
+    "solvePnPGeneric": "Find all poses of an object that its points in a picture allow.",
+    "solvePnPRansac": "Find the pose of an object from its points in a picture, of which some may be wrong (RANSAC).",
+    "solvePnPRefineLM": "Refine the pose of an object from its points in a picture (Levenberg and Marquardt).",
+    "solvePnPRefineVVS": "Refine the pose of an object from its points in a picture (visual servoing).",
+    "sortIdx": "Find the order in which each row or column of a matrix is sorted.",
+    "split": "Split an image into its channels.",
+    "stackBlur": "Blur an image; nearly as smooth as a Gaussian blur, and fast for large kernels.",
+    "stylization": "Make a picture look painted.",
+    "SVDecomp": "Calculate the singular value decomposition of a matrix.",
+    "textureFlattening": "Remove the texture of a region but keep its edges.",
+    "thresholdWithMask": "Compare each pixel that a mask selects with a threshold.",
+    "transposeND": "Exchange the axes of an array.",
+    "triangulatePoints": "Calculate points in space from their places in the pictures of two cameras.",
+    "undistortImagePoints": "Correct the lens distortion of points in a picture; the results are pixels again.",
+    "undistortPointsIter": "Correct the lens distortion of points, to a given accuracy.",
+    "validateDisparity": "Mark disparities that a check from right to left does not confirm.",
+    "vconcat": "Put pictures of one width one below the other.",
+    "warpPolar": "Map an image to polar coordinates, linear or logarithmic.",
 }
-"""First lines of those that OpenCV does not describe."""
+"""First lines of those that OpenCV does not describe, or in words that need the page around them."""
+
+ENTRIES: Final[Mapping[tuple[str, str], str]] = {
+    ("remap", "map1"): "For each pixel of the result, the x of the pixel that it comes from.",
+    ("remap", "map2"): "For each pixel of the result, the y of the pixel that it comes from.",
+    ("convertMaps", "map1"): "For each pixel, the x of the pixel that it comes from.",
+    ("convertMaps", "map2"): "For each pixel, the y of the pixel that it comes from.",
+    ("kmeans", "data"): "The samples, one row for each.",
+    ("LUT", "lut"): "The 256 values that take the place of 0 to 255, or of -128 to 127.",
+    ("fastNlMeansDenoisingMulti", "srcImgs"): "Colour pictures of one size, in the order of time.",
+    ("fastNlMeansDenoisingColoredMulti", "srcImgs"): "Colour pictures of one size, in the order of time.",
+    ("mulTransposed", "src"): "The matrix.",
+    ("triangulatePoints", "projPoints1"): "Points in the picture of the first camera, one row for each.",
+    ("triangulatePoints", "projPoints2"): "The same points in the picture of the second camera, one row for each.",
+    ("moments", "binaryImage"): "Count all pixels of an image that are not 0 alike.",
+}
+"""What is said of arguments that a node takes in fewer kinds than OpenCV does, or that OpenCV says too much of."""
 
 APEX: Final[Mapping[str, str]] = {
     "Canny": "Canny",
@@ -266,3 +363,34 @@ APEX: Final[Mapping[str, str]] = {
     "warpPerspective": "PerspectiveTransform",
 }
 """The nodes of CS::APEX that a function stands for, in whole or for the most part."""
+
+_UNITS: Final[Mapping[str, str]] = {
+    "px": """
+        reps center epsilon inpaintRadius M maxLineGap maxRadius max_rho min_rho rho_step minDist minDistance
+        minLineLength poly_sigma pt ransacReprojThreshold reprojectionError rho sigma_s sigmaSpace sigmaX sigmaY sp
+        threshold
+    """,
+    "rad": "aeps max_theta min_theta theta theta_step",
+    "deg": "angle startAngle endAngle",
+    "mm": "apertureWidth apertureHeight",
+    "of the value": """
+        beta borderValue C delta gamma h hColor high_threshold low_threshold loDiff upDiff lowerb upperb maxDiff maxVal
+        minVal maxValue maxval newVal R ranges s sigmaColor sr thresh threshold1 threshold2 value val
+    """,
+    "of the points": "length ransacThreshold",
+    "1": """
+        alpha blue_mul confidence criteria dp eps epsilon_percentage fontScale fx fy green_mul k minEigThreshold param
+        param1 param2 power prob pyr_scale qualityLevel red_mul scale shade_factor sigma_r srn stn termcrit tipLength
+        VVSlambda
+    """,
+}
+_OF: Final[Mapping[str, str]] = {name: unit for unit, names in _UNITS.items() for name in names.split()}
+_OF_FUNCTION: Final[Mapping[tuple[str, str], str]] = {
+    ("addWeighted", "beta"): "1",
+    ("illuminationChange", "beta"): "1",
+}
+
+
+def unit_of(function: str, argument: str) -> str | None:
+    """Return the unit of a real number: "1" for a plain number, "of the value" for that of the pixels or numbers."""
+    return _OF_FUNCTION.get((function, argument), _OF.get(argument))

@@ -49,7 +49,7 @@ class ImageDisplay(Node):
     image = Input(AnyImage)
     path = Parameter("display.png", Predicate(is_a_path), save=True, pattern=PICTURES)
     quality = Parameter(90, Interval(ge=1, le=100))
-    most_per_s = Parameter(5.0, Interval(ge=0))
+    most_per_s = Parameter(5.0, Interval(ge=0), unit="1/s")
     shown = Event(str)
     due = State(-math.inf)
     waiting = State(factory=list[Any])

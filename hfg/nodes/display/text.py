@@ -60,7 +60,7 @@ class TextDisplay(Node):
     format = Parameter("{path}: {}", Predicate(is_a_format), MaxLen(10_000))
     to = Parameter("output", choices=("output", "error", "log"))
     level = Parameter("info", choices=tuple(_LEVELS))
-    most_per_s = Parameter(0.0, Interval(ge=0))
+    most_per_s = Parameter(0.0, Interval(ge=0), unit="1/s")
     longest = Parameter(1000, Interval(ge=1))
     shown = Event(str)
     due = State(-math.inf)

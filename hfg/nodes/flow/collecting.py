@@ -8,6 +8,7 @@ from typing import Any
 
 from annotated_types import Ge, Gt
 
+from hfg.nodes._rounding import slack_s
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Output, Parameter, State
 from hfg.token import Token
@@ -90,7 +91,8 @@ class Recent(Node):
     """Give the values of the last seconds as a list, with each value.
 
     Seconds by the stamps of the values: what is older than this one by `seconds` or more is left out, and so it may be
-    late. How many are kept depends on their rate. Silence changes nothing.
+    late. How many are kept depends on their rate, but not on how stamps are rounded: at 10 Hz, 0.3 s are always three
+    values. Silence changes nothing.
 
     Attributes:
       value: anything.
@@ -105,7 +107,7 @@ class Recent(Node):
 
     def process(self, value: Token[Any]) -> list[Any]:
         """Keep it."""
-        begin = value.stamp - self.seconds
+        begin = value.stamp - self.seconds + slack_s(self.seconds, value.stamp)
         self.kept = [token for token in self.kept if token.stamp > begin] + [value]
         return [token.value for token in self.kept]
 
@@ -161,7 +163,8 @@ class TimeWindow(Node):
     Time is that of the stamps, so the same values make the same windows, however late or fast they come. The windows
     begin at the first stamp and then every `step_s`; one holds the stamps from its begin to before its end. It is over
     when a stamp at or behind its end comes, or the stream has ended. Windows without a value are not told. A value that
-    comes when its windows are over is left out.
+    comes when its windows are over is left out. A stamp that misses a begin or an end by rounding only is at it: at
+    10 Hz, a window of 0.3 s always holds three values.
 
     Attributes:
       value: anything.
@@ -193,13 +196,22 @@ class TimeWindow(Node):
         self._tell(float("inf"))
 
     def _begin(self, number: int) -> float:
+        return self._at(number, 0.0)
+
+    def _end(self, number: int) -> float:
+        return self._at(number, self.seconds)
+
+    def _at(self, number: int, further_s: float) -> float:
+        """Return a moment of a window; a little earlier, so that stamps which are rounded down are not before it."""
         assert self.first is not None
-        return self.first + number * (self.step_s or self.seconds)
+        step_s = self.step_s or self.seconds
+        moment = self.first + (number * step_s + further_s)
+        return moment - slack_s(min(step_s, self.seconds), moment)
 
     def _tell(self, until: float) -> None:
-        while self.kept and self._begin(self.number) + self.seconds <= until:
-            begin = self._begin(self.number)
-            inside = [token for token in self.kept if begin <= token.stamp < begin + self.seconds]
+        while self.kept and self._end(self.number) <= until:
+            begin, end = self._begin(self.number), self._end(self.number)
+            inside = [token for token in self.kept if begin <= token.stamp < end]
             if inside:
                 self.window.trigger([token.value for token in inside], stamp=max(token.stamp for token in inside))
             self.number += 1
@@ -212,5 +224,5 @@ class TimeWindow(Node):
         assert self.first is not None
         over = int((stamp - self.first - self.seconds) // (self.step_s or self.seconds))
         self.number = max(self.number, over)
-        while self._begin(self.number) + self.seconds <= stamp:
+        while self._end(self.number) <= stamp:
             self.number += 1

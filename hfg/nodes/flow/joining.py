@@ -7,6 +7,7 @@ from typing import Any
 
 from annotated_types import Ge
 
+from hfg.nodes._rounding import slack_s
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
 from hfg.token import NO_MESSAGE, Token
@@ -155,7 +156,8 @@ class JoinByStamp(Node):
     def _join_or_drop(self) -> None:
         streams = [self.waiting[number] for number in range(len(self.waiting))]
         newest = max(stream[0].stamp for stream in streams)
-        late = [stream for stream in streams if newest - stream[0].stamp > self.tolerance_s]
+        most = self.tolerance_s + slack_s(self.tolerance_s, newest)  # so much at most, whatever is rounded
+        late = [stream for stream in streams if newest - stream[0].stamp > most]
         for stream in late:
             self._drop(stream)
         if not late:

@@ -49,7 +49,7 @@ class FunctionSamples(Node):
     CS::APEX: csapex::FunctionSampleGenerator.
     """
 
-    outliers = Parameter(0.1, Interval(ge=0, le=1))
+    outliers = Parameter(0.1, Interval(ge=0, le=1), unit="1")
     seed = Parameter(0)
     count = Parameter(0, Interval(ge=0))
     sample = Output(Sample)

@@ -104,8 +104,8 @@ class RandomTreesTrainer(_Trainer):
     least = Parameter(10, Interval(ge=0, le=10_000))
     variables = Parameter(0, Interval(ge=0, le=10_000))
     trees = Parameter(16, Interval(ge=1, le=1024))
-    accuracy = Parameter(0.06, Interval(ge=0, le=1))
-    priors = Parameter[Sequence[float]]((), type=Sequence[float])
+    accuracy = Parameter(0.06, Interval(ge=0, le=1), unit="1")
+    priors = Parameter[Sequence[float]]((), type=Sequence[float], unit="1")
     seed = Parameter(0, Interval(ge=0, le=2**31 - 1))
 
     def _model(self, samples: int, classes: int) -> Any:
@@ -180,8 +180,8 @@ class SvmTrainer(_Trainer):
     """
 
     kernel = Parameter("rbf", type=Literal["linear", "rbf"])
-    c = Parameter(1.0, Interval(gt=0, le=1e6))
-    gamma = Parameter(1.0, Interval(gt=0, le=1e6))
+    c = Parameter(1.0, Interval(gt=0, le=1e6), unit="1")
+    gamma = Parameter(1.0, Interval(gt=0, le=1e6), unit="1")
 
     def _model(self, samples: int, classes: int) -> Any:
         if classes < 2:

@@ -150,8 +150,8 @@ class LandmarkMap(Node):
       forget: the label of what is to be forgotten; "" forgets all.
     """
 
-    least = Parameter(2.0, Interval(ge=1))
-    ahead = Parameter(0.6, Interval(gt=0, le=1))
+    least = Parameter(2.0, Interval(ge=1), unit="1")
+    ahead = Parameter(0.6, Interval(gt=0, le=1), unit="1")
     spread = Parameter(0.08, Interval(gt=0), unit="m")
     seen = Input(list[Landmark])
     known = Output(dict[str, Landmark])

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.nodes.robotics._scans import Pose, Positions, Segments
@@ -41,9 +41,9 @@ def match_scan(
     segments: Segments,
     covariance: Covariance | None = None,
     *,
-    noise: Annotated[float, Interval(gt=0)] = 0.02,
-    reach: Annotated[float, Interval(gt=0)] = 0.4,
-    tolerance: Annotated[float, Interval(gt=0)] = 0.06,
+    noise: Annotated[float, Interval(gt=0), Unit("m")] = 0.02,
+    reach: Annotated[float, Interval(gt=0), Unit("m")] = 0.4,
+    tolerance: Annotated[float, Interval(gt=0), Unit("m")] = 0.06,
     rounds: Annotated[int, Interval(ge=1, le=100)] = 12,
 ) -> ScanMatch:
     """Lay a scan onto the walls of a map, starting from a guess.

@@ -6,7 +6,7 @@ from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.nodes._extras import require
@@ -28,9 +28,9 @@ def plan_path(
     start: Place,
     goal: Place,
     *,
-    cell: Annotated[float, Interval(gt=0)] = 0.1,
-    left: float = 0.0,
-    lower: float = 0.0,
+    cell: Annotated[float, Interval(gt=0), Unit("m")] = 0.1,
+    left: Annotated[float, Unit("m")] = 0.0,
+    lower: Annotated[float, Unit("m")] = 0.0,
     smooth: Annotated[int, Interval(ge=0, le=100)] = 3,
 ) -> Positions | None:
     """Find the cheapest path over a grid.

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.types import Named, Shape
@@ -58,7 +58,9 @@ class Disk(NamedTuple):
 
 
 @node
-def scan_points(ranges: Ranges, angles: Ranges, *, max_range: Annotated[float, Interval(gt=0)] = 30.0) -> Positions:
+def scan_points(
+    ranges: Ranges, angles: Ranges, *, max_range: Annotated[float, Interval(gt=0), Unit("m")] = 30.0
+) -> Positions:
     """Give the points that a laser has hit, in the frame of the laser: x ahead, y to the left.
 
     Fires once for each scan. A beam that has hit nothing has no point: its range is `max_range` or more, not a number,
@@ -85,9 +87,9 @@ def nearest_obstacle(
     ranges: Ranges,
     angles: Ranges,
     *,
-    direction: Annotated[float, Interval(ge=-math.pi, le=math.pi)] = 0.0,
-    width: Annotated[float, Interval(gt=0, le=2 * math.pi)] = 0.7,
-    max_range: Annotated[float, Interval(gt=0)] = 30.0,
+    direction: Annotated[float, Interval(ge=-math.pi, le=math.pi), Unit("rad")] = 0.0,
+    width: Annotated[float, Interval(gt=0, le=2 * math.pi), Unit("rad")] = 0.7,
+    max_range: Annotated[float, Interval(gt=0), Unit("m")] = 30.0,
 ) -> float:
     """Give how far it is to what is nearest in a sector.
 
@@ -132,7 +134,11 @@ def seen_from(points: Any, pose: Any) -> Any:
 
 @node
 def expected_ranges(
-    pose: Pose, angles: Ranges, segments: Segments, *, max_range: Annotated[float, Interval(gt=0)] = 30.0
+    pose: Pose,
+    angles: Ranges,
+    segments: Segments,
+    *,
+    max_range: Annotated[float, Interval(gt=0), Unit("m")] = 30.0,
 ) -> Ranges:
     """Give what a laser would measure if nothing were there but the walls of a map.
 
@@ -169,10 +175,10 @@ def find_disks(
     points: Positions,
     seen_from: Positions | None = None,
     *,
-    radius: Annotated[float, Interval(gt=0)] = 0.25,
-    gap: Annotated[float, Interval(gt=0)] = 0.15,
+    radius: Annotated[float, Interval(gt=0), Unit("m")] = 0.25,
+    gap: Annotated[float, Interval(gt=0), Unit("m")] = 0.15,
     least: Annotated[int, Interval(ge=2)] = 3,
-    tolerance: Annotated[float, Interval(gt=0)] = 0.04,
+    tolerance: Annotated[float, Interval(gt=0), Unit("m")] = 0.04,
 ) -> list[Disk]:
     """Find round things of a known size among the points of a scan.
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Annotated, Final, Literal
 
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.ports import Inputs
@@ -398,7 +398,9 @@ def function_of(
 
 
 @node
-def scale(value: float, *, factor: float = 1.0, offset: float = 0.0) -> float:
+def scale(
+    value: float, *, factor: Annotated[float, Unit("1")] = 1.0, offset: Annotated[float, Unit("of the value")] = 0.0
+) -> float:
     """Give a number times a factor, plus an offset.
 
     Args:
@@ -413,7 +415,12 @@ def scale(value: float, *, factor: float = 1.0, offset: float = 0.0) -> float:
 
 
 @node
-def clamp(value: float, *, lower: float = 0.0, upper: float = 1.0) -> float:
+def clamp(
+    value: float,
+    *,
+    lower: Annotated[float, Unit("of the value")] = 0.0,
+    upper: Annotated[float, Unit("of the value")] = 1.0,
+) -> float:
     """Keep a number within limits.
 
     Args:
@@ -428,10 +435,10 @@ def clamp(value: float, *, lower: float = 0.0, upper: float = 1.0) -> float:
 def map_range(
     value: float,
     *,
-    from_low: float = 0.0,
-    from_high: float = 1.0,
-    to_low: float = 0.0,
-    to_high: float = 100.0,
+    from_low: Annotated[float, Unit("of the value")] = 0.0,
+    from_high: Annotated[float, Unit("of the value")] = 1.0,
+    to_low: Annotated[float, Unit("of the result")] = 0.0,
+    to_high: Annotated[float, Unit("of the result")] = 100.0,
     clamped: bool = False,
 ) -> float:
     """Carry a number from one range over to another, in a straight line.
@@ -455,7 +462,7 @@ def map_range(
 
 
 @node
-def round_to(value: float, *, step: Annotated[float, Interval(gt=0)] = 1.0) -> float:
+def round_to(value: float, *, step: Annotated[float, Interval(gt=0), Unit("of the value")] = 1.0) -> float:
     """Round a number to the nearest multiple of a step; what lies in the middle goes to the even one.
 
     Args:
@@ -470,7 +477,7 @@ def round_to(value: float, *, step: Annotated[float, Interval(gt=0)] = 1.0) -> f
 
 
 @node
-def deadband(value: float, *, width: Annotated[float, Interval(ge=0)] = 0.1) -> float:
+def deadband(value: float, *, width: Annotated[float, Interval(ge=0), Unit("of the value")] = 0.1) -> float:
     """Give 0 for numbers near to it, and bring others nearer by as much, so that there is no jump.
 
     Args:

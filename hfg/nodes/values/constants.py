@@ -132,7 +132,7 @@ class ConstantFloat(_Constant):
     CS::APEX: csapex::DoubleInput.
     """
 
-    value = Parameter(0.0)
+    value = Parameter(0.0, unit="of the value")
     out = Output(float)
     changed = Event(float)
 
@@ -178,7 +178,9 @@ class ConstantVector(_Constant):
     CS::APEX: csapex::VectorInput.
     """
 
-    value = Parameter[Sequence[float]]((0.0, 0.0, 0.0), Predicate(has_floats), type=Sequence[float])
+    value = Parameter[Sequence[float]](
+        (0.0, 0.0, 0.0), Predicate(has_floats), type=Sequence[float], unit="of the value"
+    )
     out = Output(VectorArray)
     changed = Event(VectorArray)
 
@@ -201,7 +203,7 @@ class ConstantMatrix(_Constant):
     CS::APEX: csapex::MatrixInput.
     """
 
-    value = Parameter[Rows](((1.0, 0.0), (0.0, 1.0)), Predicate(has_floats), type=Rows)
+    value = Parameter[Rows](((1.0, 0.0), (0.0, 1.0)), Predicate(has_floats), type=Rows, unit="of the value")
     out = Output(MatrixArray)
     changed = Event(MatrixArray)
 
@@ -279,7 +281,7 @@ class FloatOnTrigger(Node):
       given: the value.
     """
 
-    value = Parameter(0.0)
+    value = Parameter(0.0, unit="of the value")
     given = Event(float)
 
     @slot
@@ -315,7 +317,9 @@ class VectorOnTrigger(Node):
       given: the value, an array of float64 with one axis.
     """
 
-    value = Parameter[Sequence[float]]((0.0, 0.0, 0.0), Predicate(has_floats), type=Sequence[float])
+    value = Parameter[Sequence[float]](
+        (0.0, 0.0, 0.0), Predicate(has_floats), type=Sequence[float], unit="of the value"
+    )
     given = Event(VectorArray)
 
     @slot
@@ -333,7 +337,7 @@ class MatrixOnTrigger(Node):
       given: the value, an array of float64, rows x columns.
     """
 
-    value = Parameter[Rows](((1.0, 0.0), (0.0, 1.0)), Predicate(has_floats), type=Rows)
+    value = Parameter[Rows](((1.0, 0.0), (0.0, 1.0)), Predicate(has_floats), type=Rows, unit="of the value")
     given = Event(MatrixArray)
 
     @slot

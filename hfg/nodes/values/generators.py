@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Final, Literal, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar
 
-from annotated_types import Interval, MinLen, Predicate
+from annotated_types import Interval, MinLen, Predicate, Unit
 
 from hfg.functions import node
 from hfg.nodetype import Node
@@ -94,9 +94,9 @@ class FloatRange(Node):
     """
 
     out = Output(float)
-    start = Parameter(0.0, Predicate(math.isfinite))
-    stop = Parameter(1.0, Predicate(is_a_number))
-    step = Parameter(0.1, Predicate(is_not_zero))
+    start = Parameter(0.0, Predicate(math.isfinite), unit="of the value")
+    stop = Parameter(1.0, Predicate(is_a_number), unit="of the value")
+    step = Parameter(0.1, Predicate(is_not_zero), unit="of the value")
     closed = Parameter(False)
 
     def process(self) -> Iterator[float]:
@@ -127,8 +127,8 @@ class LinearSpace(Node):
     """
 
     out = Output(float)
-    start = Parameter(0.0, Predicate(math.isfinite))
-    stop = Parameter(1.0, Predicate(math.isfinite))
+    start = Parameter(0.0, Predicate(math.isfinite), unit="of the value")
+    stop = Parameter(1.0, Predicate(math.isfinite), unit="of the value")
     count = Parameter(11, Interval(ge=1))
 
     def process(self) -> Iterator[float]:
@@ -191,8 +191,8 @@ class RandomUniform(_Chance):
     """
 
     out = Output(float)
-    low = Parameter(0.0, Predicate(math.isfinite))
-    high = Parameter(1.0, Predicate(math.isfinite))
+    low = Parameter(0.0, Predicate(math.isfinite), unit="of the value")
+    high = Parameter(1.0, Predicate(math.isfinite), unit="of the value")
     seed = Parameter[int | None](0, type=int | None)
     count = Parameter(0, Interval(ge=0))
 
@@ -215,8 +215,8 @@ class RandomNormal(_Chance):
     """
 
     out = Output(float)
-    mean = Parameter(0.0, Predicate(math.isfinite))
-    sigma = Parameter(1.0, Interval(ge=0), Predicate(math.isfinite))
+    mean = Parameter(0.0, Predicate(math.isfinite), unit="of the value")
+    sigma = Parameter(1.0, Interval(ge=0), Predicate(math.isfinite), unit="of the value")
     seed = Parameter[int | None](0, type=int | None)
     count = Parameter(0, Interval(ge=0))
 
@@ -262,7 +262,7 @@ class RandomBool(_Chance):
     """
 
     out = Output(bool)
-    probability = Parameter(0.5, Interval(ge=0, le=1))
+    probability = Parameter(0.5, Interval(ge=0, le=1), unit="1")
     seed = Parameter[int | None](0, type=int | None)
     count = Parameter(0, Interval(ge=0))
 
@@ -310,7 +310,7 @@ class AddNoise(Node):
 
     value = Input(float)
     noisy = Output(float)
-    sigma = Parameter(1.0, Interval(ge=0), Predicate(math.isfinite))
+    sigma = Parameter(1.0, Interval(ge=0), Predicate(math.isfinite), unit="of the value")
     seed = Parameter[int | None](0, type=int | None)
     chance = State[random.Random | None](None)
 
@@ -336,10 +336,10 @@ def waveform(
     time_s: float,
     *,
     shape: Literal["sine", "square", "triangle", "sawtooth"] = "sine",
-    frequency_hz: float = 1.0,
-    amplitude: float = 1.0,
-    offset: float = 0.0,
-    phase: float = 0.0,
+    frequency_hz: Annotated[float, Unit("1/s")] = 1.0,
+    amplitude: Annotated[float, Unit("of the value")] = 1.0,
+    offset: Annotated[float, Unit("of the value")] = 0.0,
+    phase: Annotated[float, Unit("1")] = 0.0,
 ) -> float:
     """Give the height of a wave at a time.
 

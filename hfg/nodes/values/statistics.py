@@ -275,8 +275,8 @@ class Histogram(Node):
 
     value = Input(float)
     counts = Output(list[int])
-    lower = Parameter(0.0, Predicate(math.isfinite))
-    upper = Parameter(1.0, Predicate(math.isfinite))
+    lower = Parameter(0.0, Predicate(math.isfinite), unit="of the value")
+    upper = Parameter(1.0, Predicate(math.isfinite), unit="of the value")
     bins = Parameter(10, Interval(ge=1, le=100_000))
     made_for = State[tuple[float, float, int] | None](None)
     so_far = State(factory=list[int])
@@ -319,7 +319,7 @@ class ExponentialSmoothing(Node):
 
     value = Input(float)
     smooth = Output(float)
-    alpha = Parameter(0.2, Interval(gt=0, le=1))
+    alpha = Parameter(0.2, Interval(gt=0, le=1), unit="1")
     last = State[float | None](None)
 
     def process(self, value: float) -> float:
@@ -369,7 +369,7 @@ class LowPass(_Timed):
 
     value = Input(float)
     smooth = Output(float)
-    time_constant_s = Parameter(1.0, Interval(ge=0))
+    time_constant_s = Parameter(1.0, Interval(ge=0), unit="s")
 
     def process(self, value: Token[float]) -> float:
         """Take one more."""
@@ -507,11 +507,11 @@ class PID(_Timed):
 
     error = Input(float)
     command = Output(float)
-    kp = Parameter(1.0)
-    ki = Parameter(0.0)
-    kd = Parameter(0.0)
-    lower = Parameter(-math.inf)
-    upper = Parameter(math.inf)
+    kp = Parameter(1.0, unit="1")
+    ki = Parameter(0.0, unit="1/s")
+    kd = Parameter(0.0, unit="s")
+    lower = Parameter(-math.inf, unit="of the command")
+    upper = Parameter(math.inf, unit="of the command")
     total = State(0.0)
 
     def process(self, error: Token[float]) -> float:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.nodetype import Node
@@ -63,7 +63,7 @@ def norm(vector: Vector, *, order: Literal["euclidean", "manhattan", "maximum"] 
 
 
 @node
-def scale_vector(vector: Vector, *, factor: float = 1.0) -> VectorArray:
+def scale_vector(vector: Vector, *, factor: Annotated[float, Unit("1")] = 1.0) -> VectorArray:
     """Multiply each number of a vector by a factor.
 
     Args:
@@ -181,7 +181,7 @@ def summarize(
 
     Args:
       values: any number of numbers.
-      by: how; "std" and "variance" are those of a population, divided by n.
+      by: how; "std" and "variance" are those of a sample, divided by n - 1, and 0 of a single number.
 
     Raises:
       OverflowError: a whole number is too large for a float.
@@ -190,8 +190,9 @@ def summarize(
     if not len(array):
         return None
     function = {"product": "prod", "minimum": "min", "maximum": "max", "variance": "var"}.get(by, by)
+    of_a_sample = {"ddof": 1} if by in ("std", "variance") and len(array) > 1 else {}
     with np.errstate(all="ignore"):
-        return float(getattr(np, function)(array))
+        return float(getattr(np, function)(array, **of_a_sample))
 
 
 class AddNoiseToVector(Node):
@@ -213,7 +214,7 @@ class AddNoiseToVector(Node):
 
     vector = Input(Vector)
     noisy = Output(VectorArray)
-    relative_sigma = Parameter(0.1, Interval(ge=0, le=1e6))
+    relative_sigma = Parameter(0.1, Interval(ge=0, le=1e6), unit="1")
     seed = Parameter[int | None](0, type=int | None)
     chance = State[random.Random | None](None)
 

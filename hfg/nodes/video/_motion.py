@@ -52,9 +52,9 @@ class BackgroundSubtractor(Node):
 
     method = Parameter("MOG2", type=Literal["MOG2", "KNN"])
     history = Parameter(500, Interval(ge=1, le=100_000))
-    threshold = Parameter(16.0, Interval(gt=0))
+    threshold = Parameter(16.0, Interval(gt=0), unit="of the pixel, squared")
     shadows = Parameter(False)
-    learning_rate = Parameter(-1.0, Interval(ge=-1, le=1))
+    learning_rate = Parameter(-1.0, Interval(ge=-1, le=1), unit="1")
     image = Input(Image)
     mask = Output(Mask)
     background = Output(Image)
@@ -140,7 +140,7 @@ class RunningMean(Node):
     CS::APEX: csapex::SequenceMean.
     """
 
-    weight = Parameter(0.1, Interval(gt=0, le=1))
+    weight = Parameter(0.1, Interval(gt=0, le=1), unit="1")
     image = Input(Image)
     mean = Output(Image)
 

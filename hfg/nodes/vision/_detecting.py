@@ -49,10 +49,10 @@ class PeopleDetector(Node):
     CS::APEX: csapex::HOGDetector.
     """
 
-    threshold = Parameter(0.4, Interval(ge=0, le=10))
+    threshold = Parameter(0.4, Interval(ge=0, le=10), unit="1")
     stride = Parameter(8, type=Literal[4, 8, 16])
-    pyramid = Parameter(1.05, Interval(ge=1.01, le=2))
-    scale_up = Parameter(1.0, Interval(ge=0.25, le=4))
+    pyramid = Parameter(1.05, Interval(ge=1.01, le=2), unit="1")
+    scale_up = Parameter(1.0, Interval(ge=0.25, le=4), unit="1")
     image = Input(Picture)
     boxes = Output(list[Box])
     weights = Output(list[float])
@@ -108,7 +108,7 @@ class CascadeDetector(Node):
     """
 
     cascade = Parameter("frontalface_default")
-    scale = Parameter(1.1, Interval(ge=1.01, le=2))
+    scale = Parameter(1.1, Interval(ge=1.01, le=2), unit="1")
     neighbors = Parameter(3, Interval(ge=0, le=100))
     smallest = Parameter(24, Interval(ge=1), unit="px")
     image = Input(Picture)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Final
 
 import cv2
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.images import Color, Picture, wrong_image
@@ -27,7 +27,7 @@ def draw_boxes(
     *,
     color: Colour = Colour(0, 255, 0),
     thickness: Annotated[int, Interval(ge=1, le=64)] = 2,
-    size: Annotated[float, Interval(ge=0.1, le=10)] = 0.5,
+    size: Annotated[float, Interval(ge=0.1, le=10), Unit("1")] = 0.5,
 ) -> Color:
     """Draw boxes around what was found, with words above them.
 

@@ -31,7 +31,7 @@ class EqualizeLocally(Node):
     CS::APEX: csapex::Equalize.
     """
 
-    limit = Parameter(2.0, Interval(gt=0, le=100))
+    limit = Parameter(2.0, Interval(gt=0, le=100), unit="1")
     tiles = Parameter(8, Interval(ge=1, le=64))
     image = Input(Picture)
     out = Output(Picture)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 import cv2
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.images import Mask, Picture
@@ -95,7 +95,7 @@ def match_descriptors(
     first: Descriptors,
     second: Descriptors,
     *,
-    ratio: Annotated[float, Interval(gt=0, le=1)] = 0.8,
+    ratio: Annotated[float, Interval(gt=0, le=1), Unit("1")] = 0.8,
 ) -> list[cv2.DMatch]:
     """Find which keypoints of two pictures belong together.
 

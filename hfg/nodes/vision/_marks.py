@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final, NamedTuple
 import cv2
 import numpy as np
 import numpy.typing as npt
-from annotated_types import Interval
+from annotated_types import Interval, Unit
 
 from hfg.functions import node
 from hfg.images import Picture, Rows, wrong_image
@@ -70,7 +70,7 @@ def find_bullseyes(
     image: Picture,
     *,
     rings: Annotated[int, Interval(ge=2, le=9)] = 3,
-    smallest: Annotated[float, Interval(ge=4)] = 8.0,
+    smallest: Annotated[float, Interval(ge=4), Unit("px")] = 8.0,
 ) -> list[Bullseye]:
     """Find bull's-eyes: dark and light rings around a middle, the outermost dark on light.
 
@@ -107,7 +107,7 @@ def find_bullseyes(
 def find_quadrilaterals(
     image: Picture,
     *,
-    smallest: Annotated[float, Interval(ge=4)] = 11.0,
+    smallest: Annotated[float, Interval(ge=4), Unit("px")] = 11.0,
 ) -> list[Corners]:
     """Find the corners of dark quadrilaterals on light ground, such as the frames of signs.
 
