@@ -13,6 +13,7 @@ import itertools
 import os
 import sys
 import types
+from collections import Counter
 from collections.abc import Mapping, Set
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -38,6 +39,7 @@ __all__ = ["Playing", "play_into"]
 _LOGGER = Log("hfg.recording")
 _BESIDE: Final = b'"beside":true'
 _PLAYBACK: Final = "hfg.nodes.recordings:Playback"
+_WITHOUT_NUMBERS: Final = "1"  # the version of recordings in which firings have no numbers
 
 
 def _ready(self: Any) -> bool:
@@ -231,10 +233,24 @@ def play_into(
     return playing
 
 
+def _unnumbered(recording: File) -> list[str]:
+    """Nodes with several recorded outputs whose firings have no numbers, because an older version wrote the file."""
+    if recording.metadata.get("hfg", {}).get("version") != _WITHOUT_NUMBERS:
+        return []
+    outputs = [one for one in recorded_ports(recording).values() if one.metadata.get("kind") == "output"]
+    nodes = Counter(one.metadata.get("node", "") for one in outputs)
+    return [node for node, count in nodes.items() if node and count > 1]
+
+
 def _gaps(recording: File) -> list[str]:
     """What the recording does not hold, though it passed."""
     info = recording.info()
     found = [f"{info.path} is damaged: {loss}" for loss in info.losses]
+    found += [
+        f'firings of "{node}" have no numbers in the recording, which an older version of hfg wrote: they are told '
+        "apart by the order of their tokens"
+        for node in _unnumbered(recording)
+    ]
     left_out = [(port, count, "there was no time for them") for port, count in info.left_out.items()]
     refused = [(port, count, "their values are no data") for port, count in info.refused.items()]
     return found + [

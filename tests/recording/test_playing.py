@@ -330,9 +330,11 @@ def test_a_recording_without_numbers_of_firings_is_played_by_the_order_of_its_to
 ) -> None:
     file = tmp_path / "run.mcap"
     monkeypatch.setattr("hfg.recording.messages.Firings.number", lambda self, path: 0)  # as version 1 had it
+    monkeypatch.setattr("hfg.recording.recording.VERSION", 1)
     hfg.run(two_outputs(), begin=lambda run: record(run, file))
     graph = two_outputs()
-    play_into(graph, file, speed=None)
+    playing = play_into(graph, file, speed=None)
+    assert [gap.partition(",")[0] for gap in playing.gaps] == ['firings of "camera" have no numbers in the recording']
     assert hfg.run(graph).outputs["out"] == PAIRS
 
 
