@@ -68,6 +68,7 @@ __all__ = [
     "TransportError",
     "UsageError",
     "in_words",
+    "shown",
 ]
 
 
@@ -189,6 +190,14 @@ def in_words(error: BaseException) -> str:
     except Exception as fault:
         text = f"its text cannot be made ({type(fault).__name__})"
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def shown(value: object, most: int = 80) -> str:
+    """Print a value of a user's for a message: at most so many characters of it, whatever its `repr` does."""
+    try:
+        return f"{value!r:.{most}}"
+    except Exception as fault:
+        return f"<{type(value).__name__}, whose repr raises {type(fault).__name__}>"
 
 
 def _of_what_is_not_there(error: BaseException) -> str:

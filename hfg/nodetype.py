@@ -16,7 +16,7 @@ import msgspec
 
 from hfg.declaration import declare
 from hfg.description import NodeType, parameter_values, read_only_refusal, unknown_parameter
-from hfg.errors import DeclarationError, EngineInternalError, Failure, NotRunning, UsageError
+from hfg.errors import DeclarationError, EngineInternalError, Failure, NotRunning, UsageError, shown
 from hfg.logs import Log, Logger, node_log
 from hfg.ports.automatic import (
     AUTOMATIC_EVENTS,
@@ -415,8 +415,8 @@ class Node:
         names = ", ".join(f'"{name}"' for name in type_.outputs)
         if type_.result == "none":
             raise TypeError(
-                f"{type_.name} has no output but gave back {result!r}; declare an output (annotate the result), or "
-                "return nothing"
+                f"{type_.name} has no output but gave back {shown(result)}; declare an output (annotate the result), "
+                "or return nothing"
             )
         if isinstance(result, tuple | list):
             if len(result) != len(type_.outputs):
@@ -428,7 +428,8 @@ class Node:
         if type_.fields and all(hasattr(result, name) for name in type_.fields):
             return [getattr(result, name) for name in type_.fields]
         raise TypeError(
-            f"{type_.name} gave back {result!r}, but has the outputs {names}; return a tuple with one value for each"
+            f"{type_.name} gave back {shown(result)}, but has the outputs {names}; return a tuple with one value for "
+            "each"
         )
 
     def _spread(self, result: Any) -> list[Any]:
@@ -437,7 +438,7 @@ class Node:
         parts = [result] if len(type_.layout) == 1 else result
         if not isinstance(parts, tuple | list) or len(parts) != len(type_.layout):
             raise TypeError(
-                f"{type_.name} gave back {result!r:.80}, but has {len(type_.layout)} outputs and vectors of outputs; "
+                f"{type_.name} gave back {shown(result)}, but has {len(type_.layout)} outputs and vectors of outputs; "
                 "return a tuple with one value for each, and a list for each vector"
             )
         values: list[Any] = []
@@ -448,7 +449,7 @@ class Node:
                 values += [None] * count
             elif not isinstance(part, tuple | list) or len(part) != count:
                 raise TypeError(
-                    f"{type_.name} gave back {part!r:.80} for a vector of {count} outputs; return a list with one "
+                    f"{type_.name} gave back {shown(part)} for a vector of {count} outputs; return a list with one "
                     "value for each, None for silence"
                 )
             else:

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from typing_extensions import is_protocol
 
 from hfg import generics
+from hfg.errors import shown
 
 __all__ = [
     "Array",
@@ -458,11 +459,18 @@ def _is_union(hint: Any) -> bool:
 
 
 def accepts(value: Any, hint: Any) -> bool:
-    """Say whether a value is of a type; arrays with their dtype and layout, ints as floats."""
+    """Say whether a value is of a type; arrays with their dtype and layout, ints as floats.
+
+    A value that raises while it is looked at is of none, whatever it says of itself.
+    """
     try:
-        return _checker(hint)(value)
+        fits = _checker(hint)
     except TypeError:  # an unhashable hint
-        return _make_checker(hint)(value)
+        fits = _make_checker(hint)
+    try:
+        return fits(value)
+    except Exception:
+        return False
 
 
 @functools.lru_cache(maxsize=4096)
@@ -575,9 +583,9 @@ def array_facts(hint: Any) -> ArrayFacts | None:
 
 def describe_value(value: Any) -> str:
     """Say what a value is, in few words: "int: 3", "an array of float64, 480 x 640"."""
-    if isinstance(value, np.ndarray):
+    if issubclass(type(value), np.ndarray):  # a value may lie about its class, or raise
         return f"an array of {value.dtype}, {' x '.join(map(str, value.shape)) or 'without axes'}"
-    return f"{describe(type(value))}: {value!r:.80}"
+    return f"{describe(type(value))}: {shown(value)}"
 
 
 @functools.lru_cache(maxsize=4096)

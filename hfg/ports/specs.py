@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 
 from hfg import encoding
+from hfg.errors import shown
 from hfg.limits import breaks, numbers_within
 from hfg.ports.conditions import Condition
 from hfg.ports.kinds import ParameterKind, kind_of_type, shape_of
@@ -225,9 +226,9 @@ def _speaks(value: Any, label: Any) -> bool:
 
 def _shown(value: Any) -> str:
     """A value on one line, not longer than a message may be."""
-    if isinstance(value, np.ndarray):
+    if issubclass(type(value), np.ndarray):
         return describe_value(value)
-    told = " ".join(repr(value).split())
+    told = " ".join(shown(value, 1000).split())
     return told if len(told) <= 120 else told[:119] + "…"
 
 

@@ -9,10 +9,11 @@ one comes.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
-from hfg.errors import Failure
+from hfg.errors import Failure, shown
 from hfg.testing.reference import Move, ReferenceMachine
 from hfg.testing.reference.machine import TEARDOWN_LIMIT_S
 from hfg.testing.reference.state import Task
@@ -71,6 +72,8 @@ _RULES: Final[dict[type[TraceEvent], str]] = {
     RunEnded: "R5",
     RunStarted: "A10",
 }
+_LONGEST: Final = 100_000
+_PLACE: Final = re.compile(r" at 0x[0-9a-f]+")
 _SAME_TIME: Final = 1.5e-9  # one step of the grid of nanoseconds, whatever floats make of the difference
 
 
@@ -500,11 +503,17 @@ def token_key(token: Token[Any]) -> tuple[Any, ...]:
 
 def value_key(value: Any) -> Any:
     """Values are compared by what they look like, errors by their type: arrays and NaN have no usable equality."""
-    if isinstance(value, BaseException):
-        return type(value).__name__
-    if isinstance(value, Failure):
-        return (type(value.error).__name__, repr(value.taken))
-    return (type(value).__name__, repr(value))
+    kind = type(value)
+    if issubclass(kind, BaseException):
+        return kind.__name__
+    if issubclass(kind, Failure):
+        return (type(value.error).__name__, _without_place(value.taken))
+    return (kind.__name__, _without_place(value))
+
+
+def _without_place(value: object) -> str:
+    """What it looks like, but for where it lies in memory."""
+    return _PLACE.sub("", shown(value, _LONGEST))
 
 
 def _is_of_task(event: TraceEvent) -> bool:

@@ -17,6 +17,7 @@ from hfg.ports.automatic import sent_name
 from hfg.testing import nodes as types
 from hfg.testing.operators import through
 from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
+from hfg.testing.strange import STRANGE
 from hfg.values import Colour, Span
 
 __all__ = [
@@ -103,6 +104,7 @@ class Allowed:
     start: bool = True
     failing_calls: bool = True
     sending: bool = False  # nodes send in every way there is, from plain code and async, which pauses or not
+    strange: bool = False  # values that raise when they are looked at; most errors are skipped
     plain: bool = False  # mostly functions close to each other: the shapes of which regions are fused
 
 
@@ -145,6 +147,7 @@ _INNER_WHERE: list[tuple[Callable[[Allowed], bool], list[str]]] = [
     (lambda allowed: allowed.readiness, ["OnlyTwice"]),
     (lambda allowed: allowed.retries, ["Unsteady"] * 3 + ["Stubborn"] * 2),
     (lambda allowed: allowed.tasks, ["Tends"] * 4 + ["Beats"] * 3),
+    (lambda allowed: allowed.strange, ["odd"] * 4),
     (lambda allowed: allowed.sending, ["Speaks", "SpeaksTwice", "Lends", "Passing"]),
     (lambda allowed: allowed.sending and allowed.waiting, ["SpeaksLater", "SpeaksTwiceLater", "LendsLater"]),
     (lambda allowed: allowed.sending and allowed.waiting, ["PassingLater"]),
@@ -162,7 +165,10 @@ _BEFORE = {"EachOfEach": "listed"}
 _BEHIND = {"EachOfEach": "summed", "Hums": "add", "LastWord": "add", "Lends": "unlent", "LendsLater": "unlent"}
 """What such a node is made with: it needs a consumer, or a producer, of its own."""
 
-_PLAIN = ["double", "add", "add", "some", "some", "sink", "either", "with_default", "parted", "Sends", "mood", "calm"]
+_JOINS = ["add", "either", "with_default"]
+_PLAIN = [*_JOINS * 3, "double", "some", "some", "some", "sink", "parted", "Sends", "mood", "calm"]
+_STRANGE = [what for what in STRANGE if what not in ("huge number", "deep list")]  # which only take long
+
 _PLAIN_WHERE_CODE_WAITS = ["restless", "calling"]
 _PLAIN_WHERE_CODE_FAILS = ["picky", "picky", "gives_up"]
 _PLAIN_WHERE_ACTIVITY_MOVES = ["handing"]
@@ -305,6 +311,7 @@ class _Making:
         kinds += _PLAIN_WHERE_CODE_WAITS if allowed.waiting else []
         kinds += _PLAIN_WHERE_CODE_FAILS if allowed.failures else []
         kinds += _PLAIN_WHERE_ACTIVITY_MOVES if allowed.activity else []
+        kinds += ["odd"] * 2 if allowed.strange else []
         kinds += _PLAIN_SENDING if allowed.sending else []
         kinds += _PLAIN_SENDING_LATER if allowed.sending and allowed.waiting else []
         return kinds
@@ -327,6 +334,8 @@ class _Making:
                 return {"count": choose.number(0, 24 if self.allowed.plain else 5)}
             case _ if kind in (*_SPEAKING, *_PAUSING):
                 return self._speaking(kind)
+            case "odd":
+                return {"what": choose.one_of(_STRANGE), "every": choose.number(1, 3)}
             case "some":
                 return {"modulus": choose.number(2, 3)}
             case "Failing" | "picky" | "gives_up":
@@ -348,7 +357,7 @@ class _Making:
         choose, allowed = self.choose, self.allowed
         given: dict[str, Any] = {}
         if kind in _SPEAKING:
-            ways = [way for way in types.WAYS if allowed.activity or way != "held"]
+            ways = [way for way in types.WAYS if allowed.activity or way not in ("held", "given", "taken")]
             given["way"] = choose.one_of([*ways, "both"] if allowed.failures and choose.chance(10) else ways)
         if kind in _PAUSING:
             given["pause"] = choose.one_of(types.PAUSES)
@@ -377,6 +386,8 @@ class _Making:
             options["on_error"] = choose.one_of(
                 ["skip", "restart", "disable", "stop"] if choose.chance(30) else ["skip", "restart"]
             )
+        if allowed.strange and "on_error" not in options and not choose.chance(10):
+            options["on_error"] = choose.one_of(["skip", "skip", "skip", "restart", "disable"])
         if kind in _TRIED_AGAIN:
             options |= self._trying_again(kind)
         if allowed.activity and choose.chance(self._seldom(10)):
@@ -459,7 +470,7 @@ class _Making:
                 if index and self.nodes[index - 1].type in _WIRED and port != "a":
                     self._wire(self.nodes[index - 1], (node.name, "input", port))
                     continue
-                if choose.chance(92 if not spec.optional else 60):
+                if choose.chance(92 if not spec.optional or allowed.plain else 60):
                     self._connect_input(index, (node.name, "input", port))
         if allowed.events:
             self._make_slot_edges()
@@ -473,8 +484,8 @@ class _Making:
         if allowed.feeds and choose.chance(40):
             self._edge(("", "output", choose.one_of(FEEDS)), target)
             return
-        if allowed.plain and choose.chance(70):
-            candidates = candidates[-4:]
+        if allowed.plain and choose.chance(90):
+            candidates = candidates[-3:]
         if allowed.events and choose.chance(self._seldom(30)):
             candidates = self.events(before) or candidates
         if allowed.cycles and self._has_other_input(target) and choose.chance(self._seldom(30)):
@@ -510,7 +521,7 @@ class _Making:
         choose, allowed = self.choose, self.allowed
         slots = [(node, port) for node in self.nodes for port in self.type_of(node.name).slots]
         slots = [(node, port) for node, port in slots if port != "poke" or allowed.failing_calls]
-        for _ in range(choose.number(0, (len(self.nodes) // 2) if allowed.plain else 2 * len(self.nodes))):
+        for _ in range(choose.number(0, (len(self.nodes) // 4) if allowed.plain else 2 * len(self.nodes))):
             if not slots or choose.chance(12):
                 self._delicate_edge()
                 continue
@@ -581,7 +592,7 @@ class _Making:
                 options["through"] = [through(name, choose.one_of(amounts))]
         if initial:
             options["initial"] = initial
-        if source[1] != "event" and target[1] in ("input", "parameter") and choose.chance(15):
+        if source[1] != "event" and target[1] in ("input", "parameter") and choose.chance(self._seldom(15)):
             options["buffer"] = choose.number(1, 3)
         self.pairs.add((source, target))
         self.edges.append(EdgePlan(source, target, options))

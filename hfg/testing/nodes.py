@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 import hfg
 from hfg.ports.outputs import OutputPort
+from hfg.testing.strange import STRANGE
 from hfg.types import Shape
 
 __all__ = [
@@ -78,6 +79,7 @@ __all__ = [
     "handing",
     "listed",
     "mood",
+    "odd",
     "parted",
     "picky",
     "restless",
@@ -190,6 +192,12 @@ def handing(value: int) -> Any:
     return value if value % 3 else hfg.Token(value, value % 2)
 
 
+@hfg.node(outputs=Any)
+def odd(value: Any, *, what: str = "0-d array", every: int = 2) -> Any:
+    """Give a value now and then that nobody can look at."""
+    return STRANGE[what]() if isinstance(value, int) and value % every == 0 else value
+
+
 @hfg.node
 async def calm(value: int) -> int:
     """Give the value at once."""
@@ -244,6 +252,10 @@ def _say(port: OutputPort[int], way: str, value: int) -> int | None:
             port.send(value, stamp=float(value))
         case "held":
             port.send(value, activity=0)
+        case "given":
+            port.send(value, activity=1 if value % 2 else None)
+        case "taken":
+            port.send(value, activity=-1 if value % 2 else None)
         case "token":
             port.send(hfg.Token(value, 0, 0.5))
         case "both":  # an error: once is enough
@@ -256,7 +268,7 @@ def _say(port: OutputPort[int], way: str, value: int) -> int | None:
     return None
 
 
-WAYS = ("send", "return", "either", "seldom", "stamped", "held", "token")
+WAYS = ("send", "return", "either", "seldom", "stamped", "held", "given", "taken", "token")
 """How a node may answer: by `send`, by what it returns, by one or the other, with a stamp, with a token ..."""
 
 PAUSES = ("none", "turn", "wait", "mixed")

@@ -342,7 +342,7 @@ def test_a_parameter_out_of_its_limits_by_a_token_is_an_error_of_the_node(fast: 
     source, node = graph.add(numbers(count=3)), graph.add(Limited())
     graph.connect(source.out, node.ports.parameters["level"])
     graph.connect(source.out, node.ports.inputs["value"])
-    with pytest.raises(hfg.errors.NodeError, match=r'node "limited" failed in parameter level: .* must be <= 2, got 3'):
+    with pytest.raises(hfg.errors.NodeError, match=r'node "limited" failed in firing 3: .* must be <= 2, got 3'):
         run(graph, fast)
 
 

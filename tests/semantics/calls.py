@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import re
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -22,6 +23,8 @@ from hfg.token import Token
 from hfg.trace import TokenSent
 
 __all__ = ["Calls", "Ran", "begun", "by_node", "note_calls", "noted_run", "passed_by_trace"]
+
+_PLACE = re.compile(r" at 0x[0-9a-f]+")  # in memory, where each run has its own
 
 Note = tuple[Any, ...]
 """The path of the node, what was called, what it was given, and what else its code could see."""
@@ -69,11 +72,12 @@ class Calls(list[Note]):
 
     def _told(self, given: object) -> str:
         """What the code was given, of tokens everything; but for stamps on the real clock."""
-        if isinstance(given, tuple):
+        if type(given) is tuple:
             return repr([self._told(one) for one in given])
         if type(given) is Token:
-            return repr((given.value, given.activity, given.sequence, given.stamp if self.timed else None))
-        return repr(given)
+            stamp = given.stamp if self.timed else None
+            return repr((value_key(given.value), given.activity, given.sequence, stamp))
+        return repr(value_key(given))
 
 
 def note_calls(monkeypatch: pytest.MonkeyPatch) -> Calls:
@@ -200,7 +204,8 @@ def noted_run(
         report, error = problem.report, str(problem)  # type: ignore[attr-defined]
     if fast and trace is None:
         calls.may_fuse += sum(node.firings + node.calls for node in report.nodes.values())
-    report = hfg.Report(**{**_fields(report), "duration_s": 0.0}) if real else report
+    told = {"duration_s": 0.0 if real else report.duration_s, "errors": [_PLACE.sub("", one) for one in report.errors]}
+    report, error = hfg.Report(**{**_fields(report), **told}), _PLACE.sub("", error)
     return Ran(report, error, calls.take(), asyncio.run(_passed(taps)) if tapped else {})
 
 

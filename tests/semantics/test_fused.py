@@ -36,7 +36,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def plain_shapes(seed: int) -> Allowed:
     """What is fused, and now and then what splits it."""
-    return Allowed(plain=True, max_nodes=4 + seed % 9, sending=seed % 2 == 1)
+    return Allowed(plain=True, max_nodes=4 + seed % 9, sending=seed % 2 == 1, strange=seed % 5 == 4)
 
 
 def ends(plan: GraphPlan, seed: int) -> bool:

@@ -28,7 +28,7 @@ from hfg.engine.rules.activity import reset_activity
 from hfg.engine.rules.agenda import unblock
 from hfg.engine.runtime import relays
 from hfg.engine.runtime.ports import bind_event, bind_start
-from hfg.errors import HfgError, NotRunning, UsageError
+from hfg.errors import HfgError, NotRunning, UsageError, shown
 from hfg.graph import Graph
 from hfg.graph.editing.commands import Command
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
@@ -100,7 +100,7 @@ class Run:
         outside.need_sendable(activity, stamp)
         plain = value.value if isinstance(value, Token) else value
         if not accepts(plain, port.type) and (plain is not None or port.kind == "slot"):
-            raise TypeError(f'{port.kind} "{port.path}" expects {describe(port.type)}, got {plain!r:.80}')
+            raise TypeError(f'{port.kind} "{port.path}" expects {describe(port.type)}, got {shown(plain)}')
         if relays.is_relay(port):
             await self._trigger_inside(port, value, activity, stamp)
             return

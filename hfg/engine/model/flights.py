@@ -48,9 +48,13 @@ class Attempts:
         self.arguments = arguments
         self.triggered = False
 
+    def begin_none(self) -> None:
+        """The firing fails before its function is run."""
+        self.made = 0
+
     def may_go_on(self, retries: int) -> bool:
         """Whether the firing may be tried once more."""
-        return self.made <= retries and not self.triggered
+        return 0 < self.made <= retries and not self.triggered
 
     def rest(self, timer: Timer) -> None:
         """This long until the next attempt."""

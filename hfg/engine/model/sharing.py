@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hfg.engine.model.worker import Worker
+from hfg.errors import in_words
 from hfg.nodetype import Node
 from hfg.ports.edges import NUMBER, Edge, Lying, SyncEdge
 from hfg.token import Marker, Token
@@ -59,6 +60,8 @@ class _Look:
             return self._at(value, DEPTH)
         except RuntimeError:  # a thread changes it at this moment
             return object()
+        except Exception:  # it lets nobody look into it
+            return id(value)
 
     def _at(self, value: object, depth: int) -> object:
         kind = type(value)
@@ -343,7 +346,7 @@ class Sharing:
 
     def explain(self, worker: Worker, error: BaseException) -> str | None:
         """Say what a node's code has tried to write to, if it failed because we have made that read-only."""
-        if not isinstance(error, Exception) or _READ_ONLY.search(str(error)) is None:
+        if not isinstance(error, Exception) or _READ_ONLY.search(in_words(error)) is None:
             return None
         for arrays in _arrays_in_frames(error):
             ours = [(name, owner) for name, array in arrays for owner in _whole(array)[:1] if self._is_ours(owner)]

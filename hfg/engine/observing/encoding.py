@@ -66,6 +66,13 @@ def _writable(value: Any, depth: int) -> Any:
     except Exception:
         if depth == _DEEPEST:
             return _text(value)
+    try:
+        return _parts_of(value, depth)
+    except Exception:  # of a value that cannot be looked into
+        return _text(value)
+
+
+def _parts_of(value: Any, depth: int) -> Any:
     if isinstance(value, msgspec.Struct):
         config = value.__struct_config__
         tag = {} if config.tag is None else {config.tag_field: config.tag}
@@ -80,9 +87,10 @@ def _writable(value: Any, depth: int) -> Any:
 
 def _text(value: Any) -> Any:
     """Describe a value that JSON does not know."""
-    if isinstance(value, np.ndarray):
+    kind = type(value)  # a value may lie about its class
+    if issubclass(kind, np.ndarray):
         return f"array {'x'.join(map(str, value.shape))} {value.dtype}"
-    if isinstance(value, np.generic):
+    if issubclass(kind, np.generic):
         return value.item()
     try:
         told = value if isinstance(value, str) else str(value) if isinstance(value, BaseException) else repr(value)

@@ -13,7 +13,7 @@ from typing import Any
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import lifecycle, subgraphs
 from hfg.engine.rules.modifiers import set_active
-from hfg.errors import Aborted
+from hfg.errors import Aborted, shown
 from hfg.token import Token
 
 __all__ = ["run"]
@@ -44,7 +44,7 @@ def run(worker: Worker, name: str, token: Token[Any], then: Callable[[], None]) 
     else:
         caller = _caller(worker)
         then()
-        reason = "" if token.value is None else f": {token.value!r:.200}"
+        reason = "" if token.value is None else f": {shown(token.value, 200)}"
         host.finish("aborted", Aborted(f'the graph\'s slot "abort" was called by "{caller}"{reason}'))
 
 

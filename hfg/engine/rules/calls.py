@@ -39,8 +39,12 @@ def call(worker: Worker) -> None:
         _receive(worker, edge, token.activity)
     make_room(edge)
     if edge.target_kind == "parameter":
-        set_parameter(worker, name, token.value)
-        finish_call(worker, "done")
+        try:
+            set_parameter(worker, name, token.value)
+        except Exception as error:
+            core.upstairs.fail_call(worker, name, error)
+        else:
+            finish_call(worker, "done")
     elif edge.while_active and not worker.active:  # T4: it was about to be active, or it was when the token came
         finish_call(worker, "done")
     else:
@@ -129,11 +133,11 @@ def finish_call(worker: Worker, outcome: CallOutcome) -> None:
 
 
 def set_parameter(worker: Worker, name: str, value: object) -> None:
-    """Give a parameter a value that came by a token; one out of its limits is an error of the node (X1)."""
-    try:
-        worker.node._set_parameter(name, value)
-    except Exception as error:
-        worker.core.upstairs.fail(worker, f"parameter {name}", error, answer=False)
-        return
+    """Give a parameter a value that came by a token.
+
+    Raises:
+      ValueError: it is out of its limits, or what the value itself raises: an error of the firing or call (X1).
+    """
+    worker.node._set_parameter(name, value)
     if worker.core.seldom is not None:
         worker.core.seldom(ParameterSet(worker.core.now(), worker.path, name, worker.node._parameters[name]))

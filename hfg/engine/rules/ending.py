@@ -13,7 +13,7 @@ from hfg.engine.rules.agenda import freed, idle_again
 from hfg.engine.rules.modifiers import derive_scopes, touch
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, send_end
-from hfg.errors import EndOfStream
+from hfg.errors import EndOfStream, shown
 from hfg.ports.edges import EventEdge
 from hfg.token import Marker, Token
 from hfg.trace import FiringEnded, TokenDrained, TokenDropped
@@ -65,7 +65,7 @@ def drop_taken(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]
 
 def gave_back(result: Any) -> TypeError:
     """F4: `end()` writes its last words, and gives nothing back."""
-    return TypeError(f"end() gave back {result!r:.80}, but it writes with send(): self.out.send(...)")
+    return TypeError(f"end() gave back {shown(result)}, but it writes with send(): self.out.send(...)")
 
 
 def drain_left(edges: Sequence[Any]) -> None:

@@ -14,7 +14,7 @@ from hfg.engine.rules import calls, firing, lifecycle
 from hfg.engine.rules.modifiers import automatic, report_error
 from hfg.engine.rules.retries import retry
 from hfg.engine.rules.sending import flush_automatic, put_outputs
-from hfg.errors import EndOfStream, Failure, FiringTimeout, NodeError, QueueLimit, in_words
+from hfg.errors import EndOfStream, Failure, FiringTimeout, NodeError, QueueLimit, in_words, shown
 from hfg.frames import users_part
 from hfg.logs import node_log
 from hfg.ports.edges import EventEdge
@@ -81,7 +81,7 @@ def _wrong_value(worker: Worker, error: Exception) -> str:
             continue
         source = edge.label.partition(" -> ")[0]
         return (
-            f'its input "{name}" is declared {describe(spec.type)} and was given {given[name]!r:.80} by "{source}": '
+            f'its input "{name}" is declared {describe(spec.type)} and was given {shown(given[name])} by "{source}": '
             "look there, with debug=True the run does it"
         )
     return ""

@@ -123,11 +123,17 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
         _note(worker, kind)
     if modifiers:
         _receive(worker, modifiers)
-    _set_parameters(worker, edges, tokens)
+    refused = _set_parameters(worker, edges, tokens)
+    if refused is not None and worker.flights is not None:
+        core.upstairs.fail(worker, f"firing {worker.firings}", refused, answer=False)
     if worker.flights is not None:
         core.upstairs.begin_beside(worker, kind, edges, tokens)
     elif kind == "end":
         end(worker, edges, tokens)
+    elif refused is not None:
+        if worker.attempts is not None:
+            worker.attempts.begin_none()
+        core.upstairs.fail(worker, f"firing {worker.firings}", refused, answer=True)
     elif kind == "silent":
         worker.fire_silently()
         put_outputs(worker, None)
@@ -277,11 +283,15 @@ def _all_ended(worker: Worker, taking_part: Sequence[Any]) -> bool:
     return bool(counted) and all(edge.ended for edge in counted)
 
 
-def _set_parameters(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
-    """P8: a token sets the parameter when it is taken, also in a silent firing."""
+def _set_parameters(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> Exception | None:
+    """P8: a token sets the parameter when it is taken, also in a silent firing; gives why one cannot be set."""
     for edge, token in zip(edges, tokens, strict=True):
         if edge.target_kind == "parameter" and type(token.value) is not Marker:
-            set_parameter(worker, edge.port_name, token.value)
+            try:
+                set_parameter(worker, edge.port_name, token.value)
+            except Exception as error:
+                return error
+    return None
 
 
 def arguments_of(worker: Worker, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> list[Any]:

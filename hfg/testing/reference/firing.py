@@ -130,7 +130,7 @@ class Firing(RunningCode):
             if line.edge.target.kind == "parameter" and not lying.token.is_marker:
                 try:
                     self.set_parameter(station, line.edge.target.name, lying.token.value)
-                except ValueError as error:
+                except Exception as error:
                     return error
         return None
 
@@ -209,7 +209,7 @@ class Firing(RunningCode):
         if error is None:
             try:
                 self.write_result(flight, result)
-            except (TypeError, UsageError) as wrong:
+            except Exception as wrong:  # of what it looks like, too
                 error = wrong
         if error is not None:
             self.fail_firing(flight, error)

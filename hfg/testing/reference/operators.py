@@ -118,7 +118,7 @@ class Operators:
         self._clock.advance(now)
 
     def _out(self, value: Any) -> None:
-        if isinstance(value, Token):
+        if type(value) is Token:
             self._give(Token(value.value, 0, value.stamp))
         else:
             self._give(Token(value, 0, self._clock.seconds if self._newest is None else self._newest))

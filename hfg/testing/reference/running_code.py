@@ -13,6 +13,7 @@ import inspect
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from functools import partial
+from types import CoroutineType
 from typing import Any
 
 from hfg.clock import time_told_by
@@ -145,7 +146,7 @@ class RunningCode(Sending):
                 result = function()
         except Exception as error:
             failure = error
-        if inspect.iscoroutine(result):
+        if type(result) is CoroutineType:
             with self.amid_code():
                 flight.task = self.loop.start(flight, result)
         elif flight.in_thread:

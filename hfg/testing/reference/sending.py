@@ -448,7 +448,7 @@ class Sending(State):
 
 def passed_on(value: Any, activity: int | None, stamp: float | None) -> tuple[Any, int | None, float | None]:
     """A4: a token passed on keeps its stamp, and a modifier if it has one; one with a = 0 counts as its value."""
-    if isinstance(value, Token):
+    if type(value) is Token:
         activity = (value.activity or None) if activity is None else activity
         stamp = value.stamp if stamp is None else stamp
         value = value.value

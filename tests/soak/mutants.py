@@ -1,0 +1,356 @@
+"""Faults to be planted, each of which breaks one rule: the suite must find every one of them.
+
+A mutant that is found by no test shows what no test looks at. They are planted in a copy, never here.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+__all__ = ["MUTANTS", "Mutant"]
+
+_FUSED: Final = (
+    "tests/semantics/test_fused.py",
+    "tests/semantics/test_fused_threads.py",
+    "tests/semantics/test_fused_flags.py",
+    "tests/semantics/test_fused_turns.py",
+    "tests/semantics/test_fused_meddling.py",
+    "tests/semantics/test_random_graphs.py",
+    "tests/recording/test_fused.py",
+)
+_THREADS: Final = (_FUSED[1], _FUSED[4])
+_LINKS: Final = ("tests/links/test_histories.py", "tests/links/test_exact.py", "tests/links/test_bounded.py")
+
+
+class Mutant(NamedTuple):
+    """A fault.
+
+    Attributes:
+      name: what is wrong with it, in a few words.
+      rule: the rule that it breaks.
+      file: in which it is planted.
+      old: the text that it replaces; it occurs once.
+      new: what it says instead.
+      tests: where it is looked for, in this order.
+    """
+
+    name: str
+    rule: str
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...]
+
+
+def _fused(name: str, rule: str, file: str, old: str, new: str) -> Mutant:
+    return Mutant(name, rule, f"hfg/engine/fusion/{file}.py", old, new, _THREADS if file == "threads" else _FUSED)
+
+
+def _link(name: str, rule: str, file: str, old: str, new: str) -> Mutant:
+    tests = _LINKS[2:] if file == "bounded" else _LINKS
+    return Mutant(name, rule, f"hfg/links/{file}.py", old, new, tests)
+
+
+MUTANTS: Final = (
+    _fused(
+        "a member whose inputs are all optional is called with nothing",
+        "F4",
+        "writing",
+        'silence = " and ".join(f"{self.schedule.local(edge)} is None" for edge in worker.live_inputs)',
+        'silence = ""',
+    ),
+    _fused(
+        "a silence at one of two mandatory inputs runs the function",
+        "F4",
+        "writing",
+        'silence = " or ".join(dict.fromkeys(tests))',
+        'silence = " and ".join(dict.fromkeys(tests))',
+    ),
+    _fused(
+        "an absent optional input is None, whatever its default",
+        "P6",
+        "writing",
+        'return value if edge.mandatory else f"(d{k}_{at} if {value} is None else {value})"',
+        "return value",
+    ),
+    _fused(
+        "an explicit modifier is lost",
+        "A4",
+        "writing",
+        "if modifier is not None or stamp is not None or type(value) in _EXCEPTIONAL:",
+        "if stamp is not None or type(value) in _EXCEPTIONAL:",
+    ),
+    _fused(
+        "an explicit stamp is lost",
+        "T5",
+        "writing",
+        "if modifier is not None or stamp is not None or type(value) in _EXCEPTIONAL:",
+        "if modifier is not None or type(value) in _EXCEPTIONAL:",
+    ),
+    _fused(
+        "a wave has the oldest stamp of what it took",
+        "T5",
+        "writing",
+        'say(f"stamp = max(',
+        'say(f"stamp = min(',
+    ),
+    _fused(
+        "two outputs change places",
+        "F3",
+        "writing",
+        'say(f"v{k}_{output} = values[{output}]")',
+        'say(f"v{k}_{output} = values[{len(worker.out_names) - 1 - output}]")',
+    ),
+    _fused(
+        "a marker calls a slot",
+        "T4",
+        "writing",
+        'say(f"if {value} is not None:")\n        self.indent += 1\n        say(f"core.speaker',
+        'say("if True:")\n        self.indent += 1\n        say(f"core.speaker',
+    ),
+    _fused(
+        "activity that a token brings to the head is not received",
+        "A6",
+        "writing",
+        'odd.append(f"entry{number}.token.activity")',
+        "pass",
+    ),
+    _fused(
+        "whom a buffer has enabled does not go before the next wave",
+        "R2",
+        "writing",
+        'stop += ["outputs.missing", "core.followers"]',
+        'stop += ["outputs.missing"]',
+    ),
+    _fused(
+        "slots do not get their tokens first",
+        "F9",
+        "schedule",
+        'return sorted(edges, key=lambda one: one[0].target_kind != "slot")',
+        "return edges",
+    ),
+    _fused(
+        "members go breadth first",
+        "R2",
+        "schedule",
+        "        stack.extend(reversed(enabled))\n",
+        "        stack[:0] = reversed(enabled)\n",
+    ),
+    _fused(
+        "what slots that listen while they are active hear is laid inside of a wave",
+        "T4",
+        "schedule",
+        "return bool(worker.listeners) and worker.listeners[output] is not None",
+        "return False",
+    ),
+    _fused(
+        "an active member that sends over an active edge is fused",
+        "A5",
+        "region",
+        "not any(one.active for one in self.carriers)",
+        "True",
+    ),
+    _fused(
+        "what a firing has sent is not waited for at a side exit",
+        "F5",
+        "region",
+        "edge.held = edge.live and (to >= k or not done[to]) and edge not in silent_calls",
+        "edge.held = edge.live and to >= k and edge not in silent_calls",
+    ),
+    _fused(
+        "what the head took is released though its outputs are not free",
+        "F5",
+        "region",
+        "        if head.outputs.missing:\n            head.hold(self.held_entries)\n        elif self.held_entries:\n",
+        "        if self.held_entries:\n",
+    ),
+    _fused(
+        "silences behind a silence are not counted",
+        "R7",
+        "region",
+        "silent = self.silent[number] + spread",
+        "silent = self.silent[number]",
+    ),
+    _fused(
+        "finished waves are not counted at a side exit",
+        "R7",
+        "region",
+        '        self.waves += found["done"]\n',
+        "",
+    ),
+    _fused(
+        "an END that was promised before the head finds nobody",
+        "F4",
+        "region",
+        "elif self.ending:  # the END",
+        "elif False:  # the END",
+    ),
+    _fused(
+        "a flag that a call has raised is forgotten when it gives way",
+        "F3",
+        "region",
+        "self.called_off = bool(self.flags)",
+        "self.called_off = False",
+    ),
+    _fused(
+        "what async code sends by itself behind an await stays where it is",
+        "F3",
+        "region",
+        'self.amid = "wave"',
+        'self.amid = "firing"',
+    ),
+    _fused(
+        "those who stand behind a member do not follow at a side exit",
+        "R2",
+        "region",
+        "if worker in self.schedule.position and (worker.calls or agenda.place(worker)):",
+        "if worker in self.schedule.position and worker.calls:",
+    ),
+    _fused(
+        "a failing member's silence is laid as a value",
+        "T2",
+        "region",
+        "edge.token = Token(NO_MESSAGE if value is None else value, 0, stamp, edge.sent)",
+        "edge.token = Token(value, 0, stamp, edge.sent)",
+    ),
+    _fused(
+        "who looks inside of a wave is told the number before",
+        "T5",
+        "telling",
+        'self._say("nth = region.waves + done + 1")',
+        'self._say("nth = region.waves + done")',
+    ),
+    _fused(
+        "who looks is not told what has passed before a side exit",
+        "R7",
+        "telling",
+        "self.untold[k] = list(self._waiting)",
+        "self.untold[k] = []",
+    ),
+    _fused(
+        "the fast path of signals does not carry on activity that has left before",
+        "A3",
+        "slots",
+        "if carries and (worker.active or worker.right):",
+        "if carries and worker.active:",
+    ),
+    _fused(
+        "the fast path of signals keeps the activity that it gives",
+        "A5",
+        "slots",
+        "        worker.give_away_activity()\n        tell_activity",
+        "        tell_activity",
+    ),
+    _fused(
+        "a node that waits has the oldest stamp of what it took",
+        "T5",
+        "waiting",
+        "if token.stamp > stamp:",
+        "if stamp < 0:",
+    ),
+    _fused(
+        "a wave in a thread has the oldest stamp of what it took",
+        "T5",
+        "threads",
+        "self.core.now() if head.is_source else max(",
+        "self.core.now() if head.is_source else min(",
+    ),
+    _fused(
+        "a wave in a thread releases what it took though its outputs are not free",
+        "F5",
+        "threads",
+        "            head.unplace()\n            head.hold(self.held_entries)\n        elif",
+        "            release(self.held_entries)\n        elif",
+    ),
+    _link(
+        "a repeated run of tokens is accepted from its second on",
+        "L2",
+        "consumer",
+        "known = self._accepted + 1 - frame.first",
+        "known = max(self._accepted - frame.first, 0)",
+    ),
+    _link(
+        "tokens behind a gap are accepted",
+        "L2",
+        "consumer",
+        "        if known < 0:\n",
+        "        if known < 0 and False:\n",
+    ),
+    _link(
+        "a consumer holds one token too many",
+        "L1",
+        "consumer",
+        "room = self.capacity - self._taken - len(self._waiting)",
+        "room = self.capacity - self._taken - len(self._waiting) + 1",
+    ),
+    _link(
+        "a ledger's consumer acknowledges what is not recorded",
+        "L2",
+        "consumer",
+        "self.name, self.incarnation, self.epoch, self._stream, self._accepted, self._done, limit, self._seen",
+        "self.name, self.incarnation, self.epoch, self._stream, self._accepted, self._accepted, limit, self._seen",
+    ),
+    _link(
+        "what a dead producer had sent and nobody got is not counted",
+        "L2",
+        "consumer",
+        "self.counts.abandoned += self._highest - self._accepted",
+        "self.counts.abandoned += 0",
+    ),
+    _link(
+        "what was taken of a former stream counts as done of the next",
+        "L2",
+        "consumer",
+        "self._older = self.unfinished",
+        "self._older = 0",
+    ),
+    _link(
+        "a producer runs ahead by one more than its window",
+        "P4",
+        "producer",
+        "min(self._released + self.window, before + self._most)",
+        "min(self._released + self.window + 1, before + self._most + 1)",
+    ),
+    _link(
+        "a producer forgets what one of its consumers has done",
+        "L2",
+        "producer",
+        "done = released = min([peer.done for peer in peers], default=last)",
+        "done = released = max([peer.done for peer in peers], default=last)",
+    ),
+    _link(
+        "a new life of a consumer is sent nothing of what the former had accepted",
+        "L2",
+        "peer",
+        "        self.incarnation = incarnation\n        self.fall_out()\n",
+        "        self.incarnation = incarnation\n",
+    ),
+    _link(
+        "a former life of a consumer is believed",
+        "L2",
+        "peer",
+        "return incarnation >= self.incarnation and incarnation > 0",
+        "return incarnation > 0",
+    ),
+    _link(
+        "what was lost on the way is not sent again",
+        "L2",
+        "peer",
+        "if status.seen >= self.last_serial and self.accepted < self.sent:",
+        "if False:",
+    ),
+    _link(
+        "a loss of one token is not counted",
+        "L2",
+        "bounded",
+        "self.counts.lost += max(frame.first - self._last - 1, 0)",
+        "self.counts.lost += max(frame.first - self._last - 2, 0)",
+    ),
+    _link(
+        "the oldest is dropped where the newest is to be",
+        "P5",
+        "bounded",
+        'if self._overflow == "drop_newest":',
+        'if self._overflow == "newest":',
+    ),
+)
