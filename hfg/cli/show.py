@@ -196,9 +196,9 @@ def report(name: str, result: Report, verbosity: int) -> None:
         ]
         table("nodes", ("node", "firings", "silent", "calls", "failed", "active", "ended"), nodes, to_stderr=True)
     edges = [
-        (label, edge.sent, edge.dropped, edge.drained, edge.untaken, edge.grown)
+        (label, edge.sent, edge.dropped, edge.lost, edge.drained, edge.untaken, edge.grown)
         for label, edge in result.edges.items()
-        if verbosity > 1 or edge.dropped or edge.grown
+        if verbosity > 1 or edge.dropped or edge.lost or edge.grown
     ]
     if verbosity and edges:
-        table("edges", ("edge", "sent", "dropped", "drained", "untaken", "grown"), edges, to_stderr=True)
+        table("edges", ("edge", "sent", "dropped", "lost", "drained", "untaken", "grown"), edges, to_stderr=True)

@@ -217,6 +217,14 @@ class ExactProducer:
             self._free()
         return number
 
+    def begin_at(self, number: int) -> None:
+        """Nothing was sent in this life: the first token has that number.
+
+        Raises:
+          UsageError: something is not done.
+        """
+        self._begin_at(Position(self._stream, number))
+
     def _why_not(self) -> UsageError:
         if self._closed:
             return UsageError("the link is closed")

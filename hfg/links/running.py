@@ -169,6 +169,11 @@ class LinkSender:
             self._batch.ask()
         return number
 
+    def begin_at(self, number: int) -> None:
+        """Nothing was sent in this life: the first token has that number."""
+        self.machine.begin_at(number)
+        self._batch.ask()
+
     async def send(self, token: EncodedToken, position: Position | None = None) -> int:
         """The same, but wait while the window is full."""
         if self._turns.waiting or not (self.machine.free if position is None else self.machine.takes(position)):

@@ -32,7 +32,7 @@ from hfg.parts.hosts.standing import Standing
 from hfg.parts.model.agreement import Agreement, Question, Rest
 from hfg.parts.model.clocks import RunClock, machine
 from hfg.parts.model.failing import as_error
-from hfg.parts.model.inheriting import inheriting, keeping, remembering
+from hfg.parts.model.inheriting import inherited, keeping, remembered
 from hfg.parts.model.ledgers import Entry, Ledger, ledger_of
 from hfg.parts.model.lives import LIMIT, WITHIN_S
 from hfg.parts.model.messages import (
@@ -149,7 +149,14 @@ class Distribution:
         """Here is the engine of the main part."""
         self._loop = asyncio.get_running_loop()
         cutting = self._drawing.cutting
-        self._part = Part(MAIN, composition, cutting.edges_of(MAIN), rests=self._rests, inheriting=inheriting(cutting))
+        self._part = Part(
+            MAIN,
+            composition,
+            cutting.edges_of(MAIN),
+            rests=self._rests,
+            inherited=inherited(cutting),
+            remembered=remembered(cutting),
+        )
         composition.consumers.leave_out(sieve(MAIN, self._drawing.cutting.edges))
         composition.engine.callbacks.finished.append(self._ended_here)
 
@@ -186,7 +193,7 @@ class Distribution:
             self._lives,
             edges,
             self._say,
-            remembering(self._drawing.cutting),
+            remembered(self._drawing.cutting),
             shares_memory=self._launcher.shares_memory,
             admits=False,
         )
@@ -592,4 +599,5 @@ def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeReport]]) -> Ed
         drained=source.drained + target.drained,
         untaken=source.untaken if edge.guarantee == "exact" else target.untaken,
         grown=source.grown,
+        lost=source.lost + target.lost,
     )

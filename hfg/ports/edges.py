@@ -37,6 +37,7 @@ class Edge:
       position: which input of the target's node type; inputs first, then parameters.
       mandatory: whether it feeds a mandatory input (F4's m).
       sent, dropped, drained: counts for the report; `sent` is also the number of the newest token.
+      lost: tokens of it that are gone with a process (L2).
       live: whether both ends are enabled (SEMANTICS, "live edge").
       sequential: what lies on it is processed when the consumer's outputs are, not when it is taken (F5).
       follows: what it enables goes before all else of the group (R2): sequential, within one group, first in first out.
@@ -62,6 +63,7 @@ class Edge:
         "index",
         "label",
         "live",
+        "lost",
         "mandatory",
         "port_name",
         "position",
@@ -94,6 +96,7 @@ class Edge:
         self.sent = 0
         self.dropped = 0
         self.drained = 0
+        self.lost = 0
         self.live = True
         self.sequential = False
         self.follows = False

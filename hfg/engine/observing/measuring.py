@@ -261,6 +261,7 @@ class Measuring:
             deepest=max(edge.deepest, int(edge.sent > edge.dropped + edge.drained)),  # fast paths count from two on
             capacity=getattr(edge, "capacity", None),
             grown=getattr(edge, "grown", 0),
+            lost=edge.lost,
         )
 
 

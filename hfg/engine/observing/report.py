@@ -54,6 +54,7 @@ class EdgeReport(msgspec.Struct, frozen=True):
       drained: processed without a firing because the consumer has ended (F12).
       untaken: what still lies on it.
       grown: places that F8 added.
+      lost: gone with the process of a group that died (L2); what was put in their place is among the others.
     """
 
     sent: int
@@ -61,6 +62,7 @@ class EdgeReport(msgspec.Struct, frozen=True):
     drained: int
     untaken: int
     grown: int
+    lost: int = 0
 
 
 class Report(msgspec.Struct, frozen=True):
@@ -101,10 +103,11 @@ class Report(msgspec.Struct, frozen=True):
             *table(("node", "firings", "silent", "calls", "failed", "retries", "restarts", "active", "ended"), nodes),
         ]
         edges = [
-            (label, one.sent, one.dropped, one.drained, one.untaken, one.grown) for label, one in self.edges.items()
+            (label, one.sent, one.dropped, one.lost, one.drained, one.untaken, one.grown)
+            for label, one in self.edges.items()
         ]
         if edges:
-            lines += ["", *table(("edge", "sent", "dropped", "drained", "untaken", "grown"), edges)]
+            lines += ["", *table(("edge", "sent", "dropped", "lost", "drained", "untaken", "grown"), edges)]
         if self.clocks:
             lines += ["", *table(("group", "clock within"), [(one, seconds(at)) for one, at in self.clocks.items()])]
         if self.lost_activity:
@@ -223,6 +226,7 @@ def edge_reports(core: Core) -> dict[str, EdgeReport]:
             drained=edge.drained,
             untaken=edge.untaken,
             grown=getattr(edge, "grown", 0),
+            lost=edge.lost,
         )
         for edge in core.edges
     }

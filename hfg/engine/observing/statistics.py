@@ -95,6 +95,7 @@ class EdgeStatistics(msgspec.Struct, frozen=True):
       deepest: the most that ever lay on it.
       capacity: places of its queue; None for an edge of data, which has one, unless a buffer or a delay adds to that.
       grown: places that F8 added.
+      lost: gone with the process of a group that died (L2).
     """
 
     sent: int
@@ -105,6 +106,7 @@ class EdgeStatistics(msgspec.Struct, frozen=True):
     deepest: int
     capacity: int | None
     grown: int
+    lost: int = 0
 
 
 class GroupStatistics(msgspec.Struct, frozen=True):
@@ -183,9 +185,12 @@ class Statistics(msgspec.Struct, frozen=True):
         lines = [f"{self.outcome} after {seconds(self.duration_s)}, {self.firings} firings"]
         lines += ["", *table((*columns, "active", "doing"), nodes)]
         edges = [
-            (label, one.sent, one.rate_hz, one.dropped, one.drained, one.untaken, one.deepest, one.grown)
+            (label, one.sent, one.rate_hz, one.dropped, one.lost, one.drained, one.untaken, one.deepest, one.grown)
             for label, one in self.edges.items()
         ]
         if edges:
-            lines += ["", *table(("edge", "sent", "Hz", "dropped", "drained", "untaken", "deepest", "grown"), edges)]
+            lines += [
+                "",
+                *table(("edge", "sent", "Hz", "dropped", "lost", "drained", "untaken", "deepest", "grown"), edges),
+            ]
         return "\n".join([*lines, *([""] if self.errors else []), *self.errors])

@@ -38,6 +38,7 @@ class Outlet:
       sent: how many tokens have left, as its two ends count them: through all lives of both.
       taken: how many of them count as taken by the consumer.
       left: how many have left in this life.
+      end_has_left: END was the last of them.
       hearing: what that does with them, as far as is known here.
     """
 
@@ -63,6 +64,7 @@ class Outlet:
         (self._edge,) = worker.in_edges
         self._waiting = 0  # tokens that have left and still lie here
         self._owed = 0  # tokens that a former life has kept and that are not taken: the oldest of those under way
+        self.end_has_left = False
         self.hearing: Hearing = "open"
         self.label: str = worker.port_name
         self.sent = 0
@@ -90,6 +92,7 @@ class Outlet:
             tokens = [Token(*one) for one in lying]
         if self._keeps:
             self._waiting += len(tokens)
+            self.end_has_left = self.end_has_left or (bool(tokens) and tokens[-1].value is END)
         self.sent += len(tokens)
         self.left += len(tokens)
         return tokens
@@ -113,6 +116,11 @@ class Outlet:
         """A former life has sent so many, and nobody waits for what becomes of them."""
         self.sent += total
         self.taken += total
+
+    def stand_at(self, number: int) -> None:
+        """That is the number of the last one that has left: a new life of the consumer counts from there."""
+        self.taken += number - self.sent
+        self.sent = number
 
     def owe(self, count: int) -> None:
         """A former life has kept so many for the consumer, which are on their way and do not lie here."""
@@ -199,6 +207,7 @@ class Inlet:
       label: of the edge.
       received: how many tokens have come, as its two ends count them: through all lives of both.
       taken: how many of them their consumer has taken.
+      heard: how many the producer has sent, as far as is known here, by its numbers.
       speaking: whether their producer is enabled, as far as is known here.
     """
 
@@ -221,6 +230,7 @@ class Inlet:
         self.speaking = True
         self.label: str = worker.port_name
         self.received = 0
+        self.heard = 0
         self.taken = 0
         self._done = 0  # of those, in the part, with all that came of them
         self._orphans = 0  # of so many the producer has died and left nobody who waits for them to be done
@@ -242,6 +252,10 @@ class Inlet:
         self.received += total
         self.taken += total
         self._done += total
+
+    def rebase_to(self, number: int) -> None:
+        """All up to that number was done by former lives, or is lost with them."""
+        self.received = self.taken = self._done = number
 
     @property
     def settled(self) -> int:
@@ -277,6 +291,10 @@ class Inlet:
         """So many have left and will never come: the edge may lose some, and counts them."""
         self.received += count
         self._edge.count_dropped(count)
+
+    def count_lost(self, count: int) -> None:
+        """So many are lost with the process of a part."""
+        self._edge.lost += count
 
     def arrive(self, tokens: Sequence[tuple[Any, int, float]]) -> None:
         """Tokens have come over the link: value, modifier and stamp of each."""

@@ -1,24 +1,36 @@
 """Parts of which nothing is lost when they die, and where a new life of a part goes on (rule L2, docs/links.md).
 
-A part in which each token gives exactly one on each edge that leaves it needs no ledger: what it sends inherits the
-positions of what it was sent, and a token counts as done when all that came of it is done. A new life of it is sent
-what was not done, sends what comes of that once more, and whoever has it already knows it by its position. Decides,
-never waits. Stands on graphs that are cut.
+A component (see `components`) in which each token gives exactly one on each edge that leaves it needs no ledger: what
+it sends inherits the positions of what it was sent, and a token counts as done when all that came of it is done. A new
+life of it is sent what was not done, sends what comes of that once more, and whoever has it already knows it by its
+number. Any other component goes on behind the last number that anybody outside knows of. Decides, never waits. Stands
+on graphs that are cut.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Final, TypeAlias
 
-from hfg.graph.flat import LINK, MAIN, Cutting, End, FlatEdge, FlatGraph, FlatNode
+from hfg.graph.flat import LINK, MAIN, Cutting, End, FlatGraph
 from hfg.graph.flat.order import strongly_connected
+from hfg.parts.model.components import Component, components
 
-__all__ = ["UNKNOWN", "Alignment", "Arrived", "Inheritance", "Where", "inheriting", "keeping", "remembering"]
+__all__ = [
+    "UNKNOWN",
+    "Alignment",
+    "Arrived",
+    "Inheritance",
+    "Where",
+    "inherited",
+    "inheriting",
+    "keeping",
+    "remembered",
+]
 
 Where: TypeAlias = tuple[int, int]
-"""The position of a token: stream and number; (0, 0) is before all of them."""
+"""The position of a token: stream and number. Over an edge from an output numbers grow by one through all lives."""
 
 UNKNOWN: Final[Where] = (-1, 0)
 """Said of a position by a life of a part that was not told yet where it goes on."""
@@ -28,12 +40,31 @@ Arrived: TypeAlias = tuple[tuple[Any, int, float], Where]
 
 
 def inheriting(cutting: Cutting) -> frozenset[str]:
-    """Give the parts whose tokens inherit positions; all parts of a run come to the same answer.
+    """Give the parts with components whose tokens inherit positions; all parts of a run come to the same answer.
 
     A delay holds tokens back for good, so it would hold up who waits until they are done: with one in the graph none
     does; nor does one beside a ledger (see `keeping`).
     """
-    return frozenset() if keeping(cutting) else _one_to_one(cutting)
+    if keeping(cutting):
+        return frozenset()
+    return frozenset(name for name, found in _answering(cutting).items() if found)
+
+
+def inherited(cutting: Cutting) -> frozenset[str]:
+    """Give the edges between parts, by label, whose tokens inherit their positions."""
+    return frozenset(
+        label
+        for name, found in _answering(cutting).items()
+        if name in inheriting(cutting)
+        for component in found
+        for label in component.leaving
+    )
+
+
+def remembered(cutting: Cutting) -> frozenset[str]:
+    """Give the edges between parts, by label, whose producer remembers what it has sent, in another life too."""
+    keeps = keeping(cutting)
+    return inherited(cutting) | {edge.label for edge in cutting.edges if edge.source in keeps}
 
 
 def keeping(cutting: Cutting) -> dict[str, bool | str]:
@@ -43,32 +74,48 @@ def keeping(cutting: Cutting) -> dict[str, bool | str]:
     it has kept has not got all that it was sent, and what is inherited alone would not tell. So they do where two of
     them feed each other: a token would be done when it is done at the other, and there when it is done here.
     """
-    asked_for, one_to_one = _asked_for(cutting), _one_to_one(cutting)
-    if not asked_for and not _feed_each_other(cutting, one_to_one):
+    asked_for, answering = _asked_for(cutting), _answering(cutting)
+    if not asked_for and not _feed_each_other(cutting, answering):
         return {}
-    also: dict[str, bool | str] = dict.fromkeys(one_to_one, True)
+    whole = components(cutting)
+    also: dict[str, bool | str] = {name: True for name, found in answering.items() if found and found == whole[name]}
     return also | asked_for
 
 
-def _feed_each_other(cutting: Cutting, parts: frozenset[str]) -> bool:
-    """Whether what leaves one of these parts comes back to it, by way of whatever nodes."""
-    numbers = {("part", name): number for number, name in enumerate(sorted(parts))}
+def _answering(cutting: Cutting) -> dict[str, tuple[Component, ...]]:
+    """The components that would inherit positions, by part."""
+    if any(edge.initial for flat in cutting.parts.values() for edge in flat.edges):
+        return {}
+    return {name: tuple(one for one in found if one.answers) for name, found in components(cutting).items()}
+
+
+def _feed_each_other(cutting: Cutting, answering: Mapping[str, tuple[Component, ...]]) -> bool:
+    """Whether what leaves one of these components comes back to it, by way of whatever nodes."""
+    home = {
+        path: (name, number)
+        for name, found in answering.items()
+        for number, component in enumerate(found)
+        for path in component.nodes
+    }
+    numbers: dict[object, int] = {("component", *one): number for number, one in enumerate(sorted(set(home.values())))}
+    count = len(numbers)
     fed: list[list[int]] = [[] for _ in numbers]
 
-    def number_of(end: End, flat: FlatGraph, part: str) -> int:
-        name = ("edge", end.name) if end.node == LINK else ("part", part)
-        if end.node >= 0 and part not in parts:
-            name = ("node", flat.nodes[end.node].path)
+    def number_of(end: End, flat: FlatGraph) -> int:
+        path = "" if end.node == LINK else flat.nodes[end.node].path
+        name: object = ("edge", end.name) if end.node == LINK else ("node", path)
+        if path in home:
+            name = ("component", *home[path])
         if name not in numbers:
             numbers[name] = len(numbers)
             fed.append([])
         return numbers[name]
 
-    for part, flat in cutting.parts.items():
+    for flat in cutting.parts.values():
         for edge in flat.edges:
             if all(end.node >= 0 or end.node == LINK for end in (edge.source, edge.target)):
-                fed[number_of(edge.source, flat, part)].append(number_of(edge.target, flat, part))
-    return any(len(together) > 1 and together[0] < len(parts) for together in strongly_connected(fed))
+                fed[number_of(edge.source, flat)].append(number_of(edge.target, flat))
+    return any(len(together) > 1 and together[0] < count for together in strongly_connected(fed))
 
 
 def _asked_for(cutting: Cutting) -> dict[str, bool | str]:
@@ -77,54 +124,6 @@ def _asked_for(cutting: Cutting) -> dict[str, bool | str]:
         for name, flat in cutting.parts.items()
         if name != MAIN and flat.groups[name].ledger
     }
-
-
-def remembering(cutting: Cutting) -> frozenset[str]:
-    """Give the parts that remember what they have sent, in another life too."""
-    return inheriting(cutting) | keeping(cutting).keys()
-
-
-def _one_to_one(cutting: Cutting) -> frozenset[str]:
-    if any(edge.initial for flat in cutting.parts.values() for edge in flat.edges):
-        return frozenset()
-    return frozenset(name for name, flat in cutting.parts.items() if name != MAIN and _is_one_to_one(flat))
-
-
-def _is_one_to_one(flat: FlatGraph) -> bool:
-    """Whether each token that comes in is answered by one on each edge that leaves.
-
-    For that all of it hangs together: of two chains that have nothing in common one may be far ahead of the other.
-    """
-    fed = {edge.target.node for edge in flat.edges}
-    sending = {edge.source.node for edge in flat.edges}
-    return (
-        not flat.gates
-        and any(edge.source.node == LINK for edge in flat.edges)
-        and all(map(_carries_data, flat.edges))
-        and all(node.index in fed and _answers_each(node, node.index in sending) for node in flat.nodes)
-        and _hangs_together(flat)
-    )
-
-
-def _carries_data(edge: FlatEdge) -> bool:
-    is_of_data = edge.source.kind == "output" and edge.target.kind == "input"
-    return is_of_data and not edge.active and (edge.source.node >= 0 or edge.source.node == LINK)
-
-
-def _hangs_together(flat: FlatGraph) -> bool:
-    beside: list[list[int]] = [[] for _ in flat.nodes]
-    for edge in flat.edges:
-        if edge.source.node >= 0 and edge.target.node >= 0:
-            beside[edge.source.node].append(edge.target.node)
-            beside[edge.target.node].append(edge.source.node)
-    return len(strongly_connected(beside)) == 1
-
-
-def _answers_each(node: FlatNode, sends: bool) -> bool:
-    if sends and node.node._hook("end") is not None:
-        return False  # it may have a last word, which answers nothing
-    options = node.options
-    return options.enabled and options.concurrency == 1 and options.on_error == "stop" and not options.active_for_s
 
 
 class Inheritance:
@@ -169,56 +168,64 @@ class Inheritance:
 
 
 class Alignment:
-    """Where the edges into a new life of a part go on together.
+    """Where a component goes on in a new life of its part: behind the last number of which anybody outside knows.
 
-    What belongs together has the same number on all of them. What was done may be known to one producer and not yet to
-    another; so all go on behind the one that knows most, and what comes of less was done by a former life.
+    What belongs together has the same number on all its edges. What was done may be known to one producer and not yet
+    to another, and consumers may have got what no producer knows to be done; whatever is older came of former lives, or
+    is lost with them.
+
+    Attributes:
+      start: the number with which it goes on on all edges; None: not all have told yet.
     """
 
-    def __init__(self, labels: Iterable[str]) -> None:
+    def __init__(self, coming: Mapping[str, int], leaving: Iterable[str] = (), *, start: int | None = None) -> None:
         """Begin knowing nothing.
 
         Args:
-          labels: of the edges of data that come in and lose nothing.
+          coming: the edges that come in, by label, and how many initial values each has.
+          leaving: those that leave and of which consumers tell what has come.
+          start: where it goes on, if that is known.
         """
-        self._next: dict[str, Where | None] = dict.fromkeys(labels)
-        self._held: dict[str, list[Arrived]] = {}
-        self._start: Where | None = (0, 0) if len(self._next) < 2 else None
+        self.start = start
+        self._delays = dict(coming)
+        self._done: dict[str, int | None] = dict.fromkeys(coming)
+        self._came: dict[str, int | None] = dict.fromkeys(leaving)
+        self._held: dict[str, list[Arrived]] = {label: [] for label in coming}
+        self._look()
 
-    def goes_on(self, label: str, last: Where) -> None:
-        """The producer says which token was the last that it knows to be done, or that it does not know yet."""
-        if last != UNKNOWN and label in self._next and self._next[label] is None:
-            self._next[label] = (last[0], last[1] + 1)
+    def done(self, label: str, number: int) -> None:
+        """The producer of an edge knows that all up to that number is done."""
+        if self._done.get(label, 0) is None:
+            self._done[label] = number
+            self._look()
 
-    @property
-    def behind(self) -> Where:
-        """The position of the last token that was done by former lives, on any of the edges; or `UNKNOWN`."""
-        start = self._start if len(self._next) > 1 else next(iter(self._next.values()), None)
-        return UNKNOWN if start is None else (start[0], max(start[1] - 1, 0))
+    def came(self, label: str, number: int) -> None:
+        """The consumer of an edge has got all up to that number, as far as it knows."""
+        if self._came.get(label, 0) is None:
+            self._came[label] = number
+            self._look()
 
-    def held(self, label: str) -> int:
-        """How many tokens of an edge wait here."""
-        return len(self._held.get(label, ())) if self._start is None else 0
+    def hold(self, label: str, tokens: list[Arrived]) -> None:
+        """These have come before all have told."""
+        self._held[label] += tokens
+        if tokens:
+            self.done(label, tokens[0][1][1] - 1)
 
-    def arrive(self, label: str, tokens: list[Arrived]) -> dict[str, tuple[int, list[Arrived]]]:
-        """Take what has come, perhaps nothing; gives what is to be laid now: how many to skip, and the others."""
-        if label not in self._next:
-            return {label: (0, tokens)}
-        if self._start is not None:
-            return {label: self._without_done(tokens, self._start)}
-        if tokens and self._next[label] is None:
-            self._next[label] = tokens[0][1]
-        self._held.setdefault(label, []).extend(tokens)
-        known = [where for where in self._next.values() if where is not None]
-        if len(known) < len(self._next):
-            return {}
-        # Numbers of different streams have nothing in common: a source has begun anew, and what it had sent is lost.
-        start = self._start = max(known) if len({stream for stream, _ in known if stream}) < 2 else (0, 0)
-        return {one: self._without_done(held, start) for one, held in self._held.items() if held}
+    def let_go(self) -> dict[str, list[Arrived]]:
+        """Give what was held, now that it is known where it goes on."""
+        held, self._held = self._held, {label: [] for label in self._held}
+        return held
 
-    @staticmethod
-    def _without_done(tokens: list[Arrived], start: Where) -> tuple[int, list[Arrived]]:
-        if not tokens or tokens[0][1] >= start:
-            return 0, tokens
-        later = [token for token in tokens if token[1] >= start]
-        return len(tokens) - len(later), later
+    def passed_over(self, label: str) -> int:
+        """How many tokens of an edge that comes in are behind the start, and were not known to be done."""
+        return 0 if self.start is None else max(self.start - 1 - (self._done[label] or 0), 0)
+
+    def _look(self) -> None:
+        if self.start is not None:
+            return
+        known = [number for number in self._came.values() if number is not None]
+        for label, done in self._done.items():
+            if done is not None:
+                known.append(done and done + self._delays[label])
+        if len(known) == len(self._came) + len(self._done):
+            self.start = 1 + max(known, default=0)

@@ -363,6 +363,7 @@ class Joins(msgspec.Struct, frozen=True, tag=True):
       total: how many tokens are done, said by the producer; how many have come, said by the consumer.
       stream, number: the position of the last of them; or `UNKNOWN`.
       hearing: what the consumer does with tokens.
+      ended: END was sent and has come; said by the producer, it is not among the tokens that are counted.
     """
 
     label: Label
@@ -370,6 +371,7 @@ class Joins(msgspec.Struct, frozen=True, tag=True):
     stream: Stream
     number: Counted
     hearing: Hearing = "open"
+    ended: bool = False
 
 
 class GoesOn(msgspec.Struct, frozen=True, tag=True):

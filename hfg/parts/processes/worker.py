@@ -25,8 +25,9 @@ from hfg.graph.structure.level import level_of
 from hfg.logs import Log
 from hfg.parts.model.agreement import Rest
 from hfg.parts.model.clocks import Offset, RunClock, machine
+from hfg.parts.model.components import components
 from hfg.parts.model.failing import as_failed
-from hfg.parts.model.inheriting import inheriting, keeping, remembering
+from hfg.parts.model.inheriting import inherited, inheriting, keeping, remembered
 from hfg.parts.model.messages import (
     Ask,
     AskTime,
@@ -198,7 +199,10 @@ class Worker:
             composition,
             edges,
             rests=self._rests,
-            inheriting=inheriting(cutting),
+            components=components(cutting)[self._name],
+            inherits=self._name in inheriting(cutting),
+            inherited=inherited(cutting),
+            remembered=remembered(cutting),
             returns=self._life > message.incarnations[MAIN],
             keeper=keeper,
         )
@@ -218,7 +222,7 @@ class Worker:
             lives,
             edges,
             self._say,
-            remembering(cutting),
+            remembered(cutting),
             shares_memory=message.shares_memory,
         )
         self._shares_memory = message.shares_memory

@@ -32,7 +32,7 @@ class Carrier:
         lives: dict[str, int],
         edges: list[CutEdge],
         say: Callable[[str, Message], None],
-        remembering: frozenset[str] = frozenset(),
+        remembered: frozenset[str] = frozenset(),
         *,
         shares_memory: bool = False,
         admits: bool = True,
@@ -47,7 +47,7 @@ class Carrier:
           lives: which life of each part this is for.
           edges: those between it and others.
           say: brings a message to another part.
-          remembering: the parts that know in each life what they have sent in others.
+          remembered: the edges whose producer knows in each life what it has sent in others, by label.
           shares_memory: large arrays between parts of one host may go through shared memory.
           admits: parts of younger lives are there, and hear what they are told.
         """
@@ -60,7 +60,7 @@ class Carrier:
             if edge.source == part.name:
                 self._links[edge.label] = outgoing[edge.label] = OutgoingEnd(world, edge)
             else:
-                self._links[edge.label] = incoming[edge.label] = IncomingEnd(world, edge, edge.source in remembering)
+                self._links[edge.label] = incoming[edge.label] = IncomingEnd(world, edge, edge.label in remembered)
         for edge in (edge for edge in edges if shares_memory and edge.within_host):
             must_hold_arrays = part.keeper is not None and edge.source == part.name  # for they are kept with it
             if edge.guarantee == "exact" and not must_hold_arrays:
@@ -107,7 +107,7 @@ class Carrier:
             case Joins():
                 link.join(message)
             case GoesOn():
-                self._part.goes_on(label, (message.stream, message.number))
+                self._incoming[label].goes_on(message.number)
             case Shares():
                 self._incoming[label].borrow(message)
             case Sees():

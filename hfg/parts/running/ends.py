@@ -19,8 +19,9 @@ from hfg.graph.flat import CutEdge
 from hfg.links import Outbox
 from hfg.links.consumer import ExactConsumer
 from hfg.links.running import BoundedReceiver, BoundedSender, LinkReceiver, LinkSender
+from hfg.parts.model.components import is_synchronous
 from hfg.parts.model.failing import codec_of
-from hfg.parts.model.inheriting import Arrived, Where
+from hfg.parts.model.inheriting import UNKNOWN, Arrived, Where
 from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, Sees, Shares, Speaks, Untrue
 from hfg.parts.running.channels import name_of
 from hfg.parts.running.part import Part
@@ -73,7 +74,8 @@ class _NearEnd:
     def __init__(self, world: World, edge: CutEdge, other: str) -> None:
         self.other = other
         self._part = world.part
-        self._waits_to_join = world.lives[world.part.name] > world.lives[other]
+        self._life = world.lives[world.part.name]
+        self._waits_to_join = self._life > world.lives[other]
         self._edge = edge
         self._key = f"{world.run}/edge/{edge.number}"
         self._codec = _codec_of(edge)
@@ -101,7 +103,8 @@ class OutgoingEnd(_NearEnd):
         part, lives = world.part, world.lives
         self._loop = asyncio.get_running_loop()
         self._most = _most_under_way(edge)
-        self._known: Where = (0, 0)  # the last that had come from former lives
+        self._known = 0  # the number of the last that had come from former lives
+        self._aligns = is_synchronous(edge) and part.keeper is None
         self._lending: Lending | None = None
         self._held: deque[EncodedToken] = deque()  # what is not kept yet, and may not leave before it is
         self._sender: LinkSender | BoundedSender
@@ -115,7 +118,7 @@ class OutgoingEnd(_NearEnd):
                 epoch=lives[part.name],
                 window=self._most,
                 released=self._released,
-                inherits=part.inherits,
+                inherits=part.positions(edge.label) is not None,
                 outbox=outbox,
             )
             after = None if outbox is None else outbox.first - 1
@@ -127,7 +130,7 @@ class OutgoingEnd(_NearEnd):
     def room(self) -> int:
         """See `Outgoing`."""
         sender = self._sender
-        if self._waits_to_join:
+        if self._waits_to_join or not self._part.is_aligned(self._edge.label):
             return 0
         if isinstance(sender, BoundedSender):
             return self._edge.window * 4
@@ -137,11 +140,11 @@ class OutgoingEnd(_NearEnd):
                 return 0
             if not self._edge.edge.is_event_edge:  # whose links have no bound
                 room = min(room, self._lending.room)
-        return self._in_a_row(sender, room) if self._part.inherits and room > 0 else room
+        positions = self._part.positions(self._edge.label)
+        return room if positions is None or room <= 0 else self._in_a_row(sender, positions, room)
 
-    def _in_a_row(self, sender: LinkSender, most: int) -> int:
+    def _in_a_row(self, sender: LinkSender, positions: deque[Where], most: int) -> int:
         """How many can be sent before numbers jump: that they do when all before is done."""
-        positions = self._part.positions[self._edge.label]
         if not positions or not sender.machine.takes(Position(*positions[0])):
             return 0
         count = 1
@@ -155,15 +158,16 @@ class OutgoingEnd(_NearEnd):
     def send(self, tokens: list[Token[Any]]) -> None:
         """See `Outgoing`."""
         sender, part, label, lending = self._sender, self._part, self._edge.label, self._lending
+        positions = part.positions(label)
         repeated = 0
         try:
             for token in tokens:
                 encoded = self._codec.encode(token) if lending is None else lending.encode(self._codec, token)
                 if part.keeper is not None:
                     self._held.append(encoded)
-                elif part.inherits and isinstance(sender, LinkSender):
-                    where = part.positions[label].popleft()
-                    repeated += where <= self._known
+                elif positions is not None and isinstance(sender, LinkSender):
+                    where = positions.popleft()
+                    repeated += where[1] <= self._known
                     sender.send_nowait(encoded, Position(*where))
                 else:
                     sender.send_nowait(encoded)
@@ -175,7 +179,7 @@ class OutgoingEnd(_NearEnd):
         outlet = part.outlets[label]
         if repeated:
             outlet.repeat(repeated)
-        if part.inherits and outlet.sent - self._unfinished > outlet.taken:
+        if positions is not None and outlet.sent - self._unfinished > outlet.taken:
             self._loop.call_soon(self._released)  # done before: nobody will say so again
 
     @property
@@ -208,9 +212,14 @@ class OutgoingEnd(_NearEnd):
         """See `Outgoing`."""
         self._tell(Speaks(self._edge.label, speaking, total))
 
-    def goes_on(self, last: Where) -> None:
+    def begin_at(self, number: int) -> None:
         """See `Outgoing`."""
-        self._tell(GoesOn(self._edge.label, *last))
+        if isinstance(self._sender, LinkSender):
+            self._sender.begin_at(number)
+
+    def goes_on(self, number: int) -> None:
+        """See `Outgoing`."""
+        self._tell(GoesOn(self._edge.label, self._life, number))
 
     def _released(self) -> None:
         if self._lending is not None:
@@ -223,15 +232,23 @@ class OutgoingEnd(_NearEnd):
         label, sender = self._edge.label, self._sender
         if isinstance(sender, LinkSender):
             sender.admit(name_of(self._edge.target), life)
-        stream, number = sender.machine.position
-        number -= self._unfinished - len(self._held)
-        if not stream:
-            stream, number = self._part.behind
-        self._known = (0, 0)  # it has nothing
+        self._known = 0  # it has nothing
         if self._lending is not None:
             self._lending.admit()
-        done = self._part.outlets[label].sent - self._unfinished
-        self._tell(Joins(label, done, stream, number))
+        outlet = self._part.outlets[label]
+        stream, number = sender.machine.position
+        ended = False
+        if not self._aligns:
+            done = max(outlet.sent - self._unfinished, 0)
+            number -= self._unfinished - len(self._held)
+        elif not self._part.is_aligned(label):
+            (stream, number), done = UNKNOWN, 0
+        else:
+            stream, number = self._life, number if stream and number else self._part.begun_at(label) - 1
+            outlet.stand_at(number)
+            ended = outlet.end_has_left and number > 0 and not self._unfinished
+            done = number = number - self._unfinished - ended
+        self._tell(Joins(label, done, stream, number, ended=ended))
         self._waits_to_join = False
         self._part.consumer_returns(label)
 
@@ -242,16 +259,20 @@ class OutgoingEnd(_NearEnd):
           Untrue: nobody waits to be told.
         """
         self._need_to_join()
-        if isinstance(self._sender, LinkSender) and not self._part.inherits:
-            stream, number = self._sender.machine.position
-            self.goes_on((stream, number))
-        self._known = (message.stream, message.number)
         self._waits_to_join = False
+        label, part = self._edge.label, self._part
+        if self._aligns:
+            total = None if message.stream == UNKNOWN[0] else message.total
+            self._known = total or 0
+            part.precede(label, total, message.hearing)
+            return
+        if isinstance(self._sender, LinkSender):
+            self.goes_on(self._sender.machine.position.sequence)
         total = message.total
-        if self._part.keeper is not None:
-            total += self._ahead_of(message) - self._part.outlets[self._edge.label].sent
-        self._part.precede(self._edge.label, total, message.hearing)
-        if self._part.keeper is not None:
+        if part.keeper is not None:
+            total += self._ahead_of(message) - part.outlets[label].sent
+        part.precede(label, total, message.hearing)
+        if part.keeper is not None:
             self._released()
 
     def _ahead_of(self, message: Joins) -> int:
@@ -300,8 +321,12 @@ class IncomingEnd(_NearEnd):
     def __init__(self, world: World, edge: CutEdge, remembers: bool) -> None:
         super().__init__(world, edge, edge.source)
         part, lives = world.part, world.lives
-        self._done = 0
+        self._by_number = part.is_by_number(edge.label)
+        self._done = 0  # of a part with a ledger: how many it has done, through all lives
+        self._count = 0  # of signals: how many have come, through all lives
+        self._laid: deque[int] = deque()  # the numbers of those that have come and are not done
         self._remembers = remembers
+        self._awaits_number = False  # a new life of the producer has not said yet where it goes on
         self._borrowing: Borrowing | None = None
         self._undecoded: deque[Delivery] = deque()
         self._segment = partial(segment_of, world.run, edge=edge.number)
@@ -332,7 +357,7 @@ class IncomingEnd(_NearEnd):
 
     def _decode(self) -> None:
         is_lossy = isinstance(self._receiver, BoundedReceiver)
-        if is_lossy and self._waits_to_join:
+        if self._waits_to_join and not self._by_number and (is_lossy or self._part.keeper is None):
             return  # what their numbers mean is not known yet
         tokens: list[Arrived] = []
         decode = self._codec.decode
@@ -351,7 +376,12 @@ class IncomingEnd(_NearEnd):
                 self._fail("brought what it cannot", error)
                 return
             self._undecoded.popleft()
-            tokens.append(((token.value, token.activity, token.stamp), (delivery.stream, delivery.sequence)))
+            self._count += 1
+            keeps = self._part.keeper is not None
+            number = delivery.sequence if self._by_number or keeps else self._count
+            if not is_lossy and not keeps:
+                self._laid.append(number)
+            tokens.append(((token.value, token.activity, token.stamp), (delivery.stream, number)))
         if tokens:
             self._part.receive(self._edge.label, tokens)
 
@@ -364,9 +394,17 @@ class IncomingEnd(_NearEnd):
 
     def taken(self, total: int) -> None:
         """See `Incoming`."""
-        if isinstance(self._receiver, LinkReceiver):
-            self._receiver.done(total - self._done)
-        self._done = total
+        if self._part.keeper is not None:  # which lays each token that comes, and nothing else
+            if isinstance(self._receiver, LinkReceiver):
+                self._receiver.done(total - self._done)
+            self._done = total
+            return
+        laid, count = self._laid, 0
+        while laid and laid[0] <= total:
+            laid.popleft()
+            count += 1
+        if count and isinstance(self._receiver, LinkReceiver):
+            self._receiver.done(count)
 
     def hears(self, hearing: Hearing, total: int) -> None:
         """See `Incoming`."""
@@ -386,9 +424,15 @@ class IncomingEnd(_NearEnd):
         stream = number = 0
         if isinstance(machine, ExactConsumer):
             stream, number = machine.accepted
-        self._before = came = self._part.came(label)
+        came = self._part.came(label)
+        if came is None:
+            stream, number, came = *UNKNOWN, 0
+        else:
+            self._before = self._count = came
+        self._awaits_number = True
         self._part.producer_returns(label, remembers=self._remembers)
-        self._tell(Joins(label, came, stream, number, self._part.inlets[label].hearing))
+        inlet = self._part.inlets[label]
+        self._tell(Joins(label, came, stream, number, inlet.hearing, ended=self._part.is_over(label)))
 
     def join(self, message: Joins) -> None:
         """The producer says what former lives have done.
@@ -397,15 +441,26 @@ class IncomingEnd(_NearEnd):
           Untrue: nobody waits to be told.
         """
         self._need_to_join()
-        total = message.total
-        ledger = None if self._part.keeper is None else self._part.keeper.position(self._edge.label)
-        if ledger is not None and ledger.stream == message.stream:
+        total, keeper = message.total, self._part.keeper
+        ledger = None if keeper is None else keeper.position(self._edge.label)
+        if self._by_number:
+            total = message.number
+        elif ledger is not None and ledger.stream == message.stream:
             total += max(ledger.sequence - message.number, 0)  # which the producer does not know to be done
+        self._count = total
         self._done += total
         self._before = message.total - message.number
         self._waits_to_join = False
-        self._part.follow(self._edge.label, total, (message.stream, message.number))
+        is_known = message.stream != UNKNOWN[0]
+        self._awaits_number = not is_known
+        self._part.follow(self._edge.label, total, is_known=is_known, ended=message.ended and keeper is None)
         self._decode()
+
+    def goes_on(self, number: int) -> None:
+        """The producer says behind which number it goes on; nothing comes of it unless that is waited for."""
+        if self._awaits_number:
+            self._awaits_number = False
+            self._part.goes_on(self._edge.label, number)
 
     def share(self, world: World) -> None:
         """Look at large arrays in shared memory, when the producer offers it."""

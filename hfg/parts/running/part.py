@@ -9,27 +9,32 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Final, Protocol
 
 from hfg.engine.face.composition import Composition
-from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.rules import quiet, rings
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
-from hfg.errors import HfgError, UsageError
+from hfg.errors import HfgError, RunError, UsageError
 from hfg.graph.flat import CutEdge
+from hfg.logs import Log
 from hfg.parts.model.agreement import Account, Answer, Question, Rest
-from hfg.parts.model.inheriting import UNKNOWN, Alignment, Arrived, Inheritance, Where
+from hfg.parts.model.components import Component, is_synchronous
+from hfg.parts.model.inheriting import Arrived, Where
 from hfg.parts.model.messages import Untrue
+from hfg.parts.running.channels import name_of
 from hfg.parts.running.keeping import Keeper
+from hfg.parts.running.progress import Progress
 from hfg.ports.edges import EventEdge
-from hfg.token import END, Token
+from hfg.token import END, NO_MESSAGE, Token
 
 __all__ = ["Incoming", "Outgoing", "Part"]
 
+_LOGGER = Log("hfg.parts")
+_MOST_LOST: Final = 1_000_000  # of one edge at once; no part holds so many, so who says so is wrong
 _MOST_SAID: Final = 1000  # words that wait for tokens which were sent before them
 _REST_S: Final = 0.002  # how long nothing has moved before that is said to others; in virtual time it is said at once
 
@@ -46,8 +51,11 @@ class Outgoing(Protocol):
     def speaks(self, speaking: bool, total: int) -> None:
         """Say that the producer is enabled from now on, or not, behind so many tokens."""
 
-    def goes_on(self, last: Where) -> None:
-        """Say that what comes next is behind that position, of a part that inherits positions and has lived before."""
+    def begin_at(self, number: int) -> None:
+        """What leaves first has that number; nothing has left in this life."""
+
+    def goes_on(self, number: int) -> None:
+        """Say that what comes next is behind that number, of a part that has lived before."""
 
 
 class Incoming(Protocol):
@@ -67,9 +75,7 @@ class Part:
       name: of its group.
       composition: its engine, and what stands on that.
       keeper: keeps what it does, if it has a ledger.
-      inherits: whether what it sends inherits the positions of what comes in, and a token that came in is done when all
-        that came of it is; else it is done when it was taken.
-      positions: of what it will send next, by label of the edge, if it inherits them.
+      inherits: whether it has components whose tokens inherit positions.
     """
 
     def __init__(
@@ -79,7 +85,10 @@ class Part:
         edges: Iterable[CutEdge],
         *,
         rests: Callable[[Rest], None],
-        inheriting: frozenset[str] = frozenset(),
+        components: Iterable[Component] = (),
+        inherits: bool = False,
+        inherited: frozenset[str] = frozenset(),
+        remembered: frozenset[str] = frozenset(),
         returns: bool = False,
         keeper: Keeper | None = None,
     ) -> None:
@@ -90,13 +99,16 @@ class Part:
           composition: its engine, not begun yet, and what stands on that.
           edges: those between it and other parts.
           rests: told when nothing moves in it any more.
-          inheriting: the parts whose tokens inherit positions.
+          components: of its nodes.
+          inherits: see above.
+          inherited: the edges between parts whose tokens inherit positions, by label.
+          remembered: those whose producer knows in each life what it has sent in others.
           returns: it has lived before.
           keeper: keeps what the part does, if it has a ledger.
         """
         edges = list(edges)
         self.name = name
-        self.inherits = inherits = name in inheriting
+        self.inherits = inherits
         self.composition = composition
         self.keeper = keeper
         self._rests = rests
@@ -106,7 +118,9 @@ class Part:
         engine = self.engine
         keeps = {edge.label: edge.guarantee == "exact" for edge in edges}
         self.outlets: dict[str, Outlet] = {
-            one.port_name: Outlet(engine, one, keeps=keeps[one.port_name], wake=self._wake, drains=not inherits)
+            one.port_name: Outlet(
+                engine, one, keeps=keeps[one.port_name], wake=self._wake, drains=one.port_name not in inherited
+            )
             for one in engine.core.outlets
         }
         self.inlets: dict[str, Inlet] = {
@@ -116,19 +130,28 @@ class Part:
         self._incoming: dict[str, Incoming] = {}
         self._portions = {edge.label: max(edge.window // 4, 1) for edge in edges}
         self._lossy = frozenset(label for label, kept in keeps.items() if not kept)
-        self._drains = frozenset(edge.label for edge in edges if edge.source not in inheriting)
+        self._drains = frozenset(edge.label for edge in edges if edge.label not in inherited)
         self._hearing: dict[str, Hearing] = dict.fromkeys(self.inlets, "open")
         self._speaking = dict.fromkeys(self.outlets, True)
         self._said: list[tuple[str, bool, int]] = []
-        self.positions: dict[str, deque[Where]] = {label: deque() for label in self.outlets} if inherits else {}
-        coming = [edge.label for edge in edges if edge.target == name and _is_synchronous(edge)]
-        self._inheritance = Inheritance(coming)
-        self._origin = dict.fromkeys(self.inlets, 0)  # how many tokens came to former lives, or were skipped
-        self._alignment = Alignment(coming if returns and keeper is None else [])
-        self._returns = returns
-        self._owes_behind = returns and inherits  # its consumers wait to be told where it goes on
-        self._last = self._find_last()
-        self._before: dict[Any, int] = {}  # what the ends had done when the part was edited last
+        self._remembered = remembered
+        counted = remembered - inherited  # by a ledger, whose numbers may be those of a former run
+        self._by_number = frozenset(
+            edge.label
+            for edge in edges
+            if keeper is None and edge.target == name and is_synchronous(edge) and edge.label not in counted
+        )
+        self._over: set[str] = set()  # edges on which END has come
+        self._fresh: set[str] = (
+            set()
+        )  # signals of which no number is known: they count from where their consumer goes on
+        self._producers = {edge.label: edge.source for edge in edges if edge.target == name}
+        self._returns = returns and keeper is None
+        self._progresses = list(self._make_progresses(edges, components))
+        self._of: dict[str, Progress] = {
+            label: one for one in self._progresses for label in (*one.coming, *one.leaving)
+        }
+        self._start: dict[str, int] = {}  # of edges that come in, where a life that is not the first goes on
         self._cleared: asyncio.Future[None] | None = None  # somebody waits until nothing is in it
         self._leaving = False
         engine.leave_quiet_to(self._nothing_moves)
@@ -146,12 +169,38 @@ class Part:
             cleared.set_result(None)
 
     def _is_clear(self) -> bool:
-        return all(inlet.is_clear for inlet in self.inlets.values())
+        return all(self.inlets[label].is_clear for one in self._inheriting() for label in one.coming)
 
-    def _find_last(self) -> list[Worker]:
-        """Who fires and sends nothing on; what stands for a subgraph never fires."""
-        core = self.engine.core
-        return [w for w in core.by_path.values() if w.scope is None and not any(w.all_out_edges())]
+    def _inheriting(self) -> Iterator[Progress]:
+        return (progress for progress in self._progresses if progress.inherits)
+
+    def _make_progresses(self, edges: list[CutEdge], components: Iterable[Component]) -> Iterator[Progress]:
+        """One for each component, and one for each other edge from an output that comes in: into a slot."""
+        delays = {edge.label: len(edge.edge.initial) for edge in edges}
+        into = {edge.label for edge in edges if edge.target == self.name and is_synchronous(edge)}
+        for one in components if self.keeper is None else ():
+            inherits = self.inherits and one.answers
+            coming = {label: delays[label] for label in one.coming}
+            into -= set(coming)
+            progress = Progress(one.nodes, coming, one.leaving, inherits=inherits, returns=self._returns)
+            progress.look_for_last(self.engine.core)
+            yield progress
+        for label in sorted(into) if self._returns else ():
+            yield Progress((), {label: 0}, (), inherits=False, returns=self._returns)
+
+    def positions(self, label: str) -> deque[Where] | None:
+        """Give the positions of what will be sent next over an edge, if they are inherited."""
+        progress = self._of.get(label)
+        return None if progress is None else progress.positions.get(label)
+
+    def is_by_number(self, label: str) -> bool:
+        """Whether the n-th token of an edge that comes in has the number n, through all lives of its producer."""
+        return label in self._by_number
+
+    def is_aligned(self, label: str) -> bool:
+        """Whether it is known where this life goes on at that end of an edge."""
+        progress = self._of.get(label)
+        return progress is None or progress.has_begun
 
     @asynccontextmanager
     async def emptied(self) -> AsyncIterator[None]:
@@ -180,11 +229,10 @@ class Part:
                 self.engine.kick()
                 await self._cleared
             yield
-            self._last = self._find_last()
-            self.engine.core.settle_counts()
-            self._before = {worker: worker.firings for worker in self._last}
-            self._before |= {outlet: outlet.finished for outlet in self.outlets.values()}
-            self._origin = {label: inlet.taken for label, inlet in self.inlets.items()}
+            core = self.engine.core
+            core.settle_counts()
+            for progress in self._inheriting():
+                progress.count_anew(core, self.inlets, self.outlets)
         finally:
             self._cleared = None
             for inlet in self.inlets.values():
@@ -225,42 +273,123 @@ class Part:
     # --- tokens -----------------------------------------------------------------------------------------------------
 
     def receive(self, label: str, tokens: list[Arrived]) -> None:
-        """Tokens have come over a link, or it was told where they go on."""
+        """Tokens have come over a link."""
         self.engine.at_once(partial(self._receive, label, tokens))
 
     def _receive(self, label: str, tokens: list[Arrived]) -> None:
         self._is_at_rest = False
-        for one, (skipped, later) in self._alignment.arrive(label, tokens).items():
-            inlet = self.inlets[one]
-            if skipped:
-                inlet.skip(skipped)
-                self._origin[one] += skipped
-            inlet.arrive([token for token, _ in later])
-            if self.keeper is not None:
-                self.keeper.came(one, [where for _, where in later])
-            if self.inherits and later:
-                self._inherit(one, later)
-            inlet.lay()
-        if self._owes_behind:
-            self._say_behind()
+        inlet = self.inlets[label]
+        if tokens and label not in self._lossy:
+            inlet.heard = max(inlet.heard, tokens[-1][1][1])
+        if self.is_aligned(label):
+            if tokens:
+                self._lay(label, tokens)
+        else:
+            progress = self._of[label]
+            progress.alignment.hold(label, tokens)
+            self._align(progress)
         if self._said:
             self._listen()
         self.engine.kick()
 
-    def _inherit(self, label: str, tokens: list[Arrived]) -> None:
-        """What will be sent has the positions of what has come."""
-        ended = tokens[-1][0][0] is END
-        inherited = self._inheritance.arrive(label, [where for _, where in tokens], ended=ended)
-        for outlet, positions in self.positions.items():
-            if not self.outlets[outlet].is_over:
-                positions.extend(inherited)
+    def _lay(self, label: str, tokens: list[Arrived]) -> None:
+        """Lay what has come, silence in place of what is lost, and nothing of what came before."""
+        inlet = self.inlets[label]
+        tokens = self._in_order(label, inlet, tokens)
+        if not tokens:
+            return
+        inlet.arrive([token for token, _ in tokens])
+        if tokens[-1][0][0] is END:
+            self._over.add(label)
+        if self.keeper is not None:
+            self.keeper.came(label, [where for _, where in tokens])
+        progress = self._of.get(label)
+        if progress is not None and progress.inherits:
+            progress.inherit(label, tokens, self.outlets)
+        inlet.lay()
 
-    def _say_behind(self) -> None:
-        """Consumers wait to be told where this life goes on: as soon as it knows."""
-        if self.behind != UNKNOWN:
-            self._owes_behind = False
-            for link in self._outgoing.values():
-                link.goes_on(self.behind)
+    def _in_order(self, label: str, inlet: Inlet, tokens: list[Arrived]) -> list[Arrived]:
+        """Give what is to be laid of them: the n-th that is laid has the number n."""
+        if label in self._fresh or (label not in self._by_number and label not in self._start):
+            return tokens
+        following = inlet.received + 1
+        if (
+            tokens[0][1][1] == following
+            and tokens[-1][1][1] == inlet.received + len(tokens)
+            and label not in self._over
+        ):
+            return tokens
+        laid: list[Arrived] = []
+        lost = passed = 0
+        for token, (stream, number) in tokens:
+            if label in self._over:
+                passed += number >= following
+            elif number < following and token[0] is not END:
+                lost += number >= self._start.get(label, 0) and label not in self._remembered
+            else:
+                missing = range(following, number)
+                lost += len(missing)
+                laid += self._silences(label, missing, stream, token[2])
+                laid.append((token, (stream, number)))
+                following = max(following, number + 1)
+        if lost:
+            self._say_lost(label, inlet, lost)
+        if passed:
+            inlet.skip(passed)
+        self._incoming[label].taken(inlet.taken)
+        return laid
+
+    def _silences(self, label: str, numbers: range, stream: int, stamp: float) -> list[Arrived]:
+        """What stands in place of tokens that are lost, so that those behind them meet what belongs to them."""
+        if len(numbers) > _MOST_LOST:
+            error = RunError(
+                f'edge "{label}" goes on with number {numbers.stop} behind {numbers.start - 1}: so many cannot be lost'
+            )
+            self.finish("failed", error)
+            return []
+        return [((NO_MESSAGE, 0, stamp), (stream, number)) for number in numbers]
+
+    def _say_lost(self, label: str, inlet: Inlet, count: int) -> None:
+        """Tokens of an edge are lost with a process: that is counted, said at once, and part of the report."""
+        inlet.count_lost(count)
+        whose = name_of(self._producers[label])
+        tokens = "1 token was" if count == 1 else f"{count} tokens were"
+        what = f'edge "{label}": {tokens} lost with a process of {whose}'
+        if self._start.get(label, 0) > inlet.received:
+            what = f'edge "{label}": {tokens} lost with a process of {name_of(self.name)}'
+        else:
+            what += "; silence takes their place, so that what belongs together still meets"
+        _LOGGER.warning("%s", what)
+        self.engine.core.errors.append(RunError(what))
+
+    def _align(self, progress: Progress) -> None:
+        """Go on with a component, as soon as it is known where."""
+        start = progress.alignment.start
+        if start is None or progress.has_begun:
+            return
+        self._start |= dict.fromkeys((*progress.coming, *progress.leaving), start)
+        progress.begin_at(start)
+        for label in progress.leaving:
+            self._leave_from(label, start, progress)
+        for label in progress.coming:
+            inlet = self.inlets[label]
+            if not progress.leaving and label not in self._fresh and progress.alignment.passed_over(label):
+                self._say_lost(label, inlet, progress.alignment.passed_over(label))
+            inlet.rebase_to(start - 1)
+            self._incoming[label].taken(start - 1)
+        for label, held in progress.alignment.let_go().items():
+            if held:
+                self._lay(label, held)
+        self.send()
+
+    def _leave_from(self, label: str, start: int, progress: Progress) -> None:
+        """What leaves goes on with that number; consumers that have less are told."""
+        outlet, link = self.outlets[label], self._outgoing[label]
+        if not progress.inherits:
+            link.begin_at(start)
+        if outlet.sent < start - 1:
+            outlet.rebase(start - 1 - outlet.sent)
+        link.goes_on(start - 1)
 
     def lose(self, label: str, total: int) -> None:
         """Of so many tokens that have left for here, those that have not come are lost: the edge may lose some."""
@@ -315,40 +444,77 @@ class Part:
         if total > self.outlets[label].sent:
             raise Untrue(f'that {total} tokens were taken from edge "{label}", by which fewer have left')
         self._is_at_rest = False
-        if not self.inherits:  # else it is taken when all that came of it is done
+        if not self._inherits(label):  # else it is taken when all that came of it is done
             self.outlets[label].be_taken(total)
         self.outlets[label].hear(hearing)
         self.send()
 
     # --- other lives ------------------------------------------------------------------------------------------------
 
-    def follow(self, label: str, total: int, last: Where) -> None:
-        """This life takes the place of others, of whose tokens on an edge that comes in so many were done."""
-        self.inlets[label].rebase(total)
-        if self.keeper is not None:
-            self.keeper.rebased(label, total)
-        self._origin[label] += total
-        self.goes_on(label, last)
+    def follow(self, label: str, total: int, *, is_known: bool, ended: bool) -> None:
+        """This life takes the place of others, of whose tokens on an edge that comes in so many were done.
 
-    def goes_on(self, label: str, last: Where) -> None:
-        """What comes next on an edge is behind that position."""
-        self._alignment.goes_on(label, last)
-        self.receive(label, [])
+        Args:
+          label: of the edge.
+          total: how many.
+          is_known: the producer knows; else it will say where it goes on.
+          ended: behind those it has sent END, which is done as well, and of which a new life has to hear.
+        """
+        inlet, progress = self.inlets[label], self._of.get(label)
+        inlet.heard = max(inlet.heard, total)
+        if progress is None:
+            inlet.rebase(total)
+            if self.keeper is not None:
+                self.keeper.rebased(label, total)
+            self.receive(label, [])
+            return
+        if is_known:
+            progress.alignment.done(label, total)
+        if ended:
+            self.receive(label, [((END, 0, self.engine.now()), (1, total + 1))])
+        self.engine.at_once(partial(self._align, progress))
 
-    @property
-    def behind(self) -> Where:
-        """The position behind which this life goes on with what comes, and so with what it sends; or `UNKNOWN`."""
-        return self._alignment.behind if self._returns else (0, 0)
+    def goes_on(self, label: str, number: int) -> None:
+        """A producer that has begun anew goes on behind that number: what is missing up to there is lost."""
+        inlet, progress = self.inlets[label], self._of.get(label)
+        inlet.heard = max(inlet.heard, number)
+        if progress is not None and not progress.has_begun:
+            progress.alignment.done(label, number)
+            self.engine.at_once(partial(self._align, progress))
+        elif label in self._by_number and inlet.received < number and label not in self._over:
+            self.engine.at_once(partial(self._lose_up_to, label, number))
 
-    def came(self, label: str) -> int:
-        """How many tokens have come on an edge, also those that wait to be told where others go on."""
-        return self.inlets[label].received + self._alignment.held(label)
-
-    def precede(self, label: str, total: int, hearing: Hearing) -> None:
-        """This life takes the place of others, of whose tokens on an edge that leaves so many have come."""
+    def _lose_up_to(self, label: str, number: int) -> None:
+        """All up to there is lost that has not come."""
         self._is_at_rest = False
-        outlet = self.outlets[label]
-        outlet.rebase(total)
+        inlet = self.inlets[label]
+        silences = self._silences(label, range(inlet.received + 1, number + 1), 1, self.engine.now())
+        if silences:
+            self._say_lost(label, inlet, len(silences))
+            self._lay(label, silences)
+            self.engine.kick()
+
+    def is_over(self, label: str) -> bool:
+        """Whether END has come on an edge."""
+        return label in self._over
+
+    def came(self, label: str) -> int | None:
+        """How many tokens have come on an edge, by the numbers of its producer; None: that was not told yet."""
+        return self.inlets[label].received if self.is_aligned(label) else None
+
+    def begun_at(self, label: str) -> int:
+        """The number with which this life goes on on an edge."""
+        return self._start.get(label, 1)
+
+    def precede(self, label: str, total: int | None, hearing: Hearing) -> None:
+        """This life takes the place of others, of whose tokens on an edge that leaves so many have come, if known."""
+        self._is_at_rest = False
+        outlet, progress = self.outlets[label], self._of.get(label)
+        if progress is None or progress.inherits:
+            outlet.rebase(max((total or 0) - outlet.sent, 0) if progress is not None else (total or 0))
+        else:
+            progress.alignment.came(label, total or 0)
+            self.engine.at_once(partial(self._align, progress))
         if hearing != outlet.hearing:
             outlet.hear(hearing)
         self.send()
@@ -357,7 +523,10 @@ class Part:
     def consumer_returns(self, label: str) -> None:
         """The consumer of an edge that leaves begins anew."""
         self._is_at_rest = False
-        outlet = self.outlets[label]
+        outlet, progress = self.outlets[label], self._of.get(label)
+        if progress is not None and not progress.inherits:
+            progress.alignment.came(label, 0)  # who would have told is gone
+            self.engine.at_once(partial(self._align, progress))
         if outlet.hearing != "open":
             outlet.hear("open")
         if not outlet.speaking:
@@ -368,7 +537,13 @@ class Part:
     def producer_returns(self, label: str, *, remembers: bool) -> None:
         """The producer of an edge that comes in begins anew; unless it remembers, nobody waits for what has come."""
         self._is_at_rest = False
-        inlet = self.inlets[label]
+        inlet, progress = self.inlets[label], self._of.get(label)
+        if progress is not None and not progress.has_begun and label not in self._by_number:
+            self._fresh.add(label)
+            progress.alignment.done(label, 0)
+            self.engine.at_once(partial(self._align, progress))
+        if progress is None or progress.has_begun:
+            inlet.heard = inlet.received  # which it is told, and goes on from there
         if not remembers:
             inlet.orphan()
         self._said = [said for said in self._said if said[0] != label]
@@ -396,7 +571,7 @@ class Part:
         """Tokens were taken: amid the pump that is told for several at once, and what is left at the end of it."""
         if self.keeper is not None:
             self._settle_kept()
-        elif not self.inherits and (
+        elif not self._inherits(inlet.label) and (
             not self.engine.core.pumping or inlet.taken - inlet.settled >= self._portions[inlet.label]
         ):
             self._settle_at(inlet, inlet.taken)
@@ -406,22 +581,15 @@ class Part:
         if inlet.settle(done):
             self._incoming[inlet.label].taken(done)
 
-    def _settle(self) -> None:
-        """Each token gives one everywhere: so many are done as have passed every end, and their firings are over.
+    def _inherits(self, label: str) -> bool:
+        progress = self._of.get(label)
+        return progress is not None and progress.inherits
 
-        Who has ended holds nobody up, once that is done which came before: whatever still comes is drained (F12).
-        """
-        before = self._before
-        ends = [outlet.finished - before.get(outlet, 0) for outlet in self.outlets.values() if outlet.holds_up]
-        if self._last:
-            self.engine.core.settle_counts()
-            ends += [
-                worker.firings - before.get(worker, 0) - (worker.busy == "firing")
-                for worker in self._last
-                if worker.busy or not worker.blocked & ENDED
-            ]
-        for label, inlet in self.inlets.items():
-            self._settle_at(inlet, min([inlet.taken, *(self._origin[label] + count for count in ends)]))
+    def _settle(self) -> None:
+        """What is done in components whose tokens inherit positions."""
+        for progress in self._inheriting():
+            for label, done in progress.done(self.engine.core, self.inlets, self.outlets).items():
+                self._settle_at(self.inlets[label], done)
 
     def _wake(self) -> None:
         """Something lies before an outlet: it leaves when the engine is done with what it does now, see `_pumped`."""
@@ -443,7 +611,7 @@ class Part:
                 self._hearing[label] = hearing
                 self._incoming[label].hears(hearing, inlet.taken)
             inlet.lay()
-            if self.keeper is None and not self.inherits:
+            if self.keeper is None and not self._inherits(label):
                 self._settle_at(inlet, inlet.taken)
         self.send()
         if self.inherits:
@@ -487,9 +655,14 @@ class Part:
                 self.name,
                 self._numbered,
                 {label: self._account(one, one.sent, one.taken) for label, one in self.outlets.items()},
-                {label: self._account(one, self.came(label), one.settled) for label, one in self.inlets.items()},
+                {label: self._coming_account(label, one) for label, one in self.inlets.items()},
             )
         )
+
+    def _coming_account(self, label: str, inlet: Inlet) -> Account:
+        """By the numbers of the producer, which may be behind those that this side goes on with."""
+        heard = inlet.heard if label in self._of else inlet.received
+        return self._account(inlet, heard, min(inlet.settled, heard))
 
     def _account(self, end: Outlet | Inlet, count: int, done: int) -> Account:
         """Give what the two ends of an edge have to agree on.
@@ -557,7 +730,3 @@ class Part:
     def finish(self, outcome: str, error: HfgError | None) -> None:
         """End the run of this part."""
         self.engine.finish(outcome, error)
-
-
-def _is_synchronous(edge: CutEdge) -> bool:
-    return edge.guarantee == "exact" and not edge.edge.is_event_edge

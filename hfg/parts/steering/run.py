@@ -536,5 +536,6 @@ def _joined(edge: CutEdge, halves: Mapping[str, Mapping[str, EdgeStatistics]]) -
         source,
         dropped=source.dropped + target.dropped,
         drained=source.drained + target.drained,
+        lost=source.lost + target.lost,
         untaken=source.untaken if edge.guarantee == "exact" else target.untaken,
     )
