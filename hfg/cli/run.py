@@ -190,7 +190,7 @@ class _Stream:
 
     def write(self, data: bytes) -> None:
         """Append an event."""
-        if not self.is_broken:
+        if not (self.is_broken or self._is_closed):
             self._try(lambda: self._file.write(data))
 
     def flush(self) -> None:

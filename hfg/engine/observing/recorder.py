@@ -343,7 +343,8 @@ class Recorder(Listener):
                     self.on_refused(place, error)
                     if not answers:
                         return
-                    token = _told(replace(token, value=NO_MESSAGE), refused=True)
+                    told = token if type(token) is Told else _told(token)
+                    token = replace(told, value=NO_MESSAGE, refused=True)
                 else:
                     token = replace(token, value=kept)
                     self._bytes_put += size
