@@ -135,6 +135,8 @@ def activity_problems(flat: FlatGraph) -> Iterator[Problem]:
     yield from _idle_edges(found)
     yield from _losing_edges(found)
     yield from _forks(found)
+    yield from _unheard_limits(found)
+    yield from _captives(found)
 
 
 def _does(node: FlatNode) -> bool:
@@ -282,6 +284,59 @@ def _forks(found: ActivityAnalysis) -> Iterator[Problem]:
                 "take both by two inputs if they are to work side by side",
                 check="activity-fork",
             )
+
+
+def _unheard_limits(found: ActivityAnalysis) -> Iterator[Problem]:
+    """Time limits of activity at whose end nothing happens (A12)."""
+    flat = found.flat
+    heard = {edge.source.node for edge in flat.edges if edge.source.kind == "event" and edge.source.name == "timeout"}
+    for end, node, options in (
+        *((node.index, node.node, node.options) for node in flat.nodes),
+        *((scope_end(scope.index), scope.subgraph, scope.options) for scope in flat.scopes),
+    ):
+        if options.active_for_s is None or end in heard or node.timeout._observers:
+            continue
+        yield Problem(
+            path=found.path(end),
+            severity="warning",
+            what=f"active_for_s={options.active_for_s:g} has no effect, for nothing is connected to its timeout",
+            why="when the time is over the event timeout is triggered, and nothing else happens (rule A12)",
+            remedy="connect its timeout, by an active edge if the activity is to leave, or leave active_for_s out",
+            check="unheard-timeout",
+        )
+
+
+def _captives(found: ActivityAnalysis) -> Iterator[Problem]:
+    """Nodes that keep their activity for good, though somebody waits until it leaves (A5, A9)."""
+    flat = found.flat
+    freed = {edge.target.node for edge in flat.edges if edge.target.kind == "slot" and edge.target.name == "deactivate"}
+    for edges in found._from.values():
+        for edge in edges:
+            if edge.source.node > ROOT and may_give_activity(flat.nodes[edge.source.node].node._type):
+                freed.add(edge.target.node)  # which may take it away, by a modifier of its own (A4)
+    for node in flat.nodes:
+        around = (node.index, *(scope_end(scope) for scope in node.scopes))
+        leaves = any(found.may_carry(edge) for end in around for edge in found._from.get(end, ()))
+        if not found.active[node.index] or leaves or not freed.isdisjoint(around) or node.iteration is not None:
+            continue
+        waiting = [edge for edge in flat.edges if edge.source.node == node.index and _waits_for_leaving(found, edge)]
+        if waiting:
+            yield Problem(
+                path=node.path,
+                severity="warning",
+                what=f'its activity can never leave it, but "{waiting[0].label}" waits for that',
+                why="no active edge leads out over which activity could go, and nothing deactivates it (rules A5, A7)",
+                remedy="make the edge active by which the activity is to leave, or connect its slot deactivate",
+                check="captive-activity",
+            )
+
+
+def _waits_for_leaving(found: ActivityAnalysis, edge: FlatEdge) -> bool:
+    """Whether an edge tells that activity has left, or leads to somebody who asks for it and never gets any."""
+    if edge.source.kind == "event" and edge.source.name == "deactivated":
+        return edge.source.name not in edge.source.port.node._type.events
+    target = edge.target.node
+    return target != ROOT and not edge.active and target in found.asks and not found.may_be_active(target)
 
 
 def _named(found: ActivityAnalysis, ends: list[int]) -> str:

@@ -303,3 +303,51 @@ def test_a_fork_into_what_never_comes_back_is_no_machine(graph: hfg.Graph) -> No
     graph.connect(begin.done, lamp.enter, active=True)
     graph.connect(work.done, begin.enter, active=True)
     assert of_activity(graph) == []
+
+
+# --- limits without an end, activity that stays ---
+
+
+def problems(graph: hfg.Graph, check: str) -> list[Problem]:
+    return [problem for problem in graph.check() if problem.check == check]
+
+
+@pytest.mark.rule("A12")
+def test_a_time_limit_that_nobody_hears_of_is_told_and_one_that_somebody_does_is_not() -> None:
+    graph = hfg.Graph()
+    step, other = graph.add(Step(), name="step", active_for_s=3.0), graph.add(Step(), name="other")
+    graph.start.activates(step.activate)
+    (problem,) = problems(graph, "unheard-timeout")
+    assert (problem.path, problem.severity) == ("step", "warning")
+    graph.connect(step.timeout, other.activate, active=True)
+    assert not problems(graph, "unheard-timeout")
+
+
+@pytest.mark.rule("A12")
+def test_a_subscriber_hears_of_it_too() -> None:
+    graph = hfg.Graph()
+    step = graph.add(Step(), active_for_s=3.0)
+    graph.start.activates(step.activate)
+    step.timeout.subscribe(print)
+    assert not problems(graph, "unheard-timeout")
+
+
+@pytest.mark.rule("A5", "A7", "A9")
+def test_activity_that_stays_though_somebody_waits_until_it_leaves_is_told() -> None:
+    def build(*, active: bool = False, freed: bool = False, waited: bool = True) -> list[Problem]:
+        graph = hfg.Graph()
+        step, after = graph.add(Step(), name="step"), graph.add(Step(), name="after")
+        graph.start.activates(step.activate)
+        graph.connect(step.done, after.enter, active=active)
+        if waited:
+            graph.connect(step.deactivated, after.ports.slots["reset"])
+        if freed:
+            graph.connect(after.done, step.ports.slots["deactivate"])
+        return problems(graph, "captive-activity")
+
+    (problem,) = build()
+    assert (problem.path, problem.severity) == ("step", "warning")
+    assert '"step.deactivated -> after.reset" waits' in problem.what
+    assert not build(active=True)
+    assert not build(freed=True)
+    assert not build(waited=False)  # a last state

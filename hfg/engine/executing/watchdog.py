@@ -13,9 +13,11 @@ import time
 
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import Worker
+from hfg.graph.checks.nodes import needs_loop
 from hfg.logs import Log
+from hfg.nodetype import Node
 
-__all__ = ["Watch", "watchdog"]
+__all__ = ["Watch", "remedy_for", "watchdog"]
 
 _SLICE_S = 0.005  # how long the pump may keep the loop to itself where nodes are slow
 _LOOKS_WHILE_BUSY = 20  # quick looks after the loop was at work; then at leisure, so that an idle robot sleeps
@@ -49,11 +51,10 @@ class Watch:
         elif now - self.since >= self.limit_s > 0 and worker.index not in self.warned:
             self.warned.add(worker.index)
             _LOGGER.warning(
-                'node "%s" has blocked the loop for more than %g s: nothing else on the loop can move; '
-                "put it into a thread with "
-                'graph.add(..., group="work") and graph.group("work", threads=1)',
+                'node "%s" has blocked the loop for more than %g s: nothing else on the loop can move; %s',
                 worker.path,
                 self.limit_s,
+                remedy_for(worker.node),
                 extra={"path": worker.path},
             )
         return True
@@ -74,6 +75,17 @@ class Watch:
             return worker
         frames = sys._current_frames()  # noqa: SLF001 (documented; there is no other way)
         return region.at_work(frames.get(self.thread)) or worker
+
+
+def remedy_for(node: Node | None) -> str:
+    """Say what to do about a node that blocks the loop; what needs the loop cannot be put into a thread (R1)."""
+    why_loop = needs_loop(node) if node is not None else ""
+    if not why_loop:
+        return 'put it into a thread with graph.add(..., group="work") and graph.group("work", threads=1)'
+    return (
+        f"{why_loop}, so it cannot be put into a thread: write `await asyncio.to_thread(function, ...)` in its async "
+        "code for what takes so long, or move that into a plain node of its own, which can"
+    )
 
 
 class _Watchdog:

@@ -20,6 +20,7 @@ from hfg.graph.checks.flow import (
     unconnected_graph,
     unconnected_inputs,
     unfed_slots,
+    waiting_rings,
 )
 from hfg.graph.checks.ledgers import kept_groups
 from hfg.graph.checks.nodes import (
@@ -27,6 +28,7 @@ from hfg.graph.checks.nodes import (
     concurrent_firings,
     empty_subgraphs,
     limits_without_effect,
+    missing_process,
     names,
     unknown_attributes,
     unknown_groups,
@@ -46,6 +48,7 @@ Check: TypeAlias = Callable[[FlatGraph], Iterable[Problem]]
 _OF_EACH_LEVEL: Final[list[Check]] = [
     unknown_groups,
     async_in_threads,
+    missing_process,
     limits_without_effect,
     unknown_attributes,
     empty_subgraphs,
@@ -61,6 +64,7 @@ _OF_EACH_LEVEL: Final[list[Check]] = [
     silent_events,
     endless_sources,
     unfed_slots,
+    waiting_rings,
 ]
 _OF_THE_WHOLE: Final[list[Check]] = [unused_scheduling, names, promotions, changed_inputs, process_borders, kept_groups]
 

@@ -5,12 +5,16 @@ Stands on `flat` and `order`.
 
 from __future__ import annotations
 
+import dis
 from collections import deque
 from collections.abc import Iterable, Iterator
+from types import CodeType
 
 from hfg.graph.checks.endless import endless
+from hfg.graph.checks.nodes import codes_in, functions_of
 from hfg.graph.flat.flattening import ROOT, FlatEdge, FlatGraph, scope_end
 from hfg.graph.flat.order import rings, shortest_ring
+from hfg.nodetype import Node
 from hfg.ports.automatic import sent_of
 from hfg.problem import Problem
 
@@ -24,6 +28,7 @@ __all__ = [
     "unconnected_graph",
     "unconnected_inputs",
     "unfed_slots",
+    "waiting_rings",
 ]
 
 
@@ -213,6 +218,72 @@ def filling_rings(flat: FlatGraph) -> Iterator[Problem]:
                     remedy='let one way suffice, or bound one of these edges by overflow="latest" or capacity_limit=',
                     check="filling-ring",
                 )
+
+
+def waiting_rings(flat: FlatGraph) -> Iterator[Problem]:
+    """Rings in which nodes may wait for each other behind full queues, and where the capacity that spares them that.
+
+    A ring in which each signal makes at most one more is harmless: its queues fill only with what comes from outside.
+    """
+    if not any(edge.is_event_edge for edge in flat.edges):
+        return
+    edges = [edge for edge in flat.edges if edge.source.node > ROOT and edge.target.node > ROOT]
+    successors: list[list[int]] = [[] for _ in flat.nodes]
+    for edge in edges:
+        successors[edge.source.node].append(edge.target.node)
+    for part in rings(successors):
+        members = set(part)
+        inside = [edge for edge in edges if edge.source.node in members and edge.target.node in members]
+        queues = [edge for edge in inside if edge.source.kind == "event" and edge.overflow == "wait"]
+        circle = _circle(flat, shortest_ring(part, successors))
+        yield from _short_queues(part, inside, queues, circle)
+        often = [edge for edge in queues if not edge.active and _may_trigger_often(flat, edge)]
+        if often:
+            yield Problem(
+                path=often[0].label,
+                severity="hint",
+                what=f"signals go round, and one firing or call may trigger many of them: {circle}",
+                why=f"when {often[0].capacity} lie there its node waits, and where the others wait for it the queue "
+                "grows (rule F8); how many there may be nobody can tell from outside",
+                remedy="say capacity= as many as may be on their way at once and one more, and it need not grow; or "
+                "bound it by capacity_limit=",
+                check="waiting-ring",
+            )
+
+
+def _short_queues(part: list[int], inside: list[FlatEdge], queues: list[FlatEdge], circle: str) -> Iterator[Problem]:
+    """Where each firing makes one signal of one, as many go round as there were at first: the bound is known."""
+    told_once = all(
+        edge.source.kind == "output" or edge.source.name == "processed" or sent_of(edge.source.name) is not None
+        for edge in inside
+    )
+    if not told_once or len(inside) != len(part) or any(edge.target.kind != "input" for edge in inside):
+        return
+    count = sum(len(edge.initial) for edge in inside)
+    for edge in queues:
+        if edge.capacity <= count:
+            yield Problem(
+                path=edge.label,
+                severity="hint",
+                what=f"{count} signals go round, and capacity={edge.capacity} holds its node back: {circle}",
+                why="where all nodes of the ring wait for each other the queue grows (rule F8)",
+                remedy=f"say capacity={count + 1}, and it need not grow",
+                check="waiting-ring",
+            )
+
+
+def _may_trigger_often(flat: FlatGraph, edge: FlatEdge) -> bool:
+    """Whether code of the node triggers the event in a loop, or waits for room between; automatic events come once."""
+    node = flat.nodes[edge.source.node].node
+    if edge.source.name not in node._type.events:
+        return False
+    codes = [code for function in functions_of(type(node), until=Node) for code in codes_in(function.__code__)]
+    return any(edge.source.name in code.co_names and _has_loop(code) for code in codes)
+
+
+def _has_loop(code: CodeType) -> bool:
+    names = (instruction.opname for instruction in dis.get_instructions(code))
+    return any("JUMP_BACKWARD" in name and not name.endswith("NO_INTERRUPT") for name in names)  # which is an await's
 
 
 def _listed(edges: list[FlatEdge]) -> str:

@@ -5,8 +5,9 @@ Stands on `flat`.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterator
-from types import CodeType
+from types import CodeType, FunctionType
 from typing import Any
 
 from hfg.graph.flat.flattening import FlatGraph
@@ -19,10 +20,14 @@ from hfg.problem import Problem
 
 __all__ = [
     "async_in_threads",
+    "codes_in",
     "concurrent_firings",
     "empty_subgraphs",
+    "functions_of",
     "limits_without_effect",
+    "missing_process",
     "names",
+    "needs_loop",
     "unknown_attributes",
     "unknown_groups",
     "unused_scheduling",
@@ -76,25 +81,94 @@ def names(whole: FlatGraph) -> list[Problem]:
 
 
 def async_in_threads(flat: FlatGraph) -> Iterator[Problem]:
-    """Async code in groups that are threads (rule R1)."""
+    """Nodes that need the loop in groups that are threads (rule R1)."""
     threads = {name: group for name, group in flat.groups.items() if group.threads}
     for node in flat.nodes if threads else ():
-        kind = node.node._type
         group = threads.get(node.options.group or "loop")
-        waiting = [f"its slot {slot.name}" for slot in kind.slots.values() if slot.is_async]
-        if kind.process_kind.startswith("async"):
-            waiting.insert(0, "it")
-        if "do" in kind.hooks:
-            waiting.append("its do-activity")
-        if waiting and group is not None:
+        why_loop = needs_loop(node.node) if group is not None else ""
+        if group is not None and why_loop:
+            remedy = "leave out group=, declare the group with threads=0, or make the function a plain one"
+            if "start_soon" in why_loop:
+                remedy = "leave out group=, or send an event to a node on the loop that begins the tasks"
             yield Problem(
                 path=node.path,
                 severity="error",
-                what=f'{waiting[0]} is async, but its group "{group.name}" is a thread',
+                what=f'{why_loop}, but its group "{group.name}" is a thread',
                 why="async code runs on the loop (rule R1)",
-                remedy="leave out group=, declare the group with threads=0, or make the function a plain one",
+                remedy=remedy,
                 check="async-in-thread",
             )
+
+
+def needs_loop(node: Node) -> str:
+    """Say why a node cannot be in a group that is a thread (rule R1); nothing if it can."""
+    kind = node._type
+    if kind.process_kind.startswith("async"):
+        return "it is async"
+    slot = next((slot.name for slot in kind.slots.values() if slot.is_async), None)
+    if slot is not None:
+        return f"its slot {slot} is async"
+    if "do" in kind.hooks:
+        return "its do-activity is async"
+    if not kind.is_function and _begins_tasks(type(node)):
+        return "its code begins tasks (start_soon)"
+    return ""
+
+
+def _begins_tasks(cls: type) -> bool:
+    """Whether methods of a node class begin tasks: they themselves, or functions and helper classes that they name."""
+    waiting = list(functions_of(cls, until=Node))
+    seen: set[Any] = set()
+    while waiting:
+        function = waiting.pop()
+        if function in seen:
+            continue
+        seen.add(function)
+        for name in _names_in(function.__code__):
+            if name == "start_soon":
+                return True
+            helper = function.__globals__.get(name)
+            if isinstance(helper, FunctionType):
+                waiting.append(helper)
+            elif isinstance(helper, type) and not issubclass(helper, Node):
+                waiting += functions_of(helper, until=object)
+    return False
+
+
+def missing_process(flat: FlatGraph) -> Iterator[Problem]:
+    """Classes with inputs and no process function, which never fire: mostly a typo (rule F2)."""
+    lacking = [
+        node
+        for node in flat.nodes
+        if node.node._type.process_kind == "none" and node.node._type.inputs and inside(node.node) is None
+    ]
+    fed = {edge.target.node for edge in flat.edges if edge.target.kind == "input"} if lacking else set()
+    for node in lacking:
+        kind = node.node._type
+        written = [name for name in _methods(type(node.node)) if name not in kind.slots and name not in kind.hooks]
+        near = difflib.get_close_matches("process", written, n=1, cutoff=0.6)
+        yield Problem(
+            path=node.path,
+            severity="error" if node.index in fed else "warning",
+            what=f"{kind.qualname} has inputs, but no process(), so it never fires",
+            why=f'did you mean "{near[0]}"?' if near else "what comes to its inputs is never taken (rules F1, F2)",
+            remedy="name the method that takes the inputs `process`, or make its inputs slots",
+            check="missing-process",
+        )
+
+
+def _methods(cls: type) -> Iterator[str]:
+    for one in cls.__mro__[: cls.__mro__.index(Node)]:
+        yield from (name for name, value in vars(one).items() if callable(value) and not name.startswith("__"))
+
+
+def functions_of(cls: type, *, until: type) -> Iterator[FunctionType]:
+    """Give the methods of a class and of its bases below another."""
+    for one in cls.__mro__[: cls.__mro__.index(until)]:
+        for value in vars(one).values():
+            function = getattr(value, "handler", getattr(value, "__func__", value))
+            if isinstance(function, FunctionType):
+                yield function
 
 
 def empty_subgraphs(flat: FlatGraph) -> Iterator[Problem]:
@@ -127,7 +201,8 @@ def limits_without_effect(flat: FlatGraph) -> Iterator[Problem]:
                 severity="warning",
                 what=f"max_duration_s={limit:g} has no effect",
                 why="it is a plain function on the loop, and nothing can interrupt that before it is over (rule X2)",
-                remedy='give it a thread, graph.group("work") and group="work", or make it async',
+                remedy="make it async"
+                + ("" if needs_loop(node.node) else ', or give it a thread, graph.group("work") and group="work"'),
                 check="limit-without-effect",
             )
 
@@ -159,19 +234,23 @@ def _known_names(cls: type) -> set[str]:
     known: set[str] = set()
     for one in cls.__mro__[: cls.__mro__.index(Node)]:
         known.update(vars(one), getattr(one, "__annotations__", ()))
-        for value in vars(one).values():
-            code = getattr(getattr(value, "handler", getattr(value, "__func__", value)), "__code__", None)
-            known.update(_names_in(code) if code is not None else ())
+    for function in functions_of(cls, until=Node):
+        known.update(_names_in(function.__code__))
     return known
 
 
-def _names_in(code: CodeType) -> Iterator[str]:
-    yield from code.co_names
+def codes_in(code: CodeType) -> Iterator[CodeType]:
+    """Give a function's code, and that of the functions and comprehensions inside."""
+    yield code
     for constant in code.co_consts:
-        if isinstance(constant, str):
-            yield constant
-        elif isinstance(constant, CodeType):
-            yield from _names_in(constant)
+        if isinstance(constant, CodeType):
+            yield from codes_in(constant)
+
+
+def _names_in(code: CodeType) -> Iterator[str]:
+    for one in codes_in(code):
+        yield from one.co_names
+        yield from (constant for constant in one.co_consts if isinstance(constant, str))
 
 
 def concurrent_firings(flat: FlatGraph) -> Iterator[Problem]:
@@ -187,7 +266,9 @@ def concurrent_firings(flat: FlatGraph) -> Iterator[Problem]:
             remedy = f'declare graph.group("{group.name}", threads={count}), or say concurrency={group.threads}'
         elif not group.threads and node.node._type.process_kind == "function":
             what = f"concurrency={count}, but its function is a plain one on the event loop"
-            remedy = f'make it async, or put it into graph.group("work", threads={count}) by group="work"'
+            remedy = "make it async"
+            if not needs_loop(node.node):
+                remedy += f', or put it into graph.group("work", threads={count}) by group="work"'
         if what:
             why = "a function that never waits, or has no thread of its own, runs alone (rules R1, F14)"
             yield Problem(node.path, "error", what, why, remedy, "concurrency")
