@@ -26,8 +26,8 @@ import msgspec
 import numpy as np
 
 from hfg.generics import callable_parts
-from hfg.limits import limits_of
 from hfg.ports.specs import ParameterSpec
+from hfg.testing.opening import opened
 from hfg.testing.samples import PATHS
 from hfg.types import ArrayFacts, array_facts, bare_type
 from hfg.values import Colour, Span
@@ -170,7 +170,8 @@ class Hostile:
         facts = array_facts(hint)
         if facts is not None:
             return self._array(facts)
-        hint, limits = _opened(hint, limits)
+        hint, more = opened(hint)
+        limits += more
         if hint is None or hint is type(None):
             return None
         origin, arguments = typing.get_origin(hint) or hint, typing.get_args(hint)
@@ -403,22 +404,6 @@ class Hostile:
 
 _FILLS: Final = ("plain", "plain", "constant", "nan", "inf", "mixed", "tiny", "large", "far")
 _INT32: Final = (annotated_types.Ge(-(2**31)), annotated_types.Le(2**31 - 1))
-
-
-def _opened(hint: Any, limits: tuple[Any, ...]) -> tuple[Any, tuple[Any, ...]]:
-    """Take aliases, new names and metadata off; keep the limits."""
-    while True:
-        if hasattr(hint, "__metadata__"):
-            limits += limits_of(hint.__metadata__)
-            hint = typing.get_args(hint)[0]
-        elif type(hint).__name__ == "TypeAliasType":
-            hint = hint.__value__
-        elif isinstance(hint, typing.NewType):
-            hint = hint.__supertype__
-        elif isinstance(hint, typing.TypeVar):
-            hint = typing.Union[hint.__constraints__] if hint.__constraints__ else hint.__bound__ or Any  # noqa: UP007
-        else:
-            return hint, limits
 
 
 def _bounds(limits: tuple[Any, ...]) -> tuple[Any, Any]:

@@ -28,6 +28,7 @@ from hypothesis import strategies as st
 from hfg.generics import callable_parts
 from hfg.limits import limits_of
 from hfg.ports.specs import ParameterSpec
+from hfg.testing.opening import opened
 from hfg.testing.samples import PATHS
 from hfg.types import ArrayFacts, array_facts, bare_type
 from hfg.values import Colour, Span
@@ -153,36 +154,17 @@ def _kept(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchS
 def _made(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchStrategy[Any]:
     facts = array_facts(hint)
     if facts is not None:
-        limits += _opened(hint)[1]
+        limits += opened(hint)[1]
         low, high, _ = _bounds(limits)
         strategy = _arrays(facts, alike)
         if low is not None or high is not None:
             strategy = strategy.map(lambda array: np.clip(array, low, high).astype(array.dtype))
         return _within(strategy, hint, limits)
-    hint, more = _opened(hint)
+    hint, more = opened(hint)
     limits += more
     if limits:
         return _within(_of(hint, limits, alike), hint, limits)
     return _of(hint, (), alike)
-
-
-def _opened(hint: Any) -> tuple[Any, tuple[Any, ...]]:
-    """Take aliases, new names and metadata off; keep the limits."""
-    limits: tuple[Any, ...] = ()
-    while True:
-        if hasattr(hint, "__metadata__"):
-            limits += limits_of(hint.__metadata__)
-            hint = typing.get_args(hint)[0]
-        elif type(hint).__name__ == "TypeAliasType":
-            hint = hint.__value__
-        elif isinstance(hint, typing.NewType):
-            hint = hint.__supertype__
-        elif isinstance(hint, typing.TypeVar):
-            hint = typing.Union[hint.__constraints__] if hint.__constraints__ else hint.__bound__ or Any  # noqa: UP007
-        elif typing.get_origin(hint) in (typing.Required, typing.NotRequired, typing.Final, typing.ClassVar):
-            hint = typing.get_args(hint)[0]
-        else:
-            return hint, limits
 
 
 def _within(strategy: st.SearchStrategy[Any], hint: Any, limits: tuple[Any, ...]) -> st.SearchStrategy[Any]:
