@@ -146,6 +146,7 @@ def _let_time_pass(replaying: Replay, until: float) -> None:
     """Nothing moved until somebody outside did something."""
     machine = replaying.machine
     while machine.now < until:
+        replaying._finish_steps()  # of which nothing need have been seen
         moves = machine.owed_moves()
         if any(move.kind != "wait" for move in moves):
             return

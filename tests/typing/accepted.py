@@ -172,6 +172,14 @@ assert_type(lookup.activated, EventPort[None])
 assert_type(lookup.enable, SlotPort[object])
 assert_type(lookup.failed, EventPort[hfg.Failure])
 assert_type(MapLookup.key, hfg.Input[int])
+
+
+class Announce(hfg.Node):
+    async def do(self) -> str:
+        return "closed"
+
+
+assert_type(Announce().completed, EventPort[Any])
 assert_type(lookup.ports.inputs["key"], InputPort[Any])
 lookup.forget(3)
 
