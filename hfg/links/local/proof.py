@@ -97,11 +97,10 @@ class Seals:
         self._keyed = hashlib.blake2b(key=key, digest_size=TAG_SIZE)
         self._number = 0
 
-    def next(self, head: bytes | bytearray | memoryview, rest: bytes | bytearray | memoryview = b"") -> bytes:
+    def next(self, frame: bytes | memoryview) -> bytes:
         """Return the seal of the next frame."""
         sealing = self._keyed.copy()
         sealing.update(_NUMBER.pack(self._number))
-        sealing.update(head)
-        sealing.update(rest)
+        sealing.update(frame)
         self._number += 1
         return sealing.digest()

@@ -1,15 +1,15 @@
 """Frames on a connection, as bytes: made, and taken out of what comes. No sockets, no event loop.
 
-A frame is its head (kind, and the lengths of key, header and payload), its seal, and then key, header and payload. The
-seal covers all of it, except the bytes of a payload that is longer than `LONG`: on a connected socket nobody but the
-other end can write, and that end has proved who it is, so hashing megabytes would buy nothing.
+A frame is its head (kind, and the lengths of key, header and payload), then key, header and payload, and a seal that
+covers all of it. The seal of a payload that is longer than `LONG` stands before it and covers its length only: on a
+connected socket nobody but the other end can write, and that end has proved who it is, so hashing megabytes would buy
+nothing.
 Depends on `proof`.
 """
 
 from __future__ import annotations
 
 import enum
-import hmac
 import struct
 from typing import Final, NamedTuple
 
@@ -19,12 +19,11 @@ from hfg.transport import Buffer, size_of
 __all__ = ["CHUNK", "LONG", "LONGEST_HEADER", "LONGEST_KEY", "Frame", "Inflow", "Kind", "frame"]
 
 _HEAD: Final = struct.Struct("<BHII")  # kind, and bytes of the key, the header and the payload, which follow
-_BODY: Final = _HEAD.size + TAG_SIZE
 LONG: Final = 2**18
 """A payload with more bytes gets a buffer of its own, which nobody copies."""
 LONGEST_KEY: Final = 2**15
 LONGEST_HEADER: Final = 2**17
-CHUNK: Final = _BODY + LONGEST_KEY + LONGEST_HEADER + LONG
+CHUNK: Final = _HEAD.size + LONGEST_KEY + LONGEST_HEADER + LONG + TAG_SIZE
 """Bytes that are read at once: the longest frame whose payload is not long."""
 
 
@@ -63,10 +62,10 @@ def frame(seals: Seals, kind: int, key: bytes, header: bytes, payload: Buffer) -
     size = size_of(payload)
     head = _HEAD.pack(kind, len(key), len(header), size)
     if size > LONG:
-        said = key + header
-        return head + seals.next(head, said) + said, payload
-    said = b"".join((key, header, payload))
-    return head + seals.next(head, said) + said, b""
+        said = head + key + header
+        return said + seals.next(said), payload
+    said = b"".join((head, key, header, payload))
+    return said + seals.next(said), b""
 
 
 class Inflow:
@@ -111,10 +110,10 @@ class Inflow:
         return [long]
 
     def _whole(self) -> list[Frame]:
-        chunk, filled = self._chunk, self._filled
+        chunk, filled = memoryview(self._chunk), self._filled
         frames: list[Frame] = []
         start = 0
-        while filled - start >= _BODY:
+        while filled - start >= _HEAD.size:
             kind, of_key, of_header, of_payload = _HEAD.unpack_from(chunk, start)
             if (
                 kind not in _KINDS
@@ -123,36 +122,30 @@ class Inflow:
                 or of_header + of_payload > self._largest
             ):
                 raise Refused("it has sent what is not a frame")
-            body = start + _BODY
-            value = body + of_key + of_header
-            end = value + of_payload
             is_long = of_payload > LONG
+            header = start + _HEAD.size + of_key
+            value = header + of_header
+            sealed = value if is_long else value + of_payload
+            end = sealed + TAG_SIZE
             if end > filled:
-                if is_long and value <= filled:
-                    self._check(start, body, value)
-                    self._begin_long(kind, body, of_key, value, of_payload)
-                    start = filled
                 break
-            self._check(start, body, value if is_long else end)
-            key = bytes(chunk[body : body + of_key])
-            frames.append(Frame(kind, key, bytes(chunk[body + of_key : value]), bytes(chunk[value:end])))
+            if chunk[sealed:end] != self._seals.next(chunk[start:sealed]):
+                raise Refused("it has sent a frame with a wrong seal")
+            key, said = bytes(chunk[start + _HEAD.size : header]), bytes(chunk[header:value])
             start = end
+            if not is_long:
+                frames.append(Frame(kind, key, said, bytes(chunk[value:sealed])))
+                continue
+            here = chunk[end : min(filled, end + of_payload)]
+            start += len(here)
+            payload = memoryview(bytearray(of_payload))  # of its own, which nobody copies
+            payload[: len(here)] = here
+            long = Frame(kind, key, said, payload.toreadonly())
+            if len(here) < of_payload:
+                self._long, self._rest = long, payload[len(here) :]
+                break
+            frames.append(long)
         if start:
-            chunk[: filled - start] = chunk[start:filled]
+            self._chunk[: filled - start] = chunk[start:filled]
             self._filled = filled - start
         return frames
-
-    def _check(self, start: int, body: int, end: int) -> None:
-        with memoryview(self._chunk) as chunk:
-            head = _HEAD.size
-            seal = bytes(chunk[start + head : body])
-            if not hmac.compare_digest(seal, self._seals.next(chunk[start : start + head], chunk[body:end])):
-                raise Refused("it has sent a frame with a wrong seal")
-
-    def _begin_long(self, kind: int, body: int, of_key: int, value: int, size: int) -> None:
-        key, header = bytes(self._chunk[body : body + of_key]), bytes(self._chunk[body + of_key : value])
-        payload = memoryview(bytearray(size))
-        here = memoryview(self._chunk)[value : self._filled]
-        payload[: len(here)] = here
-        self._rest = payload[len(here) :]
-        self._long = Frame(kind, key, header, payload.toreadonly())
