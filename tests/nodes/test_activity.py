@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import random
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -386,3 +387,18 @@ def test_figure_17_as_nodes_of_the_library() -> None:
     assert [time for time, _, _ in sent.told] == [time for time, _, _ in drive.told]
     assert len(drive.told) == 1
     assert 2.0 <= drive.told[0][0] <= 2.1
+
+
+# --- activity is handed on once ---
+
+
+@pytest.mark.rule("A3", "A5")
+@pytest.mark.parametrize("kind", [activity.Sequence, activity.Fallback, activity.Branch, activity.Retry])
+def test_one_call_of_an_active_node_hands_its_activity_on_once(kind: type[hfg.Node]) -> None:
+    """Two signals of one call would both carry +1 over active edges; only `Parallel` is made for that."""
+    choose = random.Random(kind.__name__)
+    node = kind()
+    slots = [name for name, spec in node._type.slots.items() if spec.handler_name]
+    calls = [fire(node, slot=choose.choice(slots), value=choose.randrange(3), active=True) for _ in range(200)]
+    sent = {len(call.events) for call in calls}
+    assert 1 in sent <= {0, 1}
