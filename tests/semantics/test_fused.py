@@ -275,6 +275,27 @@ def test_no_time_is_waited_for_before_a_source_whose_wave_still_holds_its_output
     assert caught.value.report.duration_s == pytest.approx(0.1)  # type: ignore[attr-defined]
 
 
+@pytest.mark.rule("A4", "A6")
+def test_an_explicit_modifier_leaves_with_what_a_member_sends_by_itself() -> None:
+    graph = hfg.Graph()
+    source, speaks, looks = graph.add(nodes.script(values=(2, 4, 3, 6))), nodes.Speaks(way="given"), nodes.Stateful()
+    graph.connect(source.out, graph.add(speaks).value)
+    graph.connect(speaks.out, graph.add(looks).value, active=True)
+    graph.connect(looks.out, graph.output("active", int))
+    assert hfg.run(graph, clock="virtual").outputs["active"] == [0, 0, 1, 1]
+
+
+@pytest.mark.rule("P6")
+def test_an_input_that_a_member_leaves_silent_has_its_default() -> None:
+    graph = hfg.Graph()
+    source, some, sums = graph.add(nodes.script(values=(1, 2, 3, 4))), nodes.some(), nodes.with_default()
+    graph.connect(source.out, graph.add(some).value)
+    graph.connect(source.out, graph.add(sums).value)
+    graph.connect(some.out, sums.other)
+    graph.connect(sums.out, graph.output("sums", int))
+    assert hfg.run(graph, clock="virtual").outputs["sums"] == [6, 4, 8, 8]
+
+
 @pytest.mark.rule("F4")
 def test_silence_behind_a_node_that_may_be_silent_itself_stays_silence(monkeypatch: pytest.MonkeyPatch) -> None:
     graph = hfg.Graph()
