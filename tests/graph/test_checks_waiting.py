@@ -252,3 +252,18 @@ def test_what_checks_advise_is_accepted_by_them() -> None:
     advised.add(slow_plain(), group="work", max_duration_s=1.0)
     assert not found(advised, "limit-without-effect")
     assert not found(advised, "async-in-thread")
+
+
+@pytest.mark.rule("F8", "L1")
+def test_a_ring_of_queues_that_wait_may_not_lead_through_another_process() -> None:
+    def crossing(**options: Any) -> list[Problem]:
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        here, there = graph.add(Gate(), name="here"), graph.add(Gate(), name="there", group="far")
+        graph.connect(here.single, there.hear)
+        graph.connect(there.single, here.hear, **options)
+        return [problem for problem in found(graph, "process-border") if "queues wait" in problem.what]
+
+    (problem,) = crossing()
+    assert problem.severity == "error"
+    assert not crossing(overflow="latest")

@@ -8,6 +8,7 @@ from hfg.encoding import wire_problem
 from hfg.errors import Failure
 from hfg.graph.flat.cutting import MAIN, cut
 from hfg.graph.flat.flat_graph import FlatGraph
+from hfg.graph.flat.order import rings
 from hfg.problem import Problem
 
 __all__ = ["process_borders"]
@@ -19,6 +20,7 @@ def process_borders(flat: FlatGraph) -> Iterator[Problem]:
         return
     cutting = cut(flat)
     yield from cutting.findings
+    yield from _rings_across(flat, {edge.edge.index for edge in cutting.edges})
     for edge in cutting.edges:
         if edge.hint is Failure:
             continue  # which is told as sentences, with what can cross of the values
@@ -31,5 +33,30 @@ def process_borders(flat: FlatGraph) -> Iterator[Problem]:
                 what=f'its values cannot cross to {where} over "{edge.label}": {reason}',
                 why="between processes values are data of a declared type (rule L4)",
                 remedy="declare the type of the port, or let both nodes run in one group",
+                check="process-border",
+            )
+
+
+def _rings_across(flat: FlatGraph, crossing: set[int]) -> Iterator[Problem]:
+    """Cycles of `wait` edges that cross a link, where nobody sees that all of it stands still (rule F8)."""
+    waiting = [
+        edge
+        for edge in flat.edges
+        if edge.source.kind == "event" and edge.overflow == "wait" and min(edge.source.node, edge.target.node) >= 0
+    ]
+    successors: list[list[int]] = [[] for _ in flat.nodes]
+    for edge in waiting:
+        successors[edge.source.node].append(edge.target.node)
+    for part in rings(successors):
+        members = set(part)
+        inside = (edge for edge in waiting if edge.source.node in members and edge.target.node in members)
+        across = next((edge for edge in inside if edge.index in crossing), None)
+        if across is not None:
+            yield Problem(
+                path=across.label,
+                severity="error",
+                what="a ring of edges whose queues wait leads through another process",
+                why="should all of its nodes wait for each other, no process would see it (rule F8)",
+                remedy='let one process have all of its nodes, or say overflow="latest" or another that does not wait',
                 check="process-border",
             )
