@@ -567,6 +567,22 @@ def test_the_check_refuses_one_in_a_thread() -> None:
     ]
 
 
+@pytest.mark.rule("A15", "R4")
+def test_an_edit_moves_none_into_a_thread() -> None:
+    graph = hfg.Graph()
+    graph.group("work", threads=1)
+    graph.start.activates(graph.add(Lasting(), name="node").hear)
+
+    async def main() -> None:
+        async with hfg.running(graph, clock="virtual") as running:
+            await asyncio.sleep(1)
+            with pytest.raises(hfg.errors.GraphError, match='its do-activity is async, but its group "work" is a thr'):
+                await running.edit(commands.Move("node", "work"))
+            running.stop()
+
+    drive(main)
+
+
 @pytest.mark.rule("A15")
 def test_the_check_says_that_nothing_makes_it_active() -> None:
     graph = hfg.Graph()

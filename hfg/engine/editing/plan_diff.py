@@ -384,7 +384,8 @@ class _Comparing:
 
 def _may_wait(kind: Any) -> bool:
     """Whether there is async code in nodes of a type."""
-    return kind.process_kind.startswith("async") or any(slot.is_async for slot in kind.slots.values())
+    waits = kind.process_kind.startswith("async") or "do" in kind.hooks
+    return waits or any(slot.is_async for slot in kind.slots.values())
 
 
 def _ends_of_running(edge: Any) -> tuple[Any, ...]:

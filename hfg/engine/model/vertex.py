@@ -219,7 +219,9 @@ class Vertex:
 
     def may_wait(self) -> bool:
         """Whether there is async code in its node."""
-        return self.type is not None and (self.is_async or any(slot.is_async for slot in self.type.slots.values()))
+        if self.type is None:
+            return False
+        return self.is_async or "do" in self.type.hooks or any(slot.is_async for slot in self.type.slots.values())
 
     def iterate(self, iteration: Iteration) -> None:
         """G4: its process function is the inside of a subgraph, which sees the elements one by one."""
