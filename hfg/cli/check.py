@@ -15,6 +15,7 @@ from hfg.cli.target import load_graph
 from hfg.errors import CheckFailed, FileError, HfgError, MachineError, TargetError
 from hfg.graph import Graph
 from hfg.graph.structure.refusals import keep_refusals, problem_of
+from hfg.parts.model.costs import costs_of_deaths
 from hfg.problem import SEVERITIES, Problem
 
 __all__ = ["check"]
@@ -47,9 +48,13 @@ def check(
         found = graph.check()
         problems += [one for one in found if not (one.check == "unconnected-input" and one.path in refused)]
     counts = {severity: sum(problem.severity == severity for problem in problems) for severity in SEVERITIES}
+    costs = [] if graph is None or counts["error"] else list(costs_of_deaths(graph))
     if json:
-        show.json(problems)
+        show.json(problems + costs)
     else:
+        for cost in costs:
+            remedy = f"; {cost.remedy}" if cost.remedy else ""
+            show.write(f"{cost.path}: {cost.what} ({cost.why}){remedy}\n")
         for problem in problems:
             show.write(f"{problem} [{problem.check}]\n")
         name = target if graph is None else f'graph "{graph.name}"'

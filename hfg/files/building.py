@@ -363,6 +363,7 @@ class _Making:
                     process=group.process,
                     host=group.host,
                     ledger=group.ledger,
+                    may_misalign=group.may_misalign,
                 )
 
     def note_gates(self, graph: Graph, box: BoxDocument, key: Key, lost: Set[str]) -> None:

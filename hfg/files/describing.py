@@ -94,7 +94,7 @@ class _Telling:
             if spec != GroupSpec("loop"):
                 threads = 1 if spec.name == "loop" else spec.threads
                 document.groups[spec.name] = GroupDocument(
-                    threads, spec.policy, spec.seed, spec.process, spec.host, spec.ledger
+                    threads, spec.policy, spec.seed, spec.process, spec.host, spec.ledger, spec.may_misalign
                 )
         for name, port in root.ports.inputs.items():
             document.inputs[name] = self.type_text(port.type, f'input "{name}"')

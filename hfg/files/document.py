@@ -102,6 +102,7 @@ class GroupDocument(msgspec.Struct, omit_defaults=True):
       process: it has a process of its own.
       host: the agent that runs that process.
       ledger: what that has done is kept: true by the run, a path in that file, too.
+      may_misalign: the run goes on when it dies, though joins may pair what does not belong together.
     """
 
     threads: int = 1
@@ -110,6 +111,7 @@ class GroupDocument(msgspec.Struct, omit_defaults=True):
     process: bool = False
     host: str = ""
     ledger: bool | str = False
+    may_misalign: bool = False
 
 
 class ParameterDocument(msgspec.Struct, omit_defaults=True):

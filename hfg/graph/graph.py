@@ -327,6 +327,7 @@ class Graph:
         process: bool = False,
         host: str | None = None,
         ledger: bool | str | os.PathLike[str] = False,
+        may_misalign: bool = False,
     ) -> GroupSpec:
         """Declare where nodes run; groups belong to the whole graph, wherever they are declared.
 
@@ -341,11 +342,14 @@ class Graph:
           ledger: True: what the process has done, its `hfg.State` and its places on all edges are kept together, so
             that another goes on from there when it dies, with nothing lost or doubled. A path: in that file as well, so
             that the next run goes on, too.
+          may_misalign: the run goes on when that process dies although nobody can know how many tokens are lost with it
+            and a join behind it may pair what does not belong together; else it fails then (rule L2). `hfg check` says
+            where that is so.
 
         Raises:
           GraphError: a value is out of its range, or the group is declared otherwise already.
         """
-        return declare_group(self._level, name, threads, policy, seed, process, host, ledger)
+        return declare_group(self._level, name, threads, policy, seed, process, host, ledger, may_misalign)
 
     def move(self, node: Node | str, *, group: str | None) -> None:
         """Let a node run in another group; with a subgraph go all inside that have no group of their own.

@@ -31,6 +31,7 @@ from hfg.parts.hosts.realm import PartIs
 from hfg.parts.hosts.standing import Standing
 from hfg.parts.model.agreement import Agreement, Question, Rest
 from hfg.parts.model.clocks import RunClock, machine
+from hfg.parts.model.components import components
 from hfg.parts.model.failing import as_error
 from hfg.parts.model.inheriting import inherited, keeping, remembered
 from hfg.parts.model.ledgers import Entry, Ledger, ledger_of
@@ -365,8 +366,15 @@ class Distribution:
         """A process has ended that was not told to: another takes its place."""
         self._agreement.leave(other.name)
         self._asking.gone(other.name, RunError(f'the process of group "{other.name}" is gone: {how}'))
+        torn = self._torn_by(other.name)
         pause_s = other.died()
         if not self._is_open:
+            return
+        if torn:
+            error = RunError(f'the process of group "{other.name}" is gone: {how}; {torn}')
+            other.answer(error)
+            self._part.finish("failed", error)
+            self._asking.over(other.name)
             return
         if pause_s is None:
             often = f"it died {LIMIT + 1} times within {WITHIN_S:g} s and is not begun again"
@@ -377,6 +385,19 @@ class Distribution:
             return
         _LOGGER.warning('the process of group "%s" is gone: %s; another begins in %g s', other.name, how, pause_s)
         other.come_back(self._bring_back(other, pause_s))
+
+    def _torn_by(self, name: str) -> str:
+        """Why the run cannot go on when a process is gone: joins would pair what does not belong together (L2)."""
+        cutting = self._drawing.cutting
+        if name in self._ledgers or not self._has_begun or cutting.parts[name].groups[name].may_misalign:
+            return ""
+        for one in components(cutting)[name]:
+            if one.cost == "unknown" and one.joined:
+                return (
+                    f'how many tokens are lost with it cannot be known, for {one.uncertain}, and "{one.joined}" would '
+                    "pair what does not belong together: give the group ledger=True, or may_misalign=True to go on"
+                )
+        return ""
 
     async def _restart(self, name: str) -> None:
         """Somebody asks for another process of a part."""

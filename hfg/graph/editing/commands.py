@@ -134,6 +134,7 @@ class AddGroup(Command, frozen=True):
     process: bool = False
     host: str | None = None
     ledger: bool | str = False
+    may_misalign: bool = False
 
 
 class ChangeGroup(Command, frozen=True):
@@ -146,6 +147,7 @@ class ChangeGroup(Command, frozen=True):
     process: bool | msgspec.UnsetType = msgspec.UNSET
     host: str | msgspec.UnsetType = msgspec.UNSET
     ledger: bool | str | msgspec.UnsetType = msgspec.UNSET
+    may_misalign: bool | msgspec.UnsetType = msgspec.UNSET
 
 
 class RemoveGroup(Command, frozen=True):

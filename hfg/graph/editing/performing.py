@@ -268,7 +268,7 @@ class _Hand:
 
     def _changegroup(self, command: c.ChangeGroup) -> None:
         said = msgspec.structs.asdict(self._group(command.name))
-        given = {name: getattr(command, name) for name in ("threads", "policy", "seed", "process", "host", "ledger")}
+        given = msgspec.structs.asdict(command)
         self._declare(group_spec(**said | {name: value for name, value in given.items() if value is not msgspec.UNSET}))
 
     def _declare(self, spec: GroupSpec) -> None:

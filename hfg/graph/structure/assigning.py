@@ -25,6 +25,7 @@ def declare_group(
     process: bool = False,
     host: str | None = None,
     ledger: bool | str | os.PathLike[str] = False,
+    may_misalign: bool = False,
 ) -> GroupSpec:
     """Declare a group of the whole graph.
 
@@ -35,7 +36,7 @@ def declare_group(
     groups = level.whole.groups
     declared: GroupSpec | None = None
     with Refusable(name):
-        declared = group_spec(name, threads, policy, seed, process, host, ledger)
+        declared = group_spec(name, threads, policy, seed, process, host, ledger, may_misalign)
         groups.declare(declared)
     # One that is refused while refusals are kept is there nevertheless, so that nodes in it are not refused as well.
     return declared if declared is not None else groups.by_name.setdefault(str(name), GroupSpec(str(name)))

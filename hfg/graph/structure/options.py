@@ -137,6 +137,7 @@ class GroupSpec(msgspec.Struct, frozen=True):
       host: of that process; "" is the one where the graph is run.
       ledger: what its process has done is kept, so that another goes on from there: True by the run, a path in that
         file, too.
+      may_misalign: the run goes on when that process dies, though joins may pair what does not belong together (L2).
     """
 
     name: str
@@ -146,6 +147,7 @@ class GroupSpec(msgspec.Struct, frozen=True):
     process: bool = False
     host: str = ""
     ledger: bool | str = False
+    may_misalign: bool = False
 
 
 _PAUSES: Final = {
@@ -334,6 +336,7 @@ def group_spec(
     process: bool = False,
     host: str | None = None,
     ledger: bool | str | os.PathLike[str] = False,
+    may_misalign: bool = False,
 ) -> GroupSpec:
     """Check a group.
 
@@ -345,6 +348,7 @@ def group_spec(
       process: whether it has a process of its own.
       host: where that is; whoever names one asks for a process.
       ledger: whether what that has done is kept, or in which file.
+      may_misalign: whether the run goes on behind a death that may misalign joins.
 
     Raises:
       GraphError: a value is out of its range.
@@ -365,10 +369,11 @@ def group_spec(
         _need_nothing_own(at, threads, process)
     ledger = os.fspath(ledger) if isinstance(ledger, os.PathLike) else ledger
     _need_ledger(at, ledger, process)
+    _need_process_for(at, may_misalign, process)
     _need_choice(at, "policy", policy, POLICY, GraphError)
     if seed is not None:
         _need_whole(at, "seed", seed, None, GraphError)
-    return GroupSpec(name, threads, policy, seed, process, host, ledger)  # type: ignore[arg-type]  # checked above
+    return GroupSpec(name, threads, policy, seed, process, host, ledger, may_misalign)  # type: ignore[arg-type]  # checked above
 
 
 def _need_place(at: str, process: object, host: object) -> None:
@@ -394,6 +399,14 @@ def _need_nothing_own(at: str, threads: int, process: bool) -> None:
     if process:
         raise GraphError(
             f'{at}: it is the event loop of the program itself; declare another, graph.group("vision", process=True)'
+        )
+
+
+def _need_process_for(at: str, may_misalign: object, process: bool) -> None:
+    if type(may_misalign) is not bool or (may_misalign and not process):
+        raise GraphError(
+            f"{at}: may_misalign says what follows from the death of the group's process: True or False, and with "
+            f"process=True; got {may_misalign!r}"
         )
 
 

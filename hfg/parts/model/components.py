@@ -52,6 +52,22 @@ class Component(msgspec.Struct, frozen=True):
     joined: str
     source: str
 
+    def in_words(self) -> tuple[str, str, str]:
+        """What a death costs, why, and what would avoid that."""
+        if self.cost == "nothing":
+            return "a death costs nothing", "each token that comes in gives exactly one on each edge that leaves", ""
+        what = "a death costs what was taken and not passed on; each token of it is counted, and joins stay aligned"
+        if self.source:
+            what += f', and source "{self.source}" begins again from its start'
+        if self.cost == "unknown":
+            what = "a death costs tokens, and nobody can know how many"
+            if self.joined:
+                what += f': it ends the run, for "{self.joined}" would pair what does not belong together'
+        remedy = "give the group ledger=True, so that nothing is lost"
+        if self.joined:
+            remedy += ", or may_misalign=True, so that the run goes on"
+        return what, self.uncertain or self.why, remedy
+
     @property
     def cost(self) -> Cost:
         """What a death costs without a ledger."""

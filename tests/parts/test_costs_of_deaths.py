@@ -1,0 +1,114 @@
+"""What a death costs is known before the run, for each connected part of each group (rule L2)."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hfg
+from hfg.graph.flat import cut, flatten
+from hfg.parts.model.components import components
+from hfg.parts.model.costs import costs_of_deaths
+from tests.parts.test_deaths import Killer, at, killed, numbers, pair, relay
+
+__all__ = ["killed"]
+
+TWO_CHAINS = """
+import hfg
+from collections.abc import Iterator
+
+
+@hfg.node
+def numbers(*, count: int = 3) -> Iterator[int]:
+    yield from range(count)
+
+
+@hfg.node
+def slow(x: int) -> int:
+    return x
+
+
+def graph() -> hfg.Graph:
+    graph = hfg.Graph("two")
+    graph.group("p", process=True)
+    source = graph.add(numbers())
+    for name in ("a", "b"):
+        node = graph.add(slow(), name=name, group="p")
+        graph.connect(source.out, node.x)
+        graph.connect(node.out, graph.output(f"{name}_out", int), active=name == "b")
+    return graph
+"""
+
+
+def two_chains(**options: Any) -> hfg.Graph:
+    """Two chains in one group, one of which can be switched off, and a join behind both."""
+    graph = hfg.Graph()
+    graph.group("both", process=True, **options)
+    source, join = graph.add(numbers(count=40)), graph.add(pair())
+    for name, port in (("plain", join.a), ("switched", join.b)):
+        node = graph.add(relay(), name=name, group="both")
+        graph.connect(source.out, node.value)
+        graph.connect(node.out, port)
+    graph.connect(join.out, graph.output("out", tuple[int, int]))
+    graph.connect(graph.start, graph["switched"].enable)
+    return graph
+
+
+@pytest.mark.rule("L2")
+def test_each_connected_part_of_a_group_has_its_own_cost() -> None:
+    plain, switched = components(cut(flatten(two_chains())))["both"]
+    assert (plain.nodes, plain.cost) == (("plain",), "nothing")
+    assert (switched.nodes, switched.cost, switched.joined) == (("switched",), "unknown", "pair")
+    assert switched.uncertain == '"switched" may be disabled while it runs'
+    first, second = costs_of_deaths(two_chains())
+    assert first.what == "a death costs nothing"
+    assert 'it ends the run, for "pair" would pair what does not belong together' in second.what
+    assert "ledger=True" in second.remedy
+
+
+@pytest.mark.rule("L2")
+def test_a_death_after_which_a_join_would_be_torn_ends_the_run_with_a_sentence(killed: Any) -> None:
+    killed(at(0.03, "both"))
+    with pytest.raises(
+        hfg.errors.RunError, match=r'"pair" would pair what does not belong together.*may_misalign=True'
+    ):
+        hfg.run(two_chains(), clock="virtual", until_s=30.0)
+
+
+@pytest.mark.rule("L2")
+def test_a_group_that_may_misalign_goes_on(killed: Any) -> None:
+    made: list[Killer] = killed(at(0.03, "both"))
+    assert hfg.run(two_chains(may_misalign=True), clock="virtual", until_s=30.0).outcome == "done"
+    assert made[0].lives == {"both": 2}
+
+
+@pytest.mark.rule("L2")
+def test_check_says_what_a_death_costs(tmp_path: Path) -> None:
+    (tmp_path / "two.py").write_text(TWO_CHAINS)
+    command = [sys.executable, "-m", "hfg", "check", "two.py:graph"]
+    text = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert 'group "p": a: a death costs nothing' in text
+    assert 'group "p": b: a death costs what was taken and not passed on' in text
+    assert "give the group ledger=True" in text
+    told = json.loads(subprocess.run([*command, "--json"], cwd=tmp_path, capture_output=True, check=True).stdout)
+    assert [one["path"] for one in told if one["check"] == "cost-of-death"] == ['group "p": a', 'group "p": b']
+
+
+def test_whoever_reads_of_a_promise_about_deaths_finds_its_test() -> None:
+    root = Path(__file__).parents[2]
+    section = (root / "docs/links.md").read_text("utf-8").partition("## What is promised about deaths")[2]
+    rows = re.findall(r"^\| (?!promise|---)(.+?) \| `(.+?)::(.+?)` \|$", section, re.MULTILINE)
+    assert len(rows) > 10
+    for promise, file, name in rows:
+        assert f"def {name}(" in (root / file).read_text("utf-8"), f"nothing tests that {promise}"
+
+
+def test_may_misalign_is_said_of_a_group_with_a_process() -> None:
+    with pytest.raises(hfg.errors.GraphError, match="with process=True"):
+        hfg.Graph().group("g", may_misalign=True)
