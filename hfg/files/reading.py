@@ -23,6 +23,7 @@ from hfg.files.parsing import Located, parse, plain
 __all__ = ["Read", "read_bytes", "read_file"]
 
 _ARROW: Final = " -> "
+_SAYS: Final = ("type", "file", "graph")
 _WRONG: Final = msgspec.UNSET  # stands for a value that was reported
 
 
@@ -222,8 +223,9 @@ class _Reading:
 
     def is_one(self, found: Located, node: NodeDocument, key: Key, known: bool) -> bool:
         """Whether a node says what it is, and says it once; a word that is not known may have been meant so."""
-        if not (node.type or node.file or "graph" in found.value or {"type", "file"} & found.value.keys()):
-            if known:
+        if not (node.type or node.file or node.graph is not None):
+            told = any(found.value[name].value not in (None, "") for name in _SAYS if name in found.value)
+            if known and not told:
                 remedy = "add a line type: module:name, file: or graph: below it"
                 self.wrong(found, key, f"it does not say what it is; {remedy}")
             return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
@@ -219,9 +220,9 @@ def load_array(path: Path, mode: Literal["r"] | None = None) -> Any:
                 raise ValueError("its end is missing")  # numpy would leave it open
             need_fair_arrays(path, is_zip=is_zip, whole=mode is None)
             return np.load(path, mmap_mode=mode, allow_pickle=False)
-        except OSError:
-            raise
         except Exception as error:  # what numpy and zipfile raise, whatever is in a file: a dozen kinds
+            if isinstance(error, OSError) and error.errno != errno.EINVAL:  # of a place before the file
+                raise
             raise ValueError(f'"{path}" is no file of numpy without Python objects: {error}') from None
 
 

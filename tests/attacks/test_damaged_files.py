@@ -1,0 +1,76 @@
+"""Whatever lies in a file, it is read or refused with a sentence, and no process dies of it.
+
+A few of each kind in the suite, a million by `make soak`: HFG_SOAK_DAMAGED says how many, HFG_SOAK_SEED where to begin.
+What foreign code reads is tried in processes of their own. A seed that found something stays in `SEEDS`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hfg.nodes.learning._models import model_of
+from tests.attacks.fuzzing import KINDS, damaged, trial
+
+pytestmark = pytest.mark.rule("L4")
+
+ROOT = Path(__file__).resolve().parents[2]
+OWN = [name for name, kind in KINDS.items() if not kind.native]
+NATIVE = [name for name, kind in KINDS.items() if kind.native]
+SEEDS: dict[str, tuple[int, ...]] = {
+    "graph": (152,),  # a node whose `graph:` is empty
+    "archive": (9,),  # the place of a part is before the file
+}
+FEW = 150
+MANY = int(os.environ.get("HFG_SOAK_DAMAGED", "1000000")) // len(KINDS)
+FIRST = int(os.environ.get("HFG_SOAK_SEED", "1000000"))
+BLOCK = 2000
+
+
+@pytest.mark.parametrize("kind", OWN)
+def test_a_damaged_file_is_read_or_refused_with_a_sentence(kind: str, tmp_path: Path) -> None:
+    wrong = {seed: trial(kind, seed, tmp_path) for seed in (*SEEDS.get(kind, ()), *range(FEW))}
+    assert {seed: what for seed, what in wrong.items() if what is not None} == {}
+
+
+def test_damage_is_the_same_each_time_and_there_is_some() -> None:
+    for kind in OWN:
+        assert len({damaged(kind, seed) for seed in range(50)}) > 30
+        assert damaged(kind, 7) == damaged(kind, 7)
+
+
+def in_a_process(kind: str, first: int, count: int, folder: Path) -> list[object]:
+    """Try them in a process of its own; gives what is wrong, and at which seed it has died."""
+    progress = folder / "progress"
+    progress.touch()
+    command = [sys.executable, "-m", "tests.attacks.fuzzing", kind, str(first), str(count), str(progress)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=3000)
+    wrong: list[object] = [json.loads(line) for line in done.stdout.splitlines()]
+    if done.returncode:
+        wrong.append([progress.read_text(), f"the process ended with {done.returncode}: {done.stderr[-400:]}"])
+    return wrong
+
+
+def test_foreign_code_survives_damaged_files(tmp_path: Path) -> None:
+    assert in_a_process(",".join(NATIVE), 0, 40, tmp_path) == []
+
+
+def test_a_model_of_trees_that_names_no_variables_is_refused(tmp_path: Path) -> None:
+    """OpenCV would end the process for it."""
+    with pytest.raises(ValueError, match="holds no model"):
+        model_of(damaged("model", 1879), "it")
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_damaged_files(kind: str, tmp_path: Path) -> None:
+    wrong: list[object] = []
+    for first in range(FIRST, FIRST + MANY, BLOCK):
+        wrong += in_a_process(kind, first, min(BLOCK, FIRST + MANY - first), tmp_path)
+    assert wrong == []
