@@ -76,7 +76,7 @@ class Line:
         self._asked = False
         try:
             answer = msgspec.json.decode(heard, type=Answer)
-        except msgspec.MsgspecError as error:
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             raise TargetError(f"process {self._pid} answers what this version of hfg cannot read: {error}") from None
         if answer.error:
             raise TargetError(f"process {self._pid}: {answer.error}")

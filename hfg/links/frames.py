@@ -216,7 +216,7 @@ def values_of(frame: Tokens, payload: Buffer) -> list[Buffer]:
         return [payload]
     try:
         values: list[Buffer] = [*_read_values.decode(payload)]
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise Unreadable("the payload holds no values") from error
     if len(values) != len(frame.metadata):
         raise Unreadable(f"{len(values)} values for {len(frame.metadata)} tokens")

@@ -67,7 +67,7 @@ def read_introduction(metadata: bytes) -> Introduction | None:
     """Give what was announced, or None if it is nothing of the kind: it may come from anybody."""
     try:
         return _decode(metadata)
-    except (msgspec.DecodeError, RecursionError):
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         return None
 
 

@@ -139,6 +139,11 @@ def fuzz_messages(rounds: int, seed: int) -> int:
     return refused
 
 
+def test_an_introduction_whose_text_is_cut_off_is_none() -> None:
+    """Found by seed 1545476621: of text that is not UTF-8 msgspec says so by another error than of all else."""
+    assert read_introduction(b"\x96\x01\xa2a\xd7\xa1b\xc3\xa0\xa0") is None
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forged_frames_are_read_or_refused(seed: int) -> None:
     assert 3_000 > fuzz_frames(3_000, seed) - 3_000 > 300  # each is refused by one of the two ends, some by both

@@ -122,7 +122,7 @@ class Door:
         """Answer one question; a tap's is given back."""
         try:
             question = msgspec.json.decode(line, type=Question)
-        except msgspec.MsgspecError as error:
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             return Answer(error=f"the question cannot be understood: {error}")
         if question.want == "name":
             return self.name

@@ -313,7 +313,7 @@ async def ask(session: Session, place: str, request: Any, answer: type[_T], *, t
     told = await session.ask(f"{place}/{request.verb}", msgspec.msgpack.encode(request), timeout_s=timeout_s)
     try:
         return msgspec.msgpack.decode(told, type=answer)
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise TransportError(f'"{place}" answers what this version of hfg cannot read: {error}') from None
 
 
@@ -324,7 +324,7 @@ def serve(session: Session, place: str, answers: Mapping[Any, Callable[[Any], Aw
         async def reply(question: bytes) -> bytes:
             try:
                 request: Any = msgspec.msgpack.decode(question, type=kind)
-            except msgspec.MsgspecError as error:
+            except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
                 raise UsageError(f"the question cannot be understood: {error}") from None
             return msgspec.msgpack.encode(await answer(request))
 
@@ -359,7 +359,7 @@ class Realm:
                 continue
             try:
                 into[one.name] = msgspec.msgpack.decode(one.metadata, type=kind)
-            except msgspec.MsgspecError:
+            except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
                 _LOGGER.warning('"%s" says of itself what this version of hfg cannot read', one.name)
         changed, self._changed = self._changed, set()
         for waiting in changed:
