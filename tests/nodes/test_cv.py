@@ -654,6 +654,11 @@ WITH_NAN = np.where(np.eye(6, 5) > 0, np.nan, FEW).astype(np.float32)
         ),
         (cv.bilateral_filter(), {"src": WITH_NAN}, "bilateral_filter: src has a number that is not within 1e15"),
         (cv.bilateral_filter(), {"src": FEW * 1e30}, "clip it, or replace NaN and infinity, first"),
+        (
+            cv.find_contours(mode="CCOMP"),
+            {"image": np.array([[0, 2**31 - 1], [-(2**31), 0]], np.int32)},
+            "find_contours: image has a number that is not within 0 and 2 ** 29",
+        ),
         (cv.check_range(), {"a": np.ones((4, 4), np.float16)}, 'input "a" of check_range: expected Array['),
     ],
 )

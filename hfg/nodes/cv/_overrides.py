@@ -1128,6 +1128,14 @@ def _disparities_are_of_the_range(inputs: Mapping[str, Any], parameters: Mapping
     return f"disparity has numbers that are not within {least * 16} and {most * 16 - 1}, sixteenths of the disparities"
 
 
+def _labels_are_few(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
+    """OpenCV marks pixels of 32 bits by their highest bits, and follows marks that are none beyond the image."""
+    image = inputs["image"]
+    if image.dtype != np.int32 or (image.min() >= 0 and image.max() <= 2**29):
+        return None
+    return "image has a number that is not within 0 and 2 ** 29; clip it, or convert it to uint8, first"
+
+
 def _finite(*names: str) -> Need:
     """Refuse what is not a number, or infinite: OpenCV counts such elements in one place and not in another."""
 
@@ -1175,6 +1183,7 @@ _NEEDED: Final[tuple[tuple[str, Need], ...]] = (
     ("validateDisparity", Need("there are disparities outside of their range", _disparities_are_of_the_range)),
     ("eigenNonSymmetric", _finite("src")),
     ("filter2D", _finite("kernel")),
+    ("findContours", Need("an image of int32 has a number that is not within 0 and 2 ** 29", _labels_are_few)),
     ("sepFilter2D", _finite("kernelX", "kernelY")),
 )
 NEEDS: Final[Mapping[str, tuple[Need, ...]]] = {
