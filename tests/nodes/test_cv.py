@@ -673,6 +673,7 @@ def test_values_that_end_the_process_are_refused(node: Any, given: Any, sentence
         (cv.put_text, {"text": "\ud800"}),
         (cv.good_features_to_track, {"min_distance": 1e30}),
         (cv.kmeans, {"criteria": (3, 1e300)}),
+        (cv.hough_circles, {"param2": 1e-9}),
         (cv.fast_nl_means_denoising_multi, {"img_to_denoise_index": 2**31 - 1}),
     ],
 )

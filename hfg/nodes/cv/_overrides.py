@@ -445,9 +445,9 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
         {
             "method": _words("HOUGH_ GRADIENT GRADIENT_ALT", "GRADIENT"),
             "dp": _float(1.0, 1.0, 10.0),
-            "minDist": _float(20.0, 1.0),
-            "param1": _float(100.0, above=0.0),
-            "param2": _float(100.0, above=0.0),
+            "minDist": _float(20.0, 1.0, 32767.0),
+            "param1": _float(100.0, 0.1),
+            "param2": _float(100.0, 0.1),  # with almost nothing GRADIENT_ALT reads beyond its memory
             "minRadius": _int(0, 0),
             "maxRadius": _int(0),
         },
