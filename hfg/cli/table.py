@@ -119,6 +119,8 @@ class View:
         glance = self._glances[-1][0]
         errors = sum(row.errors for row in rows)
         told = [glance.graph, glance.outcome, f"{glance.duration_s:.1f} s", _count(len(rows), "node")]
+        if glance.lost:
+            told.append(_count(glance.lost, "token") + " lost with processes")
         lines = [paint("  ".join([*told, *([_count(errors, "error")] if errors else [])]), _BOLD)]
         active = [row.path for row in rows if row.active]
         if active:

@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.cli.table import View
+from hfg.engine.observing.glance import Glance
 from hfg.graph.flat import cut, flatten
 from hfg.parts.model.components import components
 from hfg.parts.model.costs import costs_of_deaths
@@ -112,3 +114,10 @@ def test_whoever_reads_of_a_promise_about_deaths_finds_its_test() -> None:
 def test_may_misalign_is_said_of_a_group_with_a_process() -> None:
     with pytest.raises(hfg.errors.GraphError, match="with process=True"):
         hfg.Graph().group("g", may_misalign=True)
+
+
+@pytest.mark.rule("L2")
+def test_top_says_how_many_tokens_are_lost_with_processes() -> None:
+    view = View()
+    view.look(Glance("g", "running", 1.0, 1.0, [], lost=3))
+    assert "3 tokens lost with processes" in "\n".join(view.lines(100, 10))

@@ -53,6 +53,7 @@ class Glance(msgspec.Struct, frozen=True):
       duration_s: since it began, on its clock; 0 before.
       machine_s: now, on the machine's monotonic clock.
       nodes: in order of adding, those inside iterating subgraphs too.
+      lost: tokens that are gone with processes of groups (L2).
     """
 
     graph: str
@@ -60,6 +61,7 @@ class Glance(msgspec.Struct, frozen=True):
     duration_s: float
     machine_s: float
     nodes: list[NodeGlance]
+    lost: int = 0
 
 
 def glance_at(engine: Engine) -> Glance:
@@ -91,4 +93,5 @@ def glance_at(engine: Engine) -> Glance:
         duration_s=engine.elapsed() if engine.core.started else 0.0,
         machine_s=time.monotonic(),
         nodes=nodes,
+        lost=sum(edge.lost for edge in engine.core.edges),
     )

@@ -378,7 +378,8 @@ class CutRun(Run):
         for counts in self._counts.values():
             if counts.glance is not None:
                 nodes |= {node.path: node for node in counts.glance.nodes}
-        return msgspec.structs.replace(mine, nodes=list(self._in_order(nodes).values()))
+        lost = mine.lost + sum(counts.glance.lost for counts in self._counts.values() if counts.glance is not None)
+        return msgspec.structs.replace(mine, nodes=list(self._in_order(nodes).values()), lost=lost)
 
     def statistics(self) -> Statistics:
         """See `Run.statistics`; of other parts as they last said (see `refresh`), with the age of that."""
