@@ -256,10 +256,11 @@ def _in_columns(value: Any, inputs: Mapping[str, Any]) -> Any:
 
 
 def _with_room(value: Any, inputs: Mapping[str, Any]) -> Any:
-    """Copy an array to where something is behind it: OpenCV reads some bytes more."""
-    room = np.zeros(value.size + 64, value.dtype)
-    room[: value.size] = value.reshape(-1)
-    return room[: value.size].reshape(value.shape)
+    """Copy an array to where something is around it: OpenCV reads some bytes more, and a row of a few pixels."""
+    beside = 64 + 4 * value.shape[-1] * (value.shape[1] if value.ndim == 3 else 1)
+    room = np.zeros(value.size + 2 * beside, value.dtype)
+    room[beside : beside + value.size] = value.reshape(-1)
+    return room[beside : beside + value.size].reshape(value.shape)
 
 
 def _painted(value: Colour, inputs: Mapping[str, Any]) -> tuple[float, ...]:
@@ -443,6 +444,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     **_each(
         ["HoughCircles", "HoughCirclesWithAccumulator"],
         {
+            "image": Say(convert=_with_room),
             "method": _words("HOUGH_ GRADIENT GRADIENT_ALT", "GRADIENT"),
             "dp": _float(1.0, 1.0, 10.0),
             "minDist": _float(20.0, 1.0, 32767.0),
