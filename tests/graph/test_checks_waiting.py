@@ -110,7 +110,7 @@ def test_a_class_with_inputs_and_no_process_is_refused_and_the_near_name_told() 
     graph.connect(source.out, nothing.value)
     near, bare = found(graph, "missing-process")
     assert (near.path, near.severity) == ("typo", "error")
-    assert near.why == 'did you mean "proces"?'
+    assert near.why == "its method proces() looks like a misspelt process()"
     assert (bare.path, bare.why) == ("nothing", "what comes to its inputs is never taken (rules F1, F2)")
 
 
