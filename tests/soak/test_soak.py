@@ -45,6 +45,7 @@ def test_the_engine_does_what_the_oracle_permits(block: int) -> None:
         base = WIDE if seed % 2 else Allowed()
         allowed = replace(base, threads=seed % 10 == 0, max_nodes=5 + seed % 6)
         allowed = replace(allowed, tasks=seed % 7 == 1, sending=seed % 3 == 0, doing=seed % 5 == 2)
+        allowed = replace(allowed, rings=seed % 3 == 0)
         plan = random_plan(seed, allowed)
         if suite.reference(plan, seed) is not None:
             suite.check(plan, seed)

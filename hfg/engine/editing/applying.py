@@ -499,6 +499,7 @@ class _Applying:
                 flush_automatic(worker)
         lifecycle.disable_around(worker for worker in touched if any(not scope.enabled for scope in worker.around))
         judge_sources(self.core)
+        self.core.waits_changed()
 
     def _begin(self, edge: Any) -> None:
         """An edge begins: if it has initial tokens, they lie on it now (P7)."""

@@ -340,6 +340,7 @@ class Core:
         self.iterating: list[Iteration] = []  # subgraphs amid a firing in which they iterate, inner ones behind (G4)
         self.full_edges = 0  # queues that hold their sources back (F8)
         self.suspects: dict[Worker, None] = {}  # held back so, and perhaps in a ring that has closed
+        self.all_suspect = False
         self.waiting_room = 0  # of those, how much code awaits trigger_wait (F8)
         self.timers = 0
         self.pumping = False
@@ -419,6 +420,10 @@ class Core:
         for worker in self.workers:
             if standing[worker] != worker.queued:
                 raise EngineInternalError(f'node "{worker.path}": it stands {standing[worker]} times in its run queue')
+
+    def waits_changed(self) -> None:
+        """F8: who may wait for whom is not as it was, so any node that a full queue holds back may be in a ring now."""
+        self.all_suspect = True
 
     def hold(self, held: bool) -> None:
         """R3: whether the run is paused, and nodes move one by one; a wave under way ends behind its present call."""

@@ -32,6 +32,7 @@ __all__ = [
     "CROWDED",
     "DISABLED",
     "ENDED",
+    "FIRES_NO_MORE",
     "FULL",
     "FUTILE",
     "NO_CALLS",
@@ -66,6 +67,7 @@ BACKOFF: Final = 2048  # between teardown and setup after an error (X1)
 TORN_DOWN: Final = 4096  # the run is ending (R5, X3)
 RECORDED: Final = 8192  # what it sends is recorded without loss, and the disk is behind
 NO_CALLS: Final = FULL  # the least of them
+FIRES_NO_MORE: Final = ENDED | DISABLED | REMOVED | TORN_DOWN | UNWIRED | FUTILE  # whatever comes to it
 
 Entry: TypeAlias = "tuple[Any, int | None, float | None]"  # what is written to an output: value, modifier, stamp
 
@@ -389,13 +391,17 @@ class Worker(Vertex):
             self.region.disturb(self)
         if reason == FULL:
             self.placed = False  # a rate goes on holding it, and is to be over before a queue grows (F8)
-        else:
-            self.unplace()
+            return
+        self.unplace()
+        if reason & FIRES_NO_MORE:
+            self.core.waits_changed()
 
     def allow(self, reasons: int) -> bool:
         """Take reasons away; whether one of them held. Who calls this sees to it that the worker goes on."""
         held = self.blocked & reasons
         self.blocked &= ~reasons
+        if held & FIRES_NO_MORE:
+            self.core.waits_changed()
         return bool(held)
 
     def wait_for_rate(self, when: float, over: Callable[[], None]) -> None:
@@ -466,6 +472,7 @@ class Worker(Vertex):
         self.waiting_room += how_many
         self.core.waiting_room += how_many
         self.core.suspects[self] = None
+        self.tell_watchers()
 
     def be_watched_by(self, held: Worker) -> None:
         """F8: what is held back by a full queue is in no ring as long as code of this one goes on, or its timer."""

@@ -6,7 +6,8 @@ through a full queue ends by one more place in that queue. This is the local dea
 found as a greatest fixed point.
 
 A walk begins only at nodes that a full queue has come to hold back, or whose last walk ended at code or a timer that is
-over now (`Core.suspects`). So a graph without full queues pays nothing, and of many nodes that are held back only those
+over now (`Core.suspects`); at all that are held back after an edit, and when a node can fire no more or again
+(`Core.waits_changed`). So a graph without full queues pays nothing, and of many nodes that are held back only those
 are looked at again for which something has changed. Stands on `agenda`.
 """
 
@@ -17,18 +18,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final, TypeAlias
 
 from hfg.engine.model.core import Core
-from hfg.engine.model.worker import (
-    BACKOFF,
-    CROWDED,
-    DISABLED,
-    ENDED,
-    FULL,
-    FUTILE,
-    REMOVED,
-    TORN_DOWN,
-    UNWIRED,
-    Worker,
-)
+from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, CROWDED, ENDED, FIRES_NO_MORE, FULL, Worker
 from hfg.engine.rules.agenda import freed, must_wait
 from hfg.errors import QueueLimit
 from hfg.graph.flat.order import strongly_connected
@@ -49,7 +39,6 @@ _ROOM: Final = "room"  # has room in each queue behind its events
 _HEAR: Final = "hear"  # gets a token for one of its slots
 
 _ELSEWHERE: Final[Action] = (None, "elsewhere")
-_FIRES_NO_MORE = ENDED | DISABLED | REMOVED | TORN_DOWN | UNWIRED | FUTILE
 
 
 class _Wait:
@@ -73,29 +62,42 @@ _NEVER = _Wait([], any_of=True)
 def resolve(core: Core) -> bool:
     """Let each ring that has closed grow, as long as there are any; whether there were."""
     grew = False
-    while core.suspects and not core.over:
-        suspects = [worker for worker in core.suspects if worker.full_edges]
-        core.suspects.clear()
-        if not suspects:
-            break
+    again: list[Worker] = []  # nobody tells when what keeps these out of rings changes
+    while not core.over and (suspects := _take_suspects(core)):
+        known: dict[Worker, bool] = {}
+        again += [worker for worker in suspects if _plainly_goes_on(worker, known)]
+        suspects = [worker for worker in suspects if not known[worker]]
         walk = _Walk(core)
         found = walk.smallest_of_rings(suspects)
-        walk.watch(suspects)
+        again += walk.watch(suspects)
         for edge in found:
             grow_queue(core, edge)
-        if not found:
-            break
-        grew = True
+        if found:
+            grew = True
+            core.suspects.update(dict.fromkeys(again))
+            again = []
+    core.suspects.update(dict.fromkeys(again))
     return grew
 
 
+def _take_suspects(core: Core) -> list[Worker]:
+    """Give all that may have come to be in a ring; each is looked at once."""
+    if not core.full_edges:
+        suspects: Iterable[Worker] = ()
+    else:
+        suspects = core.workers if core.all_suspect else list(core.suspects)
+    core.all_suspect = False
+    core.suspects.clear()
+    return [worker for worker in suspects if worker.full_edges]
+
+
 def look_at_all(core: Core) -> None:
-    """Nothing moves any more, or the graph was edited: all that full queues hold back are suspects."""
+    """Nothing moves any more: all that full queues hold back are suspects."""
     if core.full_edges:
-        held = [worker for worker in core.workers if worker.full_edges]
-        core.suspects.update(dict.fromkeys(held))
-        for worker in held:
-            is_held(worker)  # and if a rate does so too, its timer is set
+        core.waits_changed()
+        for worker in core.workers:
+            if worker.full_edges:
+                is_held(worker)  # and if a rate does so too, its timer is set
 
 
 def smallest_at_rest(core: Core) -> EventEdge | None:
@@ -203,11 +205,15 @@ class _Walk:
                     self._opened[other] = action
                     waiting.append(other)
 
-    def watch(self, held: Iterable[Worker]) -> None:
-        """Have these looked at again when what keeps them out of rings has changed, or soon if that tells nobody."""
+    def watch(self, held: Iterable[Worker]) -> list[Worker]:
+        """Have these looked at again when what keeps them out of rings has changed; give those whom nobody tells."""
+        again = []
         for worker in held:
             if not all([self._will_tell(reason, worker) for reason in self._reasons(worker)]):  # noqa: C419 - each
-                self._core.suspects[worker] = None
+                again.append(worker)
+            if (worker, _ROOM) not in self._opened:
+                worker.tell_watchers()
+        return again
 
     def _reasons(self, held: Worker) -> Iterator[Action]:
         """Give what may happen by itself, and who else is held back and has reasons of its own."""
@@ -232,7 +238,7 @@ class _Walk:
         leaf = reason[0] if reason in self._waits else self._may[reason]
         if leaf is None or (leaf is held and reason in self._waits):
             return False
-        if reason not in self._waits and not _goes_on(leaf):
+        if reason not in self._waits and not _goes_on(leaf, reason[1]):
             region: Any = leaf.region
             if region is None or not region.head.in_flight:
                 return False
@@ -288,7 +294,7 @@ def _fire(worker: Worker) -> _Wait | Worker:
     if _works_on_firing(worker) or blocked & BACKOFF:
         return worker
     on = _processing(worker)
-    if blocked & _FIRES_NO_MORE or worker.process is None:
+    if blocked & FIRES_NO_MORE or worker.process is None:
         return _Wait(on) if worker.pending_end and on else _NEVER
     on += [_sending(edge) for edge in worker.live_inputs if not edge.untaken]
     if blocked & FULL and _counts(worker, on):
@@ -300,7 +306,7 @@ def _counts(worker: Worker, waits_for: list[Action]) -> bool:
     """Whether F8 holds its next firing by itself: not beside a rate, a gate or `ready()`, and not beside a call."""
     if worker.waiting_room:
         return True
-    if worker.blocked & ~(FULL | CROWDED) or worker.busy:
+    if worker.blocked & ~(FULL | CROWDED) or worker.busy not in AMID_NOTHING:
         return False
     return bool(waits_for) or not (worker.paced and must_wait(worker))
 
@@ -381,9 +387,9 @@ def _full_edges(worker: Worker) -> list[EventEdge]:
 def _works(worker: Worker) -> bool:
     """Whether a firing or call is under way that does not only wait for room."""
     if worker.flights is None:
-        return worker.busy != "" and not worker.waiting_room
+        return worker.busy not in AMID_NOTHING and not worker.waiting_room  # an edit that holds it changes no wait
     unfinished = sum(not flight.outcome for flight in worker.flights)
-    return unfinished + (worker.busy != "") > worker.waiting_room
+    return unfinished + (worker.busy not in AMID_NOTHING) > worker.waiting_room
 
 
 def _works_on_firing(worker: Worker) -> bool:
@@ -398,7 +404,7 @@ def is_held(worker: Worker) -> bool:
     """
     if worker.codes_waiting_for_room():
         return True
-    if not worker.blocked & FULL or worker.busy:
+    if not worker.blocked & FULL or worker.busy not in AMID_NOTHING:
         return False
     if worker.calls and worker.blocked < BACKOFF:
         return True
@@ -407,8 +413,45 @@ def is_held(worker: Worker) -> bool:
     return not _processing(worker) and not (worker.paced and must_wait(worker))
 
 
-def _goes_on(worker: Worker) -> bool:
-    """Whether code or a timer of it is under way, which says so when it is over."""
-    if worker.in_flight or worker.rate_timer is not None or (worker.queued and worker.group.threaded):
+def _goes_on(worker: Worker, what: str) -> bool:
+    """Whether code of it is under way, or the timer of a rate that alone delays this, which say so when over."""
+    if worker.in_flight or (what == _FIRE and worker.rate_timer is not None):
         return True
     return worker.flights is not None and worker.flights.working > 0
+
+
+# --- a short way: chains of full queues that end where something goes on ----------------------------------------------
+
+
+def _plainly_goes_on(held: Worker, known: dict[Worker, bool]) -> bool:
+    """Whether from full queue to full queue we come to a node that takes next, or is busy; `known`: what was found."""
+    chain: dict[Worker, None] = {}
+    worker = held
+    while worker not in known:
+        chain[worker] = None
+        full = _full_edges(worker)
+        target, what = _taking(full[0])
+        if len(full) > 1 or target is None or target in chain:
+            known[worker] = False
+        elif _takes_next(target, what):
+            known[worker] = True
+        elif not _has_only_to_have_room(target, what):
+            known[worker] = False
+        else:
+            worker = target
+    known.update(dict.fromkeys(chain, known[worker]))
+    return known[held]
+
+
+def _takes_next(worker: Worker, what: str) -> bool:
+    if worker.queued and not worker.group.threaded:
+        return True
+    return _works(worker) if what == _CALL else _works_on_firing(worker)
+
+
+def _has_only_to_have_room(worker: Worker, what: str) -> bool:
+    if worker.busy not in AMID_NOTHING or not worker.full_edges or worker.paced:
+        return False
+    if what == _CALL:
+        return worker.blocked < BACKOFF
+    return worker.blocked == FULL and not (worker.inputs.missing or worker.outputs.missing)

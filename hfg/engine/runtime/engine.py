@@ -343,7 +343,7 @@ class Engine:
             call()
         if self.ended_how is not None or self._rests():
             return
-        if core.suspects:
+        if core.suspects or core.all_suspect:
             rings.resolve(core)
         went_on = bool(self.core.iterating) and iterating.settle(self.core)
         if policy or self._ready_groups or went_on:
