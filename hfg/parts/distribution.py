@@ -391,7 +391,7 @@ class Distribution:
         cutting = self._drawing.cutting
         if name in self._ledgers or not self._has_begun or cutting.parts[name].groups[name].may_misalign:
             return ""
-        for one in components(cutting)[name]:
+        for one in components(cutting, self._ledgers)[name]:
             if one.cost == "unknown" and one.joined:
                 return (
                     f'how many tokens are lost with it cannot be known, for {one.uncertain}, and "{one.joined}" would '

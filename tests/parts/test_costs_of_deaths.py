@@ -90,6 +90,47 @@ def test_a_group_that_may_misalign_goes_on(killed: Any) -> None:
     assert made[0].lives == {"both": 2}
 
 
+def into_a_ledger(*, joins: bool, **options: Any) -> hfg.Graph:
+    """A group of which tokens may be lost, and one behind it with a ledger."""
+    graph = hfg.Graph()
+    graph.group("loses", process=True, **options)
+    graph.group("keeps", process=True, ledger=True)
+    source = graph.add(numbers(count=40))
+    first, then = (graph.add(relay(), name=name, group="loses") for name in ("first", "then"))
+    graph.start.activates(first.activate)
+    graph.connect(source.out, first.value)
+    graph.connect(first.out, then.value, active=True)
+    last: hfg.Node
+    if joins:
+        last = graph.add(pair(), group="keeps")
+        graph.connect(then.out, last.a)
+        graph.connect(source.out, last.b)
+    else:
+        last = graph.add(relay(), name="last", group="keeps")
+        graph.connect(then.out, last.value)
+    graph.connect(last.out, graph.output("out", Any))
+    return graph
+
+
+@pytest.mark.rule("L2")
+def test_check_knows_that_a_ledger_does_not_count_what_is_lost_before_it() -> None:
+    joined, *_ = costs_of_deaths(into_a_ledger(joins=True))
+    assert 'it ends the run, for "pair" would pair what does not belong together' in joined.what
+    assert (
+        joined.why
+        == '"then.out -> pair.a" leads into group "keeps", whose ledger knows what has come and not what is lost'
+    )
+    alone, *_ = costs_of_deaths(into_a_ledger(joins=False))
+    assert alone.what == "a death costs tokens, and nobody can know how many"
+
+
+@pytest.mark.rule("L2")
+def test_a_join_behind_a_ledger_is_not_torn_by_a_death_before_it(killed: Any) -> None:
+    killed(at(0.03, "loses"))
+    with pytest.raises(hfg.errors.RunError, match=r'"pair" would pair what does not belong together'):
+        hfg.run(into_a_ledger(joins=True), clock="virtual", until_s=30.0)
+
+
 @pytest.mark.rule("L2")
 def test_check_says_what_a_death_costs(tmp_path: Path) -> None:
     (tmp_path / "two.py").write_text(TWO_CHAINS)

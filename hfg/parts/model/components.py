@@ -9,7 +9,7 @@ are cut.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
@@ -87,9 +87,15 @@ def is_numbered(edge: CutEdge) -> bool:
     return edge.guarantee == "exact" and (kind == "input" or (kind == "parameter" and not edge.edge.is_event_edge))
 
 
-def components(cutting: Cutting) -> dict[str, tuple[Component, ...]]:
-    """Give the components of each part but the main one; all parts of a run come to the same answer."""
-    whole = _Whole(cutting)
+def components(cutting: Cutting, kept: Collection[str] = ()) -> dict[str, tuple[Component, ...]]:
+    """Give the components of each part but the main one; all parts of a run come to the same answer.
+
+    Args:
+      cutting: of the graph.
+      kept: the parts with ledgers (see `keeping`), for what a death costs beside them; that they are there does not
+        matter to what they are themselves.
+    """
+    whole = _Whole(cutting, kept)
     return {
         name: tuple(_component(whole, name, flat, numbers) for numbers in _connected(flat))
         for name, flat in cutting.parts.items()
@@ -119,7 +125,7 @@ def _component(whole: _Whole, part: str, flat: FlatGraph, numbers: list[int]) ->
     cut = [whole.by_label[edge.label] for edge in touching if LINK in (edge.source.node, edge.target.node)]
     coming = tuple(edge.label for edge in cut if edge.target == part and is_numbered(edge))
     leaving = tuple(edge.label for edge in cut if edge.source == part and is_synchronous(edge))
-    why = _why_no_answers(flat, nodes, touching)
+    why = _why_no_answers(flat, nodes, touching) or whole.why_nothing_is_inherited
     uncertain = "" if not why else _why_uncertain(whole, flat, nodes, touching, part)
     joined = whole.joined(part, inside, leaving) if uncertain else ""
     source = next((node.path for node in nodes if node.node._type.is_source), "")
@@ -187,6 +193,10 @@ def _why_uncertain(whole: _Whole, flat: FlatGraph, nodes: list[FlatNode], touchi
         target = whole.key_of(part, edge, source=False)
         if edge.source.node >= 0 and target is not None and whole.inputs.get(target, 0) > 1:
             return f'signals of "{edge.label}" that are gone with it would have been paired with others'
+    for edge in touching:
+        if edge.target.node == LINK and whole.by_label[edge.label].target in whole.kept and not edge.is_event_edge:
+            keeps = whole.by_label[edge.label].target
+            return f'"{edge.label}" leads into group "{keeps}", whose ledger knows what has come and not what is lost'
     if whole.comes_back(part, {node.index for node in nodes}):
         return "what it sends comes back to it by way of another process"
     return ""
@@ -207,8 +217,13 @@ def _switched(flat: FlatGraph) -> set[int]:
 class _Whole:
     """The whole graph as one, of whose nodes each is known by its part and its number there."""
 
-    def __init__(self, cutting: Cutting) -> None:
+    def __init__(self, cutting: Cutting, kept: Collection[str]) -> None:
         self.cutting = cutting
+        self.kept = kept
+        has_initial = any(edge.initial for flat in cutting.parts.values() for edge in flat.edges)
+        self.why_nothing_is_inherited = (
+            "another group has a ledger" if kept else "some edge has initial values" if has_initial else ""
+        )
         self.by_label = {edge.label: edge for edge in cutting.edges}
         self._ends: dict[tuple[str, bool], _Key] = {}
         for part, flat in cutting.parts.items():

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hfg.graph import Graph
-from hfg.graph.flat import MAIN, cut, flatten
+from hfg.graph.flat import cut, flatten
 from hfg.parts.model.components import components
 from hfg.parts.model.inheriting import keeping
 from hfg.problem import Problem
@@ -20,18 +20,11 @@ def costs_of_deaths(graph: Graph) -> Iterator[Problem]:
     """Say for each connected part of each group with a process what a death costs, and what would avoid that."""
     cutting = cut(flatten(graph))
     kept = keeping(cutting)
-    has_initial = any(edge.initial for flat in cutting.parts.values() for edge in flat.edges)
-    for part, found in components(cutting).items():
-        if part == MAIN:
-            continue
+    for part, found in components(cutting, kept).items():
         for component in found:
             what, why, remedy = component.in_words()
             if part in kept:
                 what, why, remedy = "a death costs nothing", "the group has a ledger", ""
-            elif component.cost == "nothing" and (has_initial or kept):
-                what = "a death costs what was taken and not passed on; each token of it is counted"
-                why = "some edge has initial values" if has_initial else "another group has a ledger"
-                remedy = "give the group ledger=True, so that nothing is lost"
             nodes = ", ".join(component.nodes[:3]) + (
                 f" and {len(component.nodes) - 3} more" * (len(component.nodes) > 3)
             )

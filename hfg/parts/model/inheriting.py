@@ -84,8 +84,6 @@ def keeping(cutting: Cutting) -> dict[str, bool | str]:
 
 def _answering(cutting: Cutting) -> dict[str, tuple[Component, ...]]:
     """The components that would inherit positions, by part."""
-    if any(edge.initial for flat in cutting.parts.values() for edge in flat.edges):
-        return {}
     return {name: tuple(one for one in found if one.answers) for name, found in components(cutting).items()}
 
 
