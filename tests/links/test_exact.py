@@ -434,6 +434,18 @@ def test_a_consumer_has_no_more_than_its_capacity_whatever_the_producer_thinks()
     assert producer.counts.resent == 0, "credits kept it from sending what there was no room for"
 
 
+@pytest.mark.rule("L1")
+def test_a_consumer_accepts_no_more_than_its_capacity_of_a_producer_that_heeds_no_credits() -> None:
+    producer, consumer = ExactProducer(1), ExactConsumer("a", 2, capacity=3)
+    producer.admit("a")
+    settle(producer, consumer)
+    consumer.receive(write(Tokens(1, 1, 1, 1, [b""] * 2)), msgspec.msgpack.encode([b"1", b"2"]))
+    assert values(consumer) == ["1", "2"]
+    consumer.receive(write(Tokens(1, 1, 3, 2, [b""] * 3)), msgspec.msgpack.encode([b"3", b"4", b"5"]))
+    assert values(consumer) == ["3"]
+    assert consumer.counts.overrun == 2
+
+
 def test_a_life_of_a_producer_ends_without_a_word_and_the_next_goes_on() -> None:
     producer, consumer = pair()
     assert producer.close() == []

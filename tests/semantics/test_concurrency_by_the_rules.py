@@ -11,6 +11,7 @@ import threading
 from typing import Any
 
 import pytest
+from annotated_types import Interval
 
 import hfg
 from hfg import END, NO_MESSAGE
@@ -117,6 +118,52 @@ def test_silence_has_its_turn_like_everything_else(perform: Any, ordered: bool, 
         return line((2.0, 1.0), (1, None, 2), concurrency=3, ordered=ordered)
 
     assert perform(build, lambda seen: sent(seen, OUT)) == given
+
+
+class Shares(hfg.Node):
+    """Gives the value as many seconds later; its share is one at most, which a token may not know."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+    share = hfg.Parameter(0.5, Interval(ge=0, le=1))
+
+    async def process(self, value: int) -> int:
+        await asyncio.sleep(value)
+        return value
+
+
+@pytest.mark.rule("P8", "X1", "F14")
+@pytest.mark.parametrize(
+    ("options", "given"),
+    [
+        pytest.param({}, [(1, 1), (1, NO_MESSAGE), (1, NO_MESSAGE), (5, 4), (5, END)], id="one at a time"),
+        pytest.param({"concurrency": 4}, [(1, 1), (1, NO_MESSAGE), (1, NO_MESSAGE), (4, 4), (4, END)], id="in order"),
+        pytest.param(
+            {"concurrency": 4, "ordered": False},
+            [(0, NO_MESSAGE), (0, NO_MESSAGE), (1, 1), (4, 4), (4, END)],
+            id="as they are over",
+        ),
+    ],
+)
+def test_a_firing_fails_whose_token_cannot_set_a_parameter(
+    perform: Any, options: dict[str, Any], given: list[tuple[float, Any]]
+) -> None:
+    def build() -> hfg.Graph:
+        graph, shares = hfg.Graph(), Shares()
+        values, parts = graph.add(script(values=(1, 2, None, 4))), graph.add(script(values=(1, 7, 8, 0)), name="parts")
+        graph.add(shares, name="shares", on_error="skip", **options)
+        values >> shares.value
+        graph.connect(parts.out, shares.ports.parameters["share"])
+        graph.connect(shares.out, graph.add(sink(), name="sink").value)
+        return graph
+
+    def read(seen: Recorder) -> Any:
+        failed = [
+            event.number for event in seen.of(FiringEnded) if event.node == "shares" and event.outcome == "failed"
+        ]
+        return failed, len(seen.of(ErrorRaised)), sent(seen, "shares.out -> sink.value")
+
+    assert perform(build, read) == ([2, 3], 2, given)
 
 
 @pytest.mark.rule("F14", "P4", "F5")

@@ -9,17 +9,12 @@ from typing import Final, NamedTuple
 
 __all__ = ["MUTANTS", "Mutant"]
 
-_FUSED: Final = (
-    "tests/semantics/test_fused.py",
-    "tests/semantics/test_fused_threads.py",
-    "tests/semantics/test_fused_flags.py",
-    "tests/semantics/test_fused_turns.py",
-    "tests/semantics/test_fused_meddling.py",
-    "tests/semantics/test_random_graphs.py",
-    "tests/recording/test_fused.py",
-)
-_THREADS: Final = (_FUSED[1], _FUSED[4])
-_LINKS: Final = ("tests/links/test_histories.py", "tests/links/test_exact.py", "tests/links/test_bounded.py")
+_RULES: Final = ("tests/semantics/test_fused_rules.py",)
+_SENDING: Final = ("tests/semantics/test_fused.py", "-k", "not interpreted and not beside")
+_MEDDLING: Final = ("tests/semantics/test_fused_meddling.py",)
+_LOOKING: Final = ("tests/recording/test_fused.py", "-k", "not random")
+_BOUNDED: Final = ("tests/links/test_bounded.py",)
+_EXACT: Final = ("tests/links/test_exact.py",)
 
 
 class Mutant(NamedTuple):
@@ -31,7 +26,7 @@ class Mutant(NamedTuple):
       file: in which it is planted.
       old: the text that it replaces; it occurs once.
       new: what it says instead.
-      tests: where it is looked for, in this order.
+      tests: where it is looked for: files of the suite whose graphs are small enough to be read, and which of them.
     """
 
     name: str
@@ -42,12 +37,12 @@ class Mutant(NamedTuple):
     tests: tuple[str, ...]
 
 
-def _fused(name: str, rule: str, file: str, old: str, new: str) -> Mutant:
-    return Mutant(name, rule, f"hfg/engine/fusion/{file}.py", old, new, _THREADS if file == "threads" else _FUSED)
+def _fused(name: str, rule: str, file: str, old: str, new: str, tests: tuple[str, ...] = _RULES) -> Mutant:
+    return Mutant(name, rule, f"hfg/engine/fusion/{file}.py", old, new, tests)
 
 
 def _link(name: str, rule: str, file: str, old: str, new: str) -> Mutant:
-    tests = _LINKS[2:] if file == "bounded" else _LINKS
+    tests = _BOUNDED if file == "bounded" else _EXACT
     return Mutant(name, rule, f"hfg/links/{file}.py", old, new, tests)
 
 
@@ -72,6 +67,7 @@ MUTANTS: Final = (
         "writing",
         'return value if edge.mandatory else f"(d{k}_{at} if {value} is None else {value})"',
         "return value",
+        _SENDING,
     ),
     _fused(
         "an explicit modifier is lost",
@@ -79,6 +75,7 @@ MUTANTS: Final = (
         "writing",
         "if modifier is not None or stamp is not None or type(value) in _EXCEPTIONAL:",
         "if stamp is not None or type(value) in _EXCEPTIONAL:",
+        _SENDING,
     ),
     _fused(
         "an explicit stamp is lost",
@@ -100,6 +97,7 @@ MUTANTS: Final = (
         "writing",
         'say(f"v{k}_{output} = values[{output}]")',
         'say(f"v{k}_{output} = values[{len(worker.out_names) - 1 - output}]")',
+        _SENDING,
     ),
     _fused(
         "a marker calls a slot",
@@ -107,6 +105,7 @@ MUTANTS: Final = (
         "writing",
         'say(f"if {value} is not None:")\n        self.indent += 1\n        say(f"core.speaker',
         'say("if True:")\n        self.indent += 1\n        say(f"core.speaker',
+        _SENDING,
     ),
     _fused(
         "activity that a token brings to the head is not received",
@@ -121,6 +120,7 @@ MUTANTS: Final = (
         "writing",
         'stop += ["outputs.missing", "core.followers"]',
         'stop += ["outputs.missing"]',
+        _SENDING,
     ),
     _fused(
         "slots do not get their tokens first",
@@ -137,11 +137,11 @@ MUTANTS: Final = (
         "        stack[:0] = reversed(enabled)\n",
     ),
     _fused(
-        "what slots that listen while they are active hear is laid inside of a wave",
+        "of those who hear an output while they are active the first alone is sent what it sends",
         "T4",
-        "schedule",
-        "return bool(worker.listeners) and worker.listeners[output] is not None",
-        "return False",
+        "writing",
+        "for edge in listeners.who_hear():",
+        "for edge in listeners.who_hear()[:1]:",
     ),
     _fused(
         "an active member that sends over an active edge is fused",
@@ -156,6 +156,7 @@ MUTANTS: Final = (
         "region",
         "edge.held = edge.live and (to >= k or not done[to]) and edge not in silent_calls",
         "edge.held = edge.live and to >= k and edge not in silent_calls",
+        _SENDING,
     ),
     _fused(
         "what the head took is released though its outputs are not free",
@@ -177,6 +178,7 @@ MUTANTS: Final = (
         "region",
         '        self.waves += found["done"]\n',
         "",
+        _MEDDLING,
     ),
     _fused(
         "an END that was promised before the head finds nobody",
@@ -184,6 +186,7 @@ MUTANTS: Final = (
         "region",
         "elif self.ending:  # the END",
         "elif False:  # the END",
+        _LOOKING,
     ),
     _fused(
         "a flag that a call has raised is forgotten when it gives way",
@@ -198,6 +201,7 @@ MUTANTS: Final = (
         "region",
         'self.amid = "wave"',
         'self.amid = "firing"',
+        _SENDING,
     ),
     _fused(
         "those who stand behind a member do not follow at a side exit",
@@ -219,6 +223,7 @@ MUTANTS: Final = (
         "telling",
         'self._say("nth = region.waves + done + 1")',
         'self._say("nth = region.waves + done")',
+        _LOOKING,
     ),
     _fused(
         "who looks is not told what has passed before a side exit",
@@ -226,6 +231,7 @@ MUTANTS: Final = (
         "telling",
         "self.untold[k] = list(self._waiting)",
         "self.untold[k] = []",
+        _LOOKING,
     ),
     _fused(
         "the fast path of signals does not carry on activity that has left before",

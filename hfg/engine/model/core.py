@@ -240,8 +240,10 @@ class Upstairs(Protocol):
     def operator_failed(self, edge: EventEdge, error: BaseException) -> None:
         """An operator on an edge raised."""
 
-    def begin_beside(self, worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
-        """F14: a firing that has taken its tokens goes on beside others."""
+    def begin_beside(
+        self, worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
+    ) -> None:
+        """F14: a firing that has taken its tokens goes on beside others; `refused`: it fails (P8)."""
 
     def land(self, worker: Worker) -> None:
         """F14: the outputs are free: firings that are over may leave."""

@@ -35,8 +35,18 @@ def _flights(worker: Worker) -> Flights:
     return flights
 
 
-def begin(worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
-    """A firing has taken its tokens: it goes on beside those that are under way."""
+def begin(
+    worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Token[Any]], refused: Exception | None
+) -> None:
+    """A firing has taken its tokens: it goes on beside those that are under way.
+
+    Args:
+      worker: whose firing.
+      kind: what becomes of it (F4).
+      edges: from which it has taken.
+      tokens: that it has taken.
+      refused: why a parameter could not be set, so that it fails (P8); None: all could.
+    """
     flights = _flights(worker)
     stamp = worker.stamp
     assert stamp is not None
@@ -48,7 +58,11 @@ def begin(worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Toke
         flight = Flight(worker, worker.firings, stamp)
         flights.begin(flight)
         worker.crowd()
-        if kind == "silent":
+        if kind == "process":
+            _note_process(worker)
+        if refused is not None:
+            _failed(flight, refused)
+        elif kind == "silent":
             worker.fire_silently()
             flight.be_over("silent")
             flights.over(flight)
@@ -61,12 +75,16 @@ def begin(worker: Worker, kind: str, edges: Sequence[Any], tokens: Sequence[Toke
     land(worker)
 
 
-def _begin_process(flight: Flight, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
-    """F4(3): the function is run."""
-    worker = flight.worker
+def _note_process(worker: Worker) -> None:
+    """What a firing whose function is to run means to the next one."""
     firing.note_start(worker)
     if not worker.inputs.missing:  # what the next firing asks for holds already: before the calls that come now (F9)
         consider(worker)
+
+
+def _begin_process(flight: Flight, edges: Sequence[Any], tokens: Sequence[Token[Any]]) -> None:
+    """F4(3): the function is run."""
+    worker = flight.worker
     if len(worker.out_names) > len(worker.type.outputs):
         flight.parameters = dict(worker.node._parameters)
     if worker.shape.remembers:

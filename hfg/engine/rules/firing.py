@@ -124,10 +124,8 @@ def fire(worker: Worker, *, ends: bool = False) -> None:
     if modifiers:
         _receive(worker, modifiers)
     refused = _set_parameters(worker, edges, tokens)
-    if refused is not None and worker.flights is not None:
-        core.upstairs.fail(worker, f"firing {worker.firings}", refused, answer=False)
     if worker.flights is not None:
-        core.upstairs.begin_beside(worker, kind, edges, tokens)
+        core.upstairs.begin_beside(worker, kind, edges, tokens, refused)
     elif kind == "end":
         end(worker, edges, tokens)
     elif refused is not None:
