@@ -16,7 +16,7 @@ import numpy as np
 
 from hfg.encoding.arrays import ArrayHead, bytes_of, view_of
 from hfg.errors import SharedMemoryError
-from hfg.sharedmemory.layout import HEAD, LANE_SIZE, MAGIC, MOST_SLOTS, PAGE, WORDS
+from hfg.sharedmemory.layout import HEAD, LANE_SIZE, MAGIC, MOST_SLOTS, PAGE, WORDS, segment_size
 from hfg.sharedmemory.names import open_existing
 
 __all__ = ["Reader"]
@@ -42,7 +42,7 @@ class Reader:
         self.segment = segment
         self._mapped, size = _map(segment, mmap.PROT_READ)
         magic, slots, self._slot_size = HEAD.unpack_from(self._mapped) if size >= PAGE else (b"", 0, 0)
-        if magic != MAGIC or not 1 <= slots <= MOST_SLOTS or size != PAGE + slots * self._slot_size:
+        if magic != MAGIC or not 1 <= slots <= MOST_SLOTS or size != segment_size(slots, self._slot_size):
             raise SharedMemoryError(f'shared memory "{segment}" is no ring of this version of hfg')
         lane_mapped, lane_size = _map(f"{segment}.{lane}", mmap.PROT_READ | mmap.PROT_WRITE)
         if lane_size != LANE_SIZE or HEAD.unpack_from(lane_mapped)[:2] != (MAGIC, slots):

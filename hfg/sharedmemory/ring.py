@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from hfg.encoding.arrays import Lease, array_problem
 from hfg.errors import SharedMemoryError, UsageError
-from hfg.sharedmemory.layout import HEAD, LANE_SIZE, MAGIC, MOST_SLOTS, PAGE, WORDS, pages
+from hfg.sharedmemory.layout import HEAD, LANE_SIZE, MAGIC, MOST_SLOTS, PAGE, WORDS, pages, segment_size
 from hfg.sharedmemory.names import create, remove
 
 __all__ = ["Ring", "RingCounts"]
@@ -133,7 +133,7 @@ class Ring:
         self.slot_size = pages(slot_size)
         self.smallest = smallest
         self.counts = RingCounts()
-        size = PAGE + slots * self.slot_size
+        size = segment_size(slots, self.slot_size)
         self._file = create(name, size)  # kept open: its lock says that the producer lives
         self._mapped = mmap.mmap(self._file, size)
         self._generations = memoryview(self._mapped)[WORDS : WORDS + 8 * slots].cast("Q")

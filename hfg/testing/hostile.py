@@ -35,6 +35,7 @@ from hfg.values import Colour, Span
 __all__ = ["Hostile"]
 
 _SIDES: Final = (1, 1, 2, 3, 3, 4, 5, 7, 8, 9, 12, 15, 16, 17, 24, 31, 32, 33, 48, 63, 64, 65, 100)
+_SMALL: Final = (1, 2, 3, 3, 4, 5)
 _LENGTHS: Final = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 16, 24, 31, 64, 100)
 _INTEGERS: Final = (0, 1, -1, 2, 3, 5, 7, 8, 16, 31, 64, 127, 255, 256, 1000, 2**15, 2**16, 2**31 - 1, -(2**31), 2**31)
 _FAR: Final = (2**32, 2**63 - 1, -(2**63), 2**63, 2**64, 10**30)
@@ -73,6 +74,8 @@ class _Guarded:
     """
 
     SIZE: Final = 1 << 18
+    ROOM: Final = 64
+    """Bytes; what nodes for OpenCV leave behind an array."""
 
     def __init__(self) -> None:
         page = mmap.PAGESIZE
@@ -82,11 +85,13 @@ class _Guarded:
         for place in (address, address + page + self.SIZE):
             if library.mprotect(ctypes.c_void_p(place), ctypes.c_size_t(page), 0) != 0:
                 raise OSError(ctypes.get_errno(), "mprotect")
-        self._memory = np.frombuffer(self._map, np.uint8, self.SIZE, page)
+        # as memory that another library has mapped, of which nobody knows where it ends
+        self._memory = np.frombuffer(memoryview((ctypes.c_ubyte * self.SIZE).from_address(address + page)), np.uint8)
 
-    def hold(self, array: Any, *, at_end: bool) -> Any:
-        """Return a copy of an array that touches a page at its end, or at its start."""
-        start = self.SIZE - array.nbytes if at_end else 0
+    def hold(self, array: Any, *, at_end: bool, room: bool) -> Any:
+        """Return a copy of an array that touches a page at its end, or at its start, or nearly so."""
+        apart = self.ROOM if room and array.nbytes + self.ROOM <= self.SIZE else 0
+        start = self.SIZE - array.nbytes - apart if at_end else apart
         copy = self._memory[start : start + array.nbytes].view(array.dtype).reshape(array.shape)
         copy[...] = array
         return copy
@@ -261,6 +266,8 @@ class Hostile:
             return most
         if way <= 3:
             low = least if least is not None else (most - 20 if most is not None else -10)
+            if way == 3:  # what is ordinary: a few around 0
+                low = max(low, min(-10, most if most is not None else 0))
             high = min(most, low + 40) if most is not None else low + 40
             return (
                 self._random.randint(int(low), max(int(low), int(high)))
@@ -325,6 +332,8 @@ class Hostile:
     def _open_sides(self, shape: tuple[int | None, ...]) -> list[int]:
         if self.chance(2):
             return [self._one((0, 1, 5)) for _ in shape]
+        if self.chance(15):  # a kernel, which most functions want smaller than the picture
+            return [self._one(_SMALL) for _ in shape]
         if not self._same_sizes or self.chance(3):
             return [self._one(_SIDES) if number < 2 else self._one((1, 2, 3, 4)) for number in range(len(shape))]
         if shape.count(None) == 1:
@@ -399,7 +408,7 @@ class Hostile:
                 return array
             self._blocks.append(_Guarded())
         self._held += 1
-        return self._blocks[self._held - 1].hold(array, at_end=self.chance(75))
+        return self._blocks[self._held - 1].hold(array, at_end=self.chance(75), room=self.chance(60))
 
 
 _FILLS: Final = ("plain", "plain", "constant", "nan", "inf", "mixed", "tiny", "large", "far")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import json
+import mmap
 import re
 import subprocess
 import sys
@@ -20,6 +22,7 @@ from hfg import images, registry
 from hfg.catalogue import describe_type, undocumented
 from hfg.nodes import cv
 from hfg.nodes.cv import _docs, _overrides, _recipes, _stub
+from hfg.nodes.cv._room import copy_with_room, with_room
 from hfg.ports.specs import REQUIRED
 from hfg.testing import fire
 from hfg.types import accepts, compatible, describe
@@ -659,6 +662,16 @@ WITH_NAN = np.where(np.eye(6, 5) > 0, np.nan, FEW).astype(np.float32)
             {"image": np.array([[0, 2**31 - 1], [-(2**31), 0]], np.int32)},
             "find_contours: image has a number that is not within 0 and 2 ** 29",
         ),
+        (
+            cv.norm(),
+            {"src1": FEW, "mask": np.ones((2, 2), np.uint8)},
+            "norm: src1 is 6 x 5 and mask 2 x 2; they have one size",
+        ),
+        (
+            cv.normalize(),
+            {"src": FEW, "mask": np.ones((2, 2), np.uint8)},
+            "normalize: src is 6 x 5 and mask 2 x 2; they have one size",
+        ),
         (cv.check_range(), {"a": np.ones((4, 4), np.float16)}, 'input "a" of check_range: expected Array['),
     ],
 )
@@ -673,6 +686,8 @@ def test_values_that_end_the_process_are_refused(node: Any, given: Any, sentence
         (cv.put_text, {"text": "\ud800"}),
         (cv.good_features_to_track, {"min_distance": 1e30}),
         (cv.kmeans, {"criteria": (3, 1e300)}),
+        (cv.laplacian, {"scale": float("nan")}),
+        (cv.laplacian, {"scale": float("inf")}),
         (cv.hough_circles, {"param2": 1e-9}),
         (cv.fast_nl_means_denoising_multi, {"img_to_denoise_index": 2**31 - 1}),
     ],
@@ -680,3 +695,55 @@ def test_values_that_end_the_process_are_refused(node: Any, given: Any, sentence
 def test_parameters_that_end_the_process_are_refused(node: Any, parameters: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="must (be|satisfy)"):
         node(**parameters)
+
+
+# --- room around arrays ---
+
+
+def placed(memory: Any, place: int) -> Any:
+    """Give a picture of one page that begins there."""
+    found = np.frombuffer(memory, np.uint8, mmap.PAGESIZE, place).reshape(64, -1)
+    found[...] = np.arange(64)[:, None]
+    return found
+
+
+@pytest.mark.parametrize(("place", "is_copied"), [("first", True), ("second", False), ("last", True)])
+def test_an_array_at_the_end_of_a_mapping_is_copied(place: str, is_copied: bool) -> None:
+    memory = mmap.mmap(-1, 3 * mmap.PAGESIZE)
+    given = placed(memory, ["first", "second", "last"].index(place) * mmap.PAGESIZE)
+    for array in (given, given[:, ::-1], given.T):
+        found = with_room(array)
+        assert np.array_equal(found, array)
+        assert np.shares_memory(found, given) is not is_copied
+        assert with_room(found) is found or is_copied
+
+
+def test_an_array_that_others_have_mapped_is_copied_at_the_end_of_a_page() -> None:
+    memory = np.zeros(4 * mmap.PAGESIZE, np.uint8)
+    start = -memory.ctypes.data % mmap.PAGESIZE
+    foreign = (ctypes.c_char * (2 * mmap.PAGESIZE)).from_address(memory.ctypes.data + start)
+    assert not np.shares_memory(with_room(placed(foreign, 0)), memory)
+    within = placed(foreign, 0)[1:-1]
+    assert with_room(within) is within
+
+
+@pytest.mark.parametrize("rows", [0, 4])
+def test_a_copy_with_room_has_bytes_that_can_be_read_around_it(rows: int) -> None:
+    for shape in ((), (3,), (5, 4), (5, 4, 3)):
+        array = np.ones(shape, np.float32)
+        copied = copy_with_room(array, rows if shape else 0)
+        room = copied.base
+        before = copied.ctypes.data - room.ctypes.data
+        behind = room.nbytes - before - copied.nbytes
+        assert np.array_equal(copied, array)
+        assert min(before, behind) >= 64 + (rows * array[0].nbytes if shape else 0)
+
+
+def test_lists_and_arrays_that_opencv_writes_to_have_room_too() -> None:
+    memory = mmap.mmap(-1, mmap.PAGESIZE)
+    given = placed(memory, 0)
+    assert np.array_equal(fire(cv.merge(), mv=[given, given]).outputs["out"], np.dstack([given, given]))
+    before = given.copy()
+    drawn = fire(cv.circle(), img=given).outputs["out"]
+    assert np.array_equal(given, before)
+    assert not np.array_equal(drawn, before)

@@ -18,6 +18,7 @@ from hfg.encoding import ArrayHead, Lease, TokenCodec
 from hfg.errors import EncodingError, SharedMemoryError, UsageError
 from hfg.images import Image
 from hfg.sharedmemory import Reader, Ring, segment_name, segment_prefix, sweep, unavailable
+from hfg.sharedmemory.layout import MAGIC
 from hfg.token import Token
 from tests.sharedmemory import actors
 
@@ -201,11 +202,24 @@ def test_only_segments_that_the_agent_has_announced_are_opened(ring: Ring) -> No
     with pytest.raises(SharedMemoryError, match="cannot be opened .*: its producer has gone"):
         Reader(ring.name, 99, lambda name: True)
     other = SHM / segment_name(REALM, "a", 1, "strange")
-    for content in (b"", bytes(5000), b"hfgring1" + b"\xff" * 5000):
+    for content in (b"", bytes(5000), MAGIC + b"\xff" * 5000):
         other.write_bytes(content)
         with pytest.raises(SharedMemoryError, match="is not ready|is no ring of this version"):
             Reader(other.name, lane, lambda name: True)
     other.unlink()
+
+
+def test_some_bytes_can_be_read_behind_each_array_even_where_it_fills_the_last_slot(ring: Ring) -> None:
+    reader = reader_of(ring)
+    arrays = [ring.loan((4096,), np.uint8) for _ in range(3)]
+    for array in arrays:
+        assert array is not None
+        head = ArrayHead("|u1", (4096,), lease=ring.place(array))
+        view: Any = reader.view(head)
+        end = view.ctypes.data + view.nbytes
+        mapped = np.frombuffer(view.base.base, np.uint8)
+        assert end + 64 <= mapped.ctypes.data + mapped.nbytes
+        del view, mapped
 
 
 def test_what_cannot_be_made_is_said(ring: Ring) -> None:

@@ -16,6 +16,7 @@ from hfg.images import wrong_image
 from hfg.nodes._making import Port, Setting, port_name
 from hfg.nodes.cv import _overrides as overrides
 from hfg.nodes.cv._overrides import Say
+from hfg.nodes.cv._room import copy_with_room, with_room
 from hfg.types import describe_value
 
 __all__ = ["Calling", "Inlet", "Knob"]
@@ -117,7 +118,7 @@ class Calling:
                 raise TypeError(f'input "{inlet.port.name}" of {self._node}: {wrong}')
             _need_sound(self._node, inlet, value, self._deadly)
             inputs[inlet.argument] = value
-            arguments[inlet.argument] = np.copy(value) if inlet.copied else value
+            arguments[inlet.argument] = _handed(value, inlet)
         return inputs
 
     def _convert(self, arguments: dict[str, Any], inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
@@ -140,6 +141,15 @@ class Calling:
         return tuple(
             _listed(one, self._results[place]) if place in self._lists else one for place, one in enumerate(result)
         )
+
+
+def _handed(value: Any, inlet: Inlet) -> Any:
+    """Give what OpenCV may read a little beyond, and write to if it does."""
+    if isinstance(value, np.ndarray):
+        return copy_with_room(value) if inlet.copied else with_room(value)
+    if isinstance(value, list):
+        return [with_room(one) if isinstance(one, np.ndarray) else one for one in value]
+    return value
 
 
 def _listed(found: Any, kind: str) -> list[Any]:

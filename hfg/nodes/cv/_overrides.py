@@ -18,6 +18,7 @@ from hfg.encoding.pictures import need_fair_size
 from hfg.images import Color, Gray, Labels, Mask, Matrix, OneOf, Points, Rows
 from hfg.nodes._encodable import is_encodable
 from hfg.nodes._making import port_name
+from hfg.nodes.cv._room import copy_with_room
 from hfg.nodes.cv._stub import enumerations
 from hfg.ports.specs import REQUIRED
 from hfg.types import Named, Pixels, Shape
@@ -255,12 +256,9 @@ def _in_columns(value: Any, inputs: Mapping[str, Any]) -> Any:
     return np.reshape(value, (-1, 1, value.shape[-1]))
 
 
-def _with_room(value: Any, inputs: Mapping[str, Any]) -> Any:
-    """Copy an array to where something is around it: OpenCV reads some bytes more, and a row of a few pixels."""
-    beside = 64 + 4 * value.shape[-1] * (value.shape[1] if value.ndim == 3 else 1)
-    room = np.zeros(value.size + 2 * beside, value.dtype)
-    room[beside : beside + value.size] = value.reshape(-1)
-    return room[beside : beside + value.size].reshape(value.shape)
+def _among_rows(value: Any, inputs: Mapping[str, Any]) -> Any:
+    """OpenCV reads in a few rows above and below the picture."""
+    return copy_with_room(value, rows=4)
 
 
 def _painted(value: Colour, inputs: Mapping[str, Any]) -> tuple[float, ...]:
@@ -316,7 +314,7 @@ COMMON: Final[Mapping[str, Say]] = {
     "ksize": _int(3, 1, 31, odd=True),
     "blockSize": _int(3, 1, 255),
     "anchor": Say(Position, (-1, -1)),
-    "scale": _float(1.0),
+    "scale": _float(1.0, -1e15, 1e15),  # times NaN or infinity, the kernels of filters have NaN
     "delta": _float(0.0),
     "iterations": _int(1, 0, 1000),
     "normalize": Say(bool, True),
@@ -444,7 +442,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     **_each(
         ["HoughCircles", "HoughCirclesWithAccumulator"],
         {
-            "image": Say(convert=_with_room),
+            "image": Say(convert=_among_rows),
             "method": _words("HOUGH_ GRADIENT GRADIENT_ALT", "GRADIENT"),
             "dp": _float(1.0, 1.0, 10.0),
             "minDist": _float(20.0, 1.0, 32767.0),
@@ -776,7 +774,6 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
         "newImgSize": Say(Size, (0, 0)),
     },
     "getRectSubPix": {
-        "image": Say(convert=_with_room),
         "patchSize": _sizes((16, 16)),
         "center": MIDDLE,
         "patchType": _dtype("same", "same", "float32"),
@@ -838,10 +835,7 @@ FUNCTIONS: Final[Mapping[str, Mapping[str, Say]]] = {
     "minEnclosingConvexPolygon": {"points": Say(Corners), "k": _int(4, 4, 100)},  # 3 reads at address 0
     "moments": {"array": Say(ShapeOrPoints), "binaryImage": Say(bool, False)},
     "mulTransposed": {"src": Say(Matrix), "aTa": Say(bool, True), "delta": DROP},
-    "norm": {"mask": Say(Mask, convert=_with_room)},
     "normalize": {
-        "src": Say(convert=_with_room),
-        "mask": Say(Mask, convert=_with_room),
         "dst": NOTHING,
         "norm_type": _words("NORM_ INF L1 L2 MINMAX", "L2"),
     },
@@ -1099,10 +1093,11 @@ def _steps_are_in_the_picture(inputs: Mapping[str, Any], parameters: Mapping[str
 
 
 def _mask_is_alike(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
-    src, mask = inputs["src"], inputs.get("mask")
+    name = "src" if "src" in inputs else "src1"
+    src, mask = inputs[name], inputs.get("mask")
     if mask is None or src.shape[:2] == mask.shape[:2]:
         return None
-    return f"src is {_shown(src)} and mask {_shown(mask)}; they have one size"
+    return f"{name} is {_shown(src)} and mask {_shown(mask)}; they have one size"
 
 
 def _is_wide(inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> str | None:
@@ -1179,7 +1174,7 @@ _NEEDED: Final[tuple[tuple[str, Need], ...]] = (
     ("drawChessboardCorners", Need("a board that was found has more or fewer corners", _corners_fill_the_board)),
     ("triangulatePoints", Need("the cameras do not see equally many points", _points_are_pairs)),
     ("HoughLinesP", Need("rho is more than the picture", _steps_are_in_the_picture)),
-    ("minMaxLoc", _ONE_SIZE),
+    ("minMaxLoc norm normalize", _ONE_SIZE),
     ("spatialGradient", Need("the picture is one pixel wide", _is_wide)),
     ("minEnclosingTriangle", Need("the points lie almost on a line", _points_are_no_line)),
     ("validateDisparity", Need("there are disparities outside of their range", _disparities_are_of_the_range)),
