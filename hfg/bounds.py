@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from typing import Final, NamedTuple
 
-__all__ = ["BOUNDS", "CHUNK_BYTES", "FILE_BYTES", "GRAPH_FILE_BYTES", "PICTURE_PIXELS", "Bound"]
+__all__ = ["BOUNDS", "CHUNK_BYTES", "FILE_BYTES", "GRAPH_FILE_BYTES", "JSON_VALUES", "PICTURE_PIXELS", "Bound"]
 
 
 class Bound(NamedTuple):
@@ -41,6 +41,7 @@ class Bound(NamedTuple):
 CHUNK_BYTES: Final = Bound("HFG_MOST_CHUNK_BYTES", 256 * 2**20, "bytes of one chunk of a recording, unpacked")
 FILE_BYTES: Final = Bound("HFG_MOST_FILE_BYTES", 2**30, "bytes of a file, line or array that is read whole")
 GRAPH_FILE_BYTES: Final = Bound("HFG_MOST_GRAPH_FILE_BYTES", 32 * 2**20, "bytes of a graph file or .apex file")
+JSON_VALUES: Final = Bound("HFG_MOST_JSON_VALUES", 10_000_000, "values of a text of JSON, keys counted")
 PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one picture or of a frame of a video")
 
-BOUNDS: Final = (CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, PICTURE_PIXELS)
+BOUNDS: Final = (CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_VALUES, PICTURE_PIXELS)

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from hfg.bounds import BOUNDS, PICTURE_PIXELS
+import hfg
+from hfg.bounds import BOUNDS, PICTURE_PIXELS, Bound
+from hfg.encoding.pictures import need_fair_size
+from hfg.encoding.plain import json_value
+from hfg.nodes.files.reading import json_of, read_bytes
+from hfg.recording import File
+from tests.attacks.fuzzing import KINDS
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "howto" / "untrusted.md"
 
@@ -23,3 +32,60 @@ def test_a_variable_sets_a_limit_and_what_is_no_number_sets_none(
 ) -> None:
     monkeypatch.setenv(PICTURE_PIXELS.variable, said)
     assert PICTURE_PIXELS.most == most
+
+
+def _chunk(folder: Path) -> None:
+    (folder / "a.mcap").write_bytes(KINDS["recording"].samples()[0])
+    with File(folder / "a.mcap") as recording:
+        raise ValueError(str(recording.losses()))
+
+
+def _graph(folder: Path) -> None:
+    (folder / "a.hfg.yaml").write_text("hfg: 1\nname: g\nnodes: {}\n")
+    hfg.load(folder / "a.hfg.yaml")
+
+
+def _bytes(folder: Path) -> None:
+    (folder / "a").write_bytes(bytes(50))
+    read_bytes.function(folder / "a")
+
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "HFG_MOST_CHUNK_BYTES": _chunk,
+    "HFG_MOST_FILE_BYTES": _bytes,
+    "HFG_MOST_GRAPH_FILE_BYTES": _graph,
+    "HFG_MOST_JSON_VALUES": lambda folder: json_of(b"[1,2,3,4,5,6,7,8,9]", "it"),
+    "HFG_MOST_PICTURE_PIXELS": lambda folder: need_fair_size(KINDS["picture"].samples()[0], "it"),
+}
+
+
+@pytest.mark.rule("L4")
+@pytest.mark.parametrize("bound", BOUNDS, ids=lambda bound: bound.variable)
+def test_each_limit_is_kept_by_who_reads(bound: Bound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(bound.variable, "5")
+    with pytest.raises(Exception, match=f"the limit is 5; if you trust it, set {bound.variable} to a larger number"):
+        READERS[bound.variable](tmp_path)
+
+
+@pytest.mark.rule("L4")
+def test_marks_within_texts_of_json_are_no_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HFG_MOST_JSON_VALUES", "5")
+    long = b'["' + b"[,:" * 100 + b'\\\\\\"[[[[[["]'
+    assert len(json_value(long)[0]) == 308
+    with pytest.raises(ValueError, match="it has 6 values or more"):
+        json_value(b"[[],[],[" + b" " * 20 + b"]]")
+
+
+@pytest.mark.rule("L4")
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited as on Linux")
+@pytest.mark.parametrize("part", [b"[],", b"[[[]]],", b'{"":[]},', b"{},"])
+def test_no_value_of_json_costs_more_than_a_hundred_bytes(part: bytes) -> None:
+    """In a process of its own, whose memory nobody else has used."""
+    code = (
+        "from hfg.encoding.plain import json_value\n"
+        f"data = b'[' + {part!r} * 200_000 + b'0]'\nmarks = sum(map(data.count, (b'[', b'{{', b':', b',')))\n"
+        "used = lambda: int(open('/proc/self/statm').read().split()[1]) * 4096\n"
+        "before = used()\nvalue = json_value(data)\nprint((used() - before) / marks)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=100)
+    assert 10 < float(done.stdout) < 100

@@ -4,6 +4,7 @@
     codecs       what a value of a type consists of, compiled once for each type
     arrays       which arrays travel as raw bytes
     descriptions what two ends compare before the first value
+    plain        JSON of anybody, within bounds
     wire         tokens as bytes and back
 
 Whoever wants a value in a file takes `encode` and `decode`; whoever sends tokens takes `TokenCodec`.

@@ -1,19 +1,18 @@
 """Gives the text of a file that somebody has named, or a finding why there is none.
 
-Files of every kind that hold graphs are opened here, so that all are refused in the same words. Stands on `findings`.
+Files of every kind that hold graphs are opened here, so that all are refused in the same words. Stands on `findings`
+and bounds.
 """
 
 from __future__ import annotations
 
 import difflib
 from pathlib import Path
-from typing import Final
 
+from hfg.bounds import GRAPH_FILE_BYTES
 from hfg.files.findings import Findings
 
-__all__ = ["LARGEST", "bytes_of", "text_in"]
-
-LARGEST: Final = 32 * 2**20  # bytes
+__all__ = ["bytes_of", "text_in"]
 
 
 def bytes_of(path: Path, file: str, findings: Findings, *suffixes: str) -> bytes | None:
@@ -27,7 +26,7 @@ def bytes_of(path: Path, file: str, findings: Findings, *suffixes: str) -> bytes
     """
     try:
         with path.open("rb") as stream:
-            return stream.read(LARGEST + 1)
+            return stream.read(GRAPH_FILE_BYTES.most + 1)
     except IsADirectoryError:
         findings.add(file, 0, "", f"this is a folder; name a file in it that ends in {suffixes[0]}")
     except FileNotFoundError:
@@ -62,8 +61,8 @@ def text_in(data: bytes, file: str, findings: Findings, *, small: str, text: str
       small: what to do about one that is too large.
       text: what such a file is.
     """
-    if len(data) > LARGEST:
-        findings.add(file, 0, "", f"it is larger than {LARGEST // 2**20} MiB; {small}")
+    if len(data) > GRAPH_FILE_BYTES.most:
+        findings.add(file, 0, "", f"it is too large: {GRAPH_FILE_BYTES.remedy}, else {small}")
         return None
     try:
         return data.decode("utf-8-sig")

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO, Final
 import msgspec
 from mcap.records import Channel, Schema
 
+from hfg.encoding.plain import json_value
 from hfg.errors import UsageError
 from hfg.recording.chunks import Content, Damaged, content_of, unpacked
 from hfg.recording.layout import Layout, read_record
@@ -208,8 +209,8 @@ class File:
           UsageError: it is none.
         """
         try:
-            found = msgspec.json.decode(data)
-        except (msgspec.DecodeError, RecursionError, ValueError) as error:
+            found = json_value(data)
+        except (RecursionError, ValueError) as error:
             raise UsageError(f"{self.path} is damaged: a message in it is no JSON ({error})") from None
         if not isinstance(found, dict):
             raise UsageError(f"{self.path} is damaged: a message in it is no object but {str(found)[:40]!r}")

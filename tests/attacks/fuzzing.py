@@ -9,7 +9,9 @@ from __future__ import annotations
 import base64
 import itertools
 import json
+import os
 import random
+import resource
 import struct
 import sys
 import tempfile
@@ -27,8 +29,9 @@ import hfg
 from hfg.encoding.pictures import need_fair_size, size_of
 from hfg.errors import HfgError
 from hfg.files import apex
+from hfg.nodes import _structured
 from hfg.nodes.files.reading import json_of, load_image, read_array, read_arrays, read_csv
-from hfg.nodes.learning._models import model_of, text_of
+from hfg.nodes.learning._models import text_of
 from hfg.nodes.video import VideoFile
 from hfg.recording import File, recover
 from hfg.recording.tracks import Track, recorded_ports
@@ -176,6 +179,31 @@ def _models() -> list[bytes]:
     return found
 
 
+def _cascades() -> list[bytes]:
+    """One of each kind of feature, a tree in the first one."""
+    found = []
+    haar = (
+        "<rects><_>1 2 9 8 -1.</_><_>4 2 3 8 3.</_></rects>",
+        "<rects><_>8 0 3 4 1.</_></rects><tilted>1</tilted>",
+    )
+    patterns = ("<rect>0 0 4 5</rect>", "<rect>3 2 1 4</rect>")
+    for kind, categories, threshold, features in (
+        ("HAAR", 0, "0.01", haar),
+        ("LBP", 256, "1 -2 3 -4 5 -6 7 -8", patterns),
+    ):
+        tree = f"0 1 0 {threshold} -1 -2 1 {threshold}" if kind == "HAAR" else f"0 -1 1 {threshold}"
+        leaves = "0.9 -0.2 0.4" if kind == "HAAR" else "0.9 -0.2"
+        found.append(
+            '<?xml version="1.0"?>\n<opencv_storage><cascade type_id="opencv-cascade-classifier">\n'
+            f"<stageType>BOOST</stageType><featureType>{kind}</featureType><height>20</height><width>20</width>\n"
+            f"<featureParams><maxCatCount>{categories}</maxCatCount></featureParams><stageNum>1</stageNum>\n"
+            "<stages><_><maxWeakCount>1</maxWeakCount><stageThreshold>-5.</stageThreshold><weakClassifiers><_>\n"
+            f"<internalNodes>{tree}</internalNodes><leafValues>{leaves}</leafValues></_></weakClassifiers></_></stages>\n"
+            f"<features>{''.join(f'<_>{one}</_>' for one in features)}</features></cascade></opencv_storage>\n".encode()
+        )
+    return found
+
+
 # --- reading them -----------------------------------------------------------------------------------------------------
 
 
@@ -213,10 +241,29 @@ def _read_header(path: Path) -> None:
     need_fair_size(path.read_bytes(), "it")
 
 
+def _harmless(kind: str, data: bytes) -> bool:
+    """Whether a copy of this process survives reading it; faster than the new process that a graph takes."""
+    process = os.fork()
+    if not process:
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_CPU, (3, 3))
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        try:
+            _structured._TRIES[kind](data)
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    return not os.waitpid(process, 0)[1]
+
+
 def _ask_model(path: Path) -> None:
-    """What was read can be asked."""
-    model = model_of(path.read_bytes(), "it")
-    table = np.zeros((2, max(1, min(model.getVarCount(), 1000))), np.float32)
+    """What was read can be asked, whatever the samples."""
+    data = path.read_bytes()
+    if not _harmless("model", data):
+        return
+    model = _structured.model_of(data)
+    width = max(1, min(model.getVarCount(), 1000))
+    table = np.random.default_rng().normal(0, 3, (300, width)).astype(np.float32)
     with suppress(cv2.error):
         if isinstance(model, cv2.ml.RTrees):
             model.getVotes(table, 0)
@@ -224,6 +271,14 @@ def _ask_model(path: Path) -> None:
             model.findNearest(table, model.getDefaultK())
         else:
             model.predict(table)
+
+
+def _ask_cascade(path: Path) -> None:
+    data = path.read_bytes()
+    if not _harmless("cascade", data):
+        return
+    picture = np.random.default_rng().integers(0, 255, (70, 90), np.uint8)
+    _structured.cascade_of(data).detectMultiScale(picture, 1.3)
 
 
 def _read_video(path: Path) -> None:
@@ -249,6 +304,7 @@ _JSON: Final = (
 )  # fmt: skip
 _BINARY: Final = (b"\0" * 8, b"\xff" * 8, b"PK", b"'|O'", b"(99999999999,)", b"lz4", b"zstd", b"\x89MCAP0\r\n")
 
+_XML: Final = (b"<_>", b"</_>", b"<", b">", b"-1 ", b"99 ", b"2147483647 ", b".5", b"x ", b"1e99 ", b"nan ", b"<a/>")
 _TABLE: Final = (b",", b"\n", b'"', b"\0", b"\r", b"9" * 5000)
 
 KINDS: Final[dict[str, Kind]] = {
@@ -264,6 +320,7 @@ KINDS: Final[dict[str, Kind]] = {
     "picture": Kind(_pictures, _BINARY, _read_picture, native=True),
     "video": Kind(_videos, _BINARY, _read_video, native=True),
     "model": Kind(_models, _YAML, _ask_model, native=True),
+    "cascade": Kind(_cascades, _XML, _ask_cascade, native=True),
 }  # fmt: skip
 
 _SUFFIXES: Final = {"graph": ".hfg.yaml", "apex": ".apex", "recording": ".mcap", "token": ".mcap", "video": ".avi"}
@@ -330,8 +387,7 @@ def trial(kind: str, seed: int, folder: Path) -> str | None:
 
 def main(kinds: Sequence[str], first: int, count: int, progress: Path) -> int:
     """Try so many of each kind; print what is wrong."""
-    import resource
-
+    cv2.setNumThreads(1)  # threads do not outlive a fork
     for kind in kinds:
         _samples(kind)
     if sys.platform == "linux":

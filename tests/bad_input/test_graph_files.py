@@ -13,8 +13,9 @@ from typing import Any, cast
 import pytest
 
 import hfg
+from hfg.bounds import GRAPH_FILE_BYTES
 from hfg.cli import main
-from hfg.files import Document, NodeDocument, build, describe, opening, parsing, read, save, text_of
+from hfg.files import Document, NodeDocument, build, describe, parsing, read, save, text_of
 from tests.files.programs import double, numbers
 
 NUMBERS, DOUBLE = "tests.files.programs:numbers", "tests.files.programs:double"
@@ -209,8 +210,8 @@ def test_aliases_that_explode_are_refused_in_no_time(parser: str, monkeypatch: p
 
 def test_a_file_that_is_too_large_is_not_read() -> None:
     with Path("a.hfg.yaml").open("wb") as stream:
-        stream.truncate(opening.LARGEST + 1)
-    with pytest.raises(hfg.errors.FileError, match="it is larger than 32 MiB; put large data into files of its own"):
+        stream.truncate(GRAPH_FILE_BYTES.usual + 1)
+    with pytest.raises(hfg.errors.FileError, match="it is too large: the limit is 33,554,432; .* else put large"):
         hfg.load("a.hfg.yaml")
 
 

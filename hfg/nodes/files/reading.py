@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
-import msgspec
 import numpy as np
 from annotated_types import MaxLen, MinLen
 
 from hfg.bounds import FILE_BYTES
 from hfg.encoding.pictures import need_fair_size
+from hfg.encoding.plain import json_value
 from hfg.functions import node
 from hfg.images import AnyImage, Image
 from hfg.nodes._extras import require
@@ -113,8 +113,8 @@ def json_of(data: bytes, what: str) -> Any:
       ValueError: it is none.
     """
     try:
-        return msgspec.json.decode(data)
-    except (msgspec.DecodeError, ValueError, RecursionError) as error:
+        return json_value(data)
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"{what} is no JSON: {error}") from None
 
 

@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from annotated_types import Interval
 
+from hfg.encoding.plain import json_value
 from hfg.functions import node
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Output, Parameter
@@ -142,8 +143,8 @@ class ParseJson(Node):
     def process(self, text: str) -> Any:
         """Read it."""
         try:
-            return msgspec.json.decode(text)
-        except (msgspec.DecodeError, ValueError, RecursionError):
+            return json_value(text.encode())
+        except (ValueError, RecursionError):
             self.invalid.trigger(text)
             return None
 

@@ -14,6 +14,8 @@ from hfg.functions import node
 from hfg.images import Gray, Picture, Rows
 from hfg.nodes._encodable import need_encodable
 from hfg.nodes._pictures import colour, gray, need_picture, refusal
+from hfg.nodes._structured import cascade_of, need_harmless
+from hfg.nodes.files.access import read_whole
 from hfg.nodetype import Node
 from hfg.ports import Event, Input, Output, Parameter, State
 from hfg.types import Named
@@ -120,7 +122,8 @@ class CascadeDetector(Node):
         """Read the cascade."""
         shipped = Path(cv2.__file__).parent / "data"
         file = shipped / f"haarcascade_{self.cascade}.xml"
-        if not file.is_file():
+        is_shipped = file.is_file()
+        if not is_shipped:
             file = Path(self.cascade)
         if not file.is_file():
             known = ", ".join(
@@ -128,12 +131,17 @@ class CascadeDetector(Node):
             )
             raise FileNotFoundError(f'there is no cascade "{self.cascade}": name a file, or one of {known}')
         need_encodable("the path", str(file))
-        try:
+        if is_shipped:
             self.detector = cv2.CascadeClassifier(str(file))
-        except (cv2.error, SystemError):
-            self.detector = None
-        if self.detector is None or self.detector.empty():
-            raise ValueError(f'"{file}" is no cascade: it is an .xml file as opencv_traincascade writes it')
+            return
+        data = read_whole(file)
+        try:
+            need_harmless("cascade", data)
+            self.detector = cascade_of(data)
+        except ValueError as error:
+            raise ValueError(
+                f'"{file}" is no cascade ({error}): it is an .xml file as opencv_traincascade writes it'
+            ) from None
 
     def process(self, image: Picture) -> list[Box]:
         """Look for the objects."""

@@ -1,0 +1,36 @@
+"""Reads JSON of which nobody knows who wrote it (rule L4).
+
+Two bytes, `[]`, become a list of eighty: so not only the size of a text is limited, but how many values it has. Stands
+on bounds and msgspec.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+import msgspec
+
+from hfg.bounds import JSON_VALUES
+
+__all__ = ["json_value"]
+
+_TEXT: Final = re.compile(rb'"(?:[^"\\]|\\.)*+"', re.DOTALL)
+_MARKS: Final = (b"[", b"{", b":", b",")  # each comes before one value at most
+
+
+def json_value(data: bytes) -> Any:
+    """Read a value.
+
+    Raises:
+      ValueError: it is no JSON (`msgspec.DecodeError` is one), or has more values than any may have.
+      RecursionError: it has too many levels.
+    """
+    most = JSON_VALUES.most
+    if len(data) > most and _marks(data) > most and (found := _marks(_TEXT.sub(b"", data))) > most:
+        raise ValueError(f"it has {found:,} values or more, {JSON_VALUES.remedy}")
+    return msgspec.json.decode(data)
+
+
+def _marks(data: bytes) -> int:
+    return sum(map(data.count, _MARKS))
