@@ -32,6 +32,7 @@ from hfg.parts.hosts.standing import Standing
 from hfg.parts.model.agreement import Agreement, Question, Rest
 from hfg.parts.model.clocks import RunClock, machine
 from hfg.parts.model.components import components
+from hfg.parts.model.costs import uncounted
 from hfg.parts.model.failing import as_error
 from hfg.parts.model.inheriting import inherited, keeping, remembered
 from hfg.parts.model.ledgers import Entry, Ledger, ledger_of
@@ -384,7 +385,12 @@ class Distribution:
             self._asking.over(other.name)
             return
         _LOGGER.warning('the process of group "%s" is gone: %s; another begins in %g s', other.name, how, pause_s)
+        for what in self._uncounted(other.name):
+            _LOGGER.warning('group "%s": %s', other.name, what)
         other.come_back(self._bring_back(other, pause_s))
+
+    def _uncounted(self, name: str) -> tuple[str, ...]:
+        return uncounted(self._drawing.cutting, name, self._ledgers) if self._has_begun else ()
 
     def _torn_by(self, name: str) -> str:
         """Why the run cannot go on when a process is gone: joins would pair what does not belong together (L2)."""
@@ -495,11 +501,12 @@ class Distribution:
                 if not goes_on:
                     errors.append(f'the process of group "{other.name}" has not reported')
                 continue
-            if other.deaths.count:
+            if times := max(other.deaths.count, other.restarts):
                 errors.append(
-                    f'the process of group "{other.name}" was begun again {other.deaths.count} times; what it counted '
+                    f'the process of group "{other.name}" was begun again {times} times; what it counted '
                     "before is not in the report"
                 )
+                errors += [f'group "{other.name}", each time: {what}' for what in self._uncounted(other.name)]
             nodes |= _own(found.nodes, homes, other.name)
             edges |= _own(found.edges, homes, other.name)
             halves[other.name] = found.edges

@@ -286,10 +286,48 @@ def test_a_source_that_dies_begins_again_and_its_consumer_goes_on_with_what_come
     source, one = graph.add(ticks(), group="source"), graph.add(relay())
     graph.connect(source.out, one.value)
     graph.connect(one.out, graph.output("out", int))
-    found = hfg.run(graph, clock="virtual").outputs["out"]
+    report = hfg.run(graph, clock="virtual")
+    found = report.outputs["out"]
     before = found.index(1000, 1)
     assert found[:before] == [1000 + number for number in range(before)]
     assert found[before:] == [1000 + number for number in range(20)]
+    again = f'edge "ticks.out -> relay.value": its source "ticks" began again, and repeats up to {before} tokens'
+    assert again in report.errors
+
+
+class Ears(hfg.Node):
+    """Is told, and shouts."""
+
+    heard = hfg.Event(int)
+
+    @hfg.slot
+    async def hear(self) -> None:
+        await asyncio.sleep(0.01)
+        self.heard.trigger(1)
+
+
+@pytest.mark.rule("A10", "L2")
+def test_what_no_edge_counts_is_named_with_the_most_that_it_can_be(
+    killed: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    killed(at(0.1, "far"))
+    graph = hfg.Graph()
+    graph.group("far", process=True)
+    source, last = graph.add(ticks()), graph.add(relay())
+    lit, ears = graph.add(relay(), name="lit", group="far"), graph.add(Ears(), group="far")
+    graph.start.activates(lit.activate)
+    graph.connect(source.out, lit.value)
+    graph.connect(lit.out, last.value, active=True)
+    graph.connect(lit.processed, ears.hear, capacity=5)
+    graph.connect(last.out, graph.output("out", int))
+    report = hfg.run(graph, clock="virtual")
+    told = [error for error in report.errors if error.startswith('group "far", each time: ')]
+    assert [one.removeprefix('group "far", each time: ') for one in told] == [
+        "up to 2 firings and slot calls under way were lost with it",
+        "up to 5 tokens on its own edges, signals not sent yet among them, were lost with it; more if queues had grown",
+        "start was triggered in it again, with 1 signal: activity that had left it may exist once more for each",
+    ]
+    assert all(one.removeprefix('group "far", each time: ') in caplog.text for one in told)
 
 
 @pytest.mark.rule("L2", "X1")

@@ -151,7 +151,9 @@ def missing_process(flat: FlatGraph) -> Iterator[Problem]:
             path=node.path,
             severity="error" if node.index in fed else "warning",
             what=f"{kind.qualname} has inputs, but no process(), so it never fires",
-            why=f'its method {near[0]}() looks like a misspelt process()' if near else "what comes to its inputs is never taken (rules F1, F2)",
+            why=f"its method {near[0]}() looks like a misspelt process()"
+            if near
+            else "what comes to its inputs is never taken (rules F1, F2)",
             remedy="name the method that takes the inputs `process`, or make its inputs slots",
             check="missing-process",
         )

@@ -5,15 +5,15 @@ Stands on `components`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from hfg.graph import Graph
-from hfg.graph.flat import cut, flatten
+from hfg.graph.flat import LINK, ROOT, Cutting, cut, flatten
 from hfg.parts.model.components import components
 from hfg.parts.model.inheriting import keeping
 from hfg.problem import Problem
 
-__all__ = ["costs_of_deaths"]
+__all__ = ["costs_of_deaths", "uncounted"]
 
 
 def costs_of_deaths(graph: Graph) -> Iterator[Problem]:
@@ -36,3 +36,44 @@ def costs_of_deaths(graph: Graph) -> Iterator[Problem]:
                 remedy=remedy,
                 check="cost-of-death",
             )
+
+
+def uncounted(cutting: Cutting, part: str, kept: Collection[str]) -> tuple[str, ...]:
+    """Say what each death of a part may lose or repeat that no edge to another part counts, and how much at most.
+
+    Args:
+      cutting: of the graph.
+      part: which one.
+      kept: the parts with ledgers.
+    """
+    if part in kept:
+        return ()
+    flat = cutting.parts[part]
+    found = [one for one in components(cutting, kept)[part] if one.cost != "nothing"]
+    paths = {path for one in found for path in one.nodes}
+    nodes = {node.index: node for node in flat.nodes if node.path in paths}
+    said = []
+    if work := sum(node.options.concurrency for node in nodes.values()):
+        said.append(f"up to {_many(work, 'firing or slot call', 'firings and slot calls')} under way were lost with it")
+    tokens = sum(
+        edge.capacity if edge.is_event_edge else 1 + edge.buffer
+        for edge in flat.edges
+        if edge.source.node in nodes and (edge.is_event_edge or edge.target.node != LINK)  # else each is counted
+    )
+    if tokens:
+        of_what = "on its own edges, signals not sent yet among them, were lost with it; more if queues had grown"
+        said.append(f"up to {_many(tokens, 'token', 'tokens')} {of_what}")
+    if begun := sum(edge.source.node == ROOT and edge.source.name == "start" for edge in flat.edges):
+        leaves = any(edge.active and edge.target.node == LINK for edge in flat.edges)
+        again = ": activity that had left it may exist once more for each" if leaves else ""
+        said.append(f"start was triggered in it again, with {_many(begun, 'signal', 'signals')}{again}")
+    said += [
+        f'source "{one.source}" began again from its start: what it had sent is sent once more'
+        for one in found
+        if one.source
+    ]
+    return tuple(said)
+
+
+def _many(count: int, one: str, more: str) -> str:
+    return f"{count} {one if count == 1 else more}"

@@ -182,7 +182,9 @@ class Part:
             inherits = self.inherits and one.answers
             coming = {label: delays[label] for label in one.coming}
             into -= set(coming)
-            progress = Progress(one.nodes, coming, one.leaving, inherits=inherits, returns=self._returns)
+            progress = Progress(
+                one.nodes, coming, one.leaving, inherits=inherits, returns=self._returns, source=one.source
+            )
             progress.look_for_last(self.engine.core)
             yield progress
         for label in sorted(into) if self._returns else ():
@@ -359,6 +361,9 @@ class Part:
             what = f'edge "{label}": {tokens} lost with a process of {name_of(self.name)}'
         else:
             what += "; silence takes their place, so that what belongs together still meets"
+        self._report(what)
+
+    def _report(self, what: str) -> None:
         _LOGGER.warning("%s", what)
         self.engine.core.errors.append(RunError(what))
 
@@ -371,6 +376,9 @@ class Part:
         progress.begin_at(start)
         for label in progress.leaving:
             self._leave_from(label, start, progress)
+            if start > 1 and progress.source:
+                again = f'its source "{progress.source}" began again, and repeats up to {start - 1} tokens'
+                self._report(f'edge "{label}": {again}')
         for label in progress.coming:
             inlet = self.inlets[label]
             if not progress.leaving and label not in self._fresh and progress.alignment.passed_over(label):

@@ -24,6 +24,7 @@ class Progress:
     Attributes:
       inherits: what it sends inherits the positions of what comes in, and a token that came in is done when all that
         came of it is done; else it is done when it was taken.
+      source: a source in it, which each life begins from its start; "" if there is none.
       coming, leaving: its edges from and to other parts, by label.
       alignment: where it goes on.
       has_begun: it goes on from there.
@@ -38,6 +39,7 @@ class Progress:
         *,
         inherits: bool,
         returns: bool,
+        source: str = "",
     ) -> None:
         """Nothing has come yet.
 
@@ -47,9 +49,11 @@ class Progress:
           leaving: those that leave.
           inherits: see above.
           returns: the part has lived before.
+          source: a source in it; "" if there is none.
         """
         self._nodes = frozenset(nodes)
         self.inherits = inherits
+        self.source = source
         self.coming = tuple(coming)
         self.leaving = tuple(leaving)
         told_by = () if inherits else self.leaving  # what it sends again is known by its number
