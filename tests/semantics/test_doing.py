@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -12,7 +13,7 @@ import hfg
 from hfg import commands
 from hfg.catalogue import describe_type
 from hfg.testing import fire, replay
-from hfg.trace import DoEnded, DoStarted, TokenSent, TraceEvent
+from hfg.trace import DoEnded, DoStarted, RunEnded, TokenSent, TraceEvent
 from tests.semantics.nodes import Ear, activity, drive, named, numbers, of_kind, run
 
 Work = Callable[["Busy"], Coroutine[Any, Any, Any]]
@@ -107,6 +108,24 @@ async def swallows(node: Busy) -> str:
     except asyncio.CancelledError:
         node.say("swallowed")
     return "not told"
+
+
+async def fails_late(node: Busy) -> None:
+    """Fail a while after it was cancelled."""
+    try:
+        await asyncio.sleep(1e6)
+    finally:
+        await asyncio.sleep(1)
+        raise ValueError("too late")
+
+
+async def stays(node: Busy) -> None:
+    """Never end."""
+    while True:
+        try:
+            await asyncio.sleep(1e6)
+        except asyncio.CancelledError:
+            node.say("not I")
 
 
 def doing(work: Work, *cues: tuple[float, str], **options: Any) -> tuple[hfg.Graph, Busy, Ear]:
@@ -259,13 +278,6 @@ def test_the_end_of_the_run_cancels_it(fast: bool) -> None:
 
 @pytest.mark.rule("A15", "X3")
 def test_one_that_does_not_end_is_named_and_left_behind() -> None:
-    async def stays(node: Busy) -> None:
-        while True:
-            try:
-                await asyncio.sleep(1e6)
-            except asyncio.CancelledError:
-                node.say("not I")
-
     graph, _, _ = doing(stays, (0, "on"))
     with pytest.raises(hfg.errors.TeardownError, match=r'^node "node" failed in do\(\): it was cancelled and did not'):
         run(graph, until_s=1)
@@ -619,6 +631,31 @@ def test_the_oracle_says_the_same(work: Work) -> None:
     events: list[TraceEvent] = []
     run(build(), trace=events)
     replay(build, events)
+
+
+@pytest.mark.rule("A15", "X3", "R5")
+@pytest.mark.parametrize("how", ["fails", "until"])
+@pytest.mark.parametrize("work", [for_ever, fails_late, resists, swallows, stays])
+def test_so_it_does_where_the_run_ends_amid_one(work: Work, how: str) -> None:
+    """It may take its time to end, within the limit; what it says then nobody hears, though somebody is connected."""
+
+    class Fails(hfg.Node):
+        @hfg.slot
+        def hear(self) -> None:
+            raise ValueError("that is all")
+
+    def build() -> hfg.Graph:
+        graph, _, _ = doing(work, (0, "on"), (1.5, "disable_it"), (2, "enable_it"))
+        if how == "fails":
+            cue = graph["cues"]
+            graph.connect(cue.ports.events["enable_it"], graph.add(Fails(), name="fails").hear)
+        return graph
+
+    events: list[TraceEvent] = []
+    with contextlib.suppress(hfg.errors.RunError):
+        run(build(), trace=events, until_s=1 if how == "until" else None)
+    assert isinstance(events[-1], RunEnded)
+    replay(build, events, until_s=1 if how == "until" else None)
 
 
 @pytest.mark.rule("A15")

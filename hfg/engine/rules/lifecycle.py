@@ -249,7 +249,9 @@ def _afresh(worker: Worker, then: Callable[[], None]) -> None:
     host = worker.core.host
 
     def down(error: NodeError | None) -> None:
-        if error is not None:
+        if worker.core.over:  # its tasks came to their end with the run: nothing is set up any more
+            worker.core.errors += [] if error is None else [error]
+        elif error is not None:
             host.finish("failed", error)
         else:
             set_up(worker, up)

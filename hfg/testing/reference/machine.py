@@ -592,14 +592,40 @@ class ReferenceMachine(Rings):
         self.outcome = outcome
         if outcome == "stalled":
             self.error = Stalled(f"nothing can move any more: {', '.join(self.stalled())}")
+        self.end_code()
+        ended = self.close()
+        torn_down = [self.tear_down_at_last(station) for station in reversed(self.stations)]
         for line in self.lines if outcome in ("stopped", "until") else ():
             for lying in line.queue:
                 self.observe(TokenDropped(self.now, line.edge.label, lying.token, "stopped"))
-        ended = self.close()
-        torn_down = [self.tear_down_at_last(station) for station in reversed(self.stations)]
         if not (ended and all(torn_down)) and outcome in ("done", "stopped", "until"):
             self.outcome = "failed"
         self.observe(RunEnded(self.now, self.outcome))
+
+    def end_code(self) -> None:
+        """X3: all code under way is cancelled and may take its time, within one limit for all of it."""
+        until = self.now + TEARDOWN_LIMIT_S
+        code: dict[Flight | Task, Any] = {}
+        for station in self.stations:
+            code |= {flight: flight.task for flight in station.flights if flight.task is not None}
+            code |= {task: task.code for task in station.tasks}
+            for task in station.tasks:
+                task.cancelled = True
+        with self.amid_code():
+            for one in code.values():
+                one.cancel()
+        while not all(one.done() for one in code.values()):
+            turn = next((owner for owner in self.loop.owners_in_turn() if owner in code), None)
+            if turn is not None:
+                with self.amid_code():
+                    self.loop.step(turn)
+                continue
+            times = [self.loop.next_time_of(owner) for owner in code]
+            due = min((time for time in times if time is not None), default=until + 1)
+            self.now = min(until, max(self.now, round(due, 9)))
+            if due > until:
+                return
+            self.loop.ring()
 
     def tear_down_at_last(self, station: Station) -> bool:
         """X3: in the reverse order of setup, each within its time limit; whether it went well."""

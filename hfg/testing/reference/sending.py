@@ -144,6 +144,8 @@ class Sending(State):
         Raises:
           QueueOverflow: an edge with policy "error" is full; nothing was sent.
         """
+        if self.outcome is not None:
+            return  # code that is ended with the run speaks to nobody any more
         value, activity, stamp = passed_on(value, activity, stamp)
         if stamp is None:
             stamp = self.now if flight is None else flight.stamp
