@@ -5,12 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hfg.engine import Run
 from hfg.engine.face.composition import Composition
 from hfg.graph import Graph
+from hfg.graph.editing.commands import Rule
 from hfg.graph.flat import FlatGraph
 
 if TYPE_CHECKING:
@@ -42,6 +45,16 @@ def _distribute(
     return distribute(graph, flat, options, virtual=virtual, settings=settings)
 
 
+def _refusal(modules: Iterable[str], types: Iterable[str], allow: Iterable[str]) -> str | None:
+    """Stand behind `commands.Rule`: they are as a graph file in the working directory."""
+    from hfg.files.allowed import Allowed
+
+    allowed = Allowed(Path("commands").absolute(), allow, 'hfg.commands.decode(..., allow=["{top}"])')
+    found = itertools.chain(map(allowed.refusal, modules), map(allowed.refusal_of_type, types))
+    return next(filter(None, found), None)
+
+
+Rule.refusal = staticmethod(_refusal)
 Composition.distribute = staticmethod(_distribute)
 Run._recorder = staticmethod(_record)
 Run._reporter = staticmethod(_report_page)

@@ -19,6 +19,7 @@ from typing import Final
 __all__ = ["Allowed", "installed_packages", "project_of"]
 
 _ALWAYS: Final = ("hfg", "reactivex.operators")
+_REMEDY: Final = '--allow {top} or hfg.load(..., allow=["{top}"])'
 _MARK: Final = "pyproject.toml"
 
 
@@ -42,15 +43,21 @@ def installed_packages() -> tuple[str, ...]:
 class Allowed:
     """What one file, and those it includes, may import.
 
+    Args:
+      file: the one.
+      extra: packages that are allowed.
+      remedy: how they are allowed, with the package as {top}.
+
     Attributes:
       project: the folder in which modules that are allowed are looked for, and in which included files lie.
       wanted: the modules that were refused, in order, as they would be allowed.
     """
 
-    def __init__(self, file: Path, extra: Iterable[str] = ()) -> None:
+    def __init__(self, file: Path, extra: Iterable[str] = (), remedy: str = _REMEDY) -> None:
         self.project = project_of(file)
         self._folder = file.resolve().parent
         self._extra = tuple(extra)
+        self._remedy = remedy
         self.wanted: dict[str, None] = {}
 
     def refusal(self, module: str) -> str | None:
@@ -73,8 +80,8 @@ class Allowed:
         self.wanted[top] = None
         return (
             f'module "{module}" is not one that this file may import, as a file alone must not run code (it would come '
-            f"from {_place(spec, folder, top)}); if you trust it allow it, with --allow {top} or "
-            f'hfg.load(..., allow=["{top}"])'
+            f"from {_place(spec, folder, top)}); if you trust it allow it, with "
+            f"{self._remedy.format(top=top)}"
         )
 
     def refusal_of_type(self, text: str) -> str | None:

@@ -75,6 +75,37 @@ def test_an_address_at_which_nobody_proves_who_he_is(alone: Path, capsys: pytest
     assert '"tcp/127.0.0.1:7447" is open: whoever connects there' in capsys.readouterr().err
 
 
+@pytest.mark.rule("L5")
+@pytest.mark.parametrize(
+    "verb",
+    [
+        ["agent"],
+        ["run", "robot.py"],
+        ["ps"],
+        ["deploy", "robot.py"],
+        ["logs", "robot"],
+        ["stop", "robot"],
+        ["restart", "robot/far"],
+        ["top", "robot"],
+    ],
+    ids=lambda verb: verb[0],
+)
+def test_each_verb_says_in_which_file_an_open_address_would_be_allowed(
+    alone: Path, capsys: pytest.CaptureFixture[str], verb: list[str]
+) -> None:
+    (alone.parent / "robot.py").write_text(
+        "import hfg\nfrom hfg.testing.nodes import Script\ngraph = hfg.Graph()\n"
+        "graph.group('far', host='arm')\ngraph.add(Script(count=1), group='far')\n"
+    )
+    alone.write_text('connect = ["tcp/127.0.0.1:7447"]\n')
+    arguments = [one.replace("robot.py", str(alone.parent / "robot.py")) for one in verb]
+    assert main([*arguments, "--settings", str(alone)]) in (1, 2)
+    said = capsys.readouterr().err
+    assert '"tcp/127.0.0.1:7447" is open: whoever listens there' in said
+    assert f"{alone}:1:" in said
+    assert "or insecure = true if all of them are to be trusted" in said
+
+
 def test_a_folder_for_logs_that_cannot_be(alone: Path) -> None:
     file = alone.parent / "file"
     file.touch()

@@ -6,11 +6,12 @@ A command can be logged, sent over a wire and carried out again: `encode` and `d
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import msgspec
 
+from hfg.encoding import TAG
 from hfg.errors import GraphError
 from hfg.graph.structure.options import DEFAULT_CAPACITY, Overflow, Policy
 
@@ -40,11 +41,13 @@ __all__ = [
     "RemoveGroup",
     "Rename",
     "Replace",
+    "Rule",
     "SetEdge",
     "SetParameter",
     "Ungate",
     "decode",
     "encode",
+    "read",
 ]
 
 
@@ -373,8 +376,70 @@ def encode(commands: Iterable[Command]) -> str:
         raise GraphError(f"commands are plain data, and these hold something else: {error}") from error
 
 
-def decode(data: str | bytes) -> Sequence[AnyCommand]:
+class Rule:
+    """What commands may have imported. It is that of graph files, which stands on an upper floor: see composing."""
+
+    refusal: Callable[[Iterable[str], Iterable[str], Iterable[str]], str | None]
+    """Of modules, of types as texts, and what is allowed beside; says why one must not be imported, or None."""
+
+
+def decode(data: str | bytes, *, allow: Iterable[str] = ()) -> Sequence[AnyCommand]:
     """Read commands that `encode` wrote, or somebody else.
+
+    They import what they name when they are applied. So they name only what a graph file may: modules of hfg, of
+    packages with node types, what is imported already, and what is allowed here.
+
+    Args:
+      data: one line of JSON.
+      allow: further packages whose code they may run.
+
+    Raises:
+      GraphError: it is no JSON, or no command, which the message says where; or they name another module.
+    """
+    commands = read(data)
+    references = [one for command in commands for one in (*_references(command), *_in_values(command))]
+    types = [text for command in commands for text in _types(command)]
+    why = Rule.refusal([one.partition(":")[0] for one in references], types, allow)
+    if why is not None:
+        raise GraphError(f"these commands are refused: {why}")
+    return commands
+
+
+def _references(command: AnyCommand) -> list[str]:
+    if isinstance(command, Add | Replace):
+        return [command.type]
+    if isinstance(command, Connect | SetEdge) and isinstance(command.through, tuple):
+        return [one.type for one in command.through]
+    return []
+
+
+def _in_values(command: AnyCommand) -> Iterator[str]:
+    """What values name that say their type: `{"$type": "object", "class": "my_robot.types:Pose", ...}`."""
+    left = [msgspec.to_builtins(command)]
+    while left:
+        one = left.pop()
+        if isinstance(one, dict):
+            if TAG in one:
+                yield from (text for text in one.values() if isinstance(text, str) and ":" in text)
+            left += one.values()
+        elif isinstance(one, list | tuple):
+            left += one
+
+
+def _types(command: AnyCommand) -> list[str]:
+    if isinstance(command, AddInput | AddOutput):
+        return [command.type]
+    if isinstance(command, AddSubgraph):
+        return [
+            text
+            for ports in (command.inputs, command.outputs, command.events, command.slots)
+            for text in ports.values()
+        ]
+    return []
+
+
+def read(data: str | bytes) -> Sequence[AnyCommand]:
+    """Read commands of somebody who may run any code here anyway.
 
     Raises:
       GraphError: it is no JSON, or no command; the message says where.

@@ -21,7 +21,7 @@ from hfg.engine.model.worker import Worker
 from hfg.engine.observing.report import edge_reports, node_reports
 from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
-from hfg.graph.editing.commands import decode
+from hfg.graph.editing.commands import read
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.parts.model.failing import as_failed
 from hfg.parts.model.messages import Call, Failed, Message, Parcel, Result, Seen, Sight
@@ -89,11 +89,11 @@ class Serving:
             "tap": self._tap,
             "more": self._more,
             "leave": self._leave,
-            "edit": lambda commands, empties: self._edit(partial(edits.edit_now, decode(commands)), empties),
+            "edit": lambda commands, empties: self._edit(partial(edits.edit_now, read(commands)), empties),
             "undo": lambda empties: self._edit(edits.undo_now, empties),
             "redo": lambda empties: self._edit(edits.redo_now, empties),
-            "try_edit": lambda commands: try_to_draw(graph, decode(commands)),
-            "draw_edit": lambda commands: self._draw(partial(draw, graph, decode(commands))),
+            "try_edit": lambda commands: try_to_draw(graph, read(commands)),
+            "draw_edit": lambda commands: self._draw(partial(draw, graph, read(commands))),
             "draw_undo": lambda: self._draw(partial(draw_undo, graph)),
             "draw_redo": lambda: self._draw(partial(draw_redo, graph)),
         }

@@ -12,7 +12,7 @@ from typing import Any
 
 from hfg.graph.editing import history_of, prepare
 from hfg.graph.editing.changes import Change, EdgeChange, NodeSwap, OptionsChange, ParameterChange, undo_all
-from hfg.graph.editing.commands import decode
+from hfg.graph.editing.commands import read
 from hfg.testing.reference.calls import Calling
 from hfg.testing.reference.state import Line, Station, fresh
 from hfg.testing.reference.structure import ROOT, Edge, End, Structure, boundary_of, is_box, whole
@@ -76,7 +76,7 @@ class Editing(Calling):
                 change.do()
             history.redo_done()
             return transaction.changes
-        transaction = prepare(self.graph, decode(what), check=False)
+        transaction = prepare(self.graph, read(what), check=False)
         history.note(transaction)
         return transaction.changes
 

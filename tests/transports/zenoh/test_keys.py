@@ -112,6 +112,18 @@ async def test_to_go_without_a_proof_is_said_at_each_start(open_one: Open, caplo
     )
 
 
+async def test_to_take_anybody_without_a_certificate_is_said_at_each_start(
+    open_one: Open, caplog: pytest.LogCaptureFixture, address: str, certificates: Any
+) -> None:
+    tls = certificates.tls("agent", mutual=False)
+    for _ in range(2):
+        session = await open_one(mode="router", listen=(address,), tls=tls, insecure=True)
+        await session.close()
+    said = [one.getMessage() for one in caplog.records if "insecure" in one.getMessage()]
+    what = "so whoever can connect there can run code as this user"
+    assert said == [f'insecure: nobody proves who he is at "{address}", {what}'] * 2
+
+
 async def test_a_local_socket_in_a_folder_that_others_can_enter_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "open"
     folder.mkdir()

@@ -348,9 +348,11 @@ def _wrong_access(settings: Settings, access: Access) -> list[SettingsProblem]:
 
 
 def open_addresses(settings: Settings) -> list[str]:
-    """Return the addresses at which nobody proves who he is."""
+    """Return the addresses at which whoever connects proves nothing."""
     named = (*settings.listen, *settings.agents, *settings.connect, *settings.meet)
-    return [address for address in dict.fromkeys(named) if address.startswith("tcp/")]
+    is_one_sided = settings.tls is not None and not settings.tls.mutual
+    open_ones = ("tcp/", "tls/") if is_one_sided else ("tcp/",)
+    return [address for address in dict.fromkeys(named) if address.startswith(open_ones)]
 
 
 def is_loopback(address: str) -> bool:

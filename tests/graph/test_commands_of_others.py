@@ -1,0 +1,56 @@
+"""Commands that somebody else wrote import no code but that which a graph file may (rule L4)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hfg
+from hfg.errors import GraphError
+
+pytestmark = pytest.mark.rule("L4")
+
+COMMANDS: list[dict[str, Any]] = [
+    {"do": "Add", "type": "arm_of_others:Arm", "path": "arm"},
+    {"do": "Replace", "path": "arm", "type": "arm_of_others:Arm"},
+    {"do": "AddInput", "name": "a", "type": "list[arm_of_others.Pose]"},
+    {"do": "AddSubgraph", "path": "box", "events": {"a": "arm_of_others.Pose"}},
+    {"do": "Connect", "source": "a.b", "target": "c.d", "through": [{"type": "arm_of_others:smoothed"}]},
+    {"do": "SetEdge", "source": "a.b", "target": "c.d", "through": [{"type": "arm_of_others:smoothed"}]},
+    {
+        "do": "SetParameter",
+        "path": "a.b",
+        "value": [{"$type": "object", "class": "arm_of_others:Pose", "fields": {}}],
+    },
+]
+
+
+@pytest.fixture(autouse=True)
+def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One beside the program that nobody has imported, and that tells when somebody does."""
+    (tmp_path / "arm_of_others.py").write_text("raise RuntimeError('it ran')\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command["do"])
+def test_a_command_that_names_the_code_of_others_is_refused_before_it_is_applied(command: dict[str, Any]) -> None:
+    with pytest.raises(GraphError, match=r'hfg.commands.decode\(..., allow=\["arm_of_others"\]\)'):
+        hfg.commands.decode(json.dumps([command]))
+    assert "arm_of_others" not in sys.modules
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command["do"])
+def test_what_is_allowed_is_read(command: dict[str, Any]) -> None:
+    assert hfg.commands.decode(json.dumps([command]), allow=["arm_of_others"])
+
+
+def test_types_of_hfg_need_no_leave() -> None:
+    graph = hfg.Graph()
+    text = '[{"do":"Add","type":"hfg.nodes.values.constants:ConstantInt","path":"a"}]'
+    graph.edit(*hfg.commands.decode(text))
+    assert list(graph.nodes) == ["a"]
