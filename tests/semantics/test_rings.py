@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
 import pytest
 from reactivex import operators as ops
 
 import hfg
+from hfg.graph import commands as c
 from hfg.testing import reference_run
+from hfg.testing.conformance import Replay
 from hfg.testing.making import Allowed, random_plan
 from hfg.testing.plans import GraphPlan, NodePlan
-from hfg.trace import QueueGrown
+from hfg.trace import QueueGrown, RunEnded, TokenDropped, TraceEvent
 from tests.semantics.nodes import Clock, Ear, Keep, Ringing, add, drive, of_kind, run, traced
 from tests.semantics.test_random_graphs import check, reference
 
@@ -310,6 +312,161 @@ def test_nothing_grows_while_the_run_is_paused() -> None:
         return before, gate.heard
 
     assert drive(main) == (0, 40)
+
+
+# --- rings that something closes ---
+
+
+class Pump(hfg.Node):
+    """Sends one thing often, and another when that is through."""
+
+    many = hfg.Event(int)
+    once = hfg.Event(int)
+
+    def setup(self) -> None:
+        self.start_soon(self.pump())
+
+    async def pump(self) -> None:
+        for number in range(5):
+            await self.many.trigger_wait(number)
+        self.once.trigger(7)
+
+
+class Between(hfg.Node):
+    """Hands on what comes, which is nothing."""
+
+    value = hfg.Input(int)
+    out = hfg.Output(int)
+
+    def process(self, value: int) -> int:
+        return value
+
+
+class Late(hfg.Node):
+    """Speaks once, after a while."""
+
+    now = hfg.Event(int)
+
+    def setup(self) -> None:
+        self.start_soon(self.speak())
+
+    async def speak(self) -> None:
+        await asyncio.sleep(0.06)
+        self.now.trigger(1)
+
+
+def opened(slot: str) -> hfg.Graph:
+    """Would be a ring, were it not for `between`, which waits for somebody whose code goes on for ever."""
+    graph = hfg.Graph()
+    pump, join, relay = graph.add(Pump(), name="pump"), graph.add(add(), name="join"), graph.add(Ear(), name="relay")
+    never, between = graph.add(waits_for_ever(), name="never"), graph.add(Between(), name="between")
+    graph.connect(pump.many, join.a, capacity=2)
+    graph.connect(pump.once, relay.hear)
+    first = graph.add(Between(), name="first")  # an edit of its edges need not wait for that code
+    graph.connect(never.out, first.value)
+    graph.connect(first.out, between.value)
+    graph.connect(between.out, relay.hear)
+    graph.connect(relay.passed, join.b)
+    graph.connect(join.out, graph.add(Keep(), name="keep").value)
+    a_task(graph)
+    if slot:
+        graph.connect(graph.add(Late(), name="late").now, between.ports.slots[slot])
+    return graph
+
+
+async def close_by_edit(run: hfg.Run, *edit: c.Command) -> None:
+    await run.edit(*edit)
+
+
+async def close_by_itself(run: hfg.Run) -> None:
+    await asyncio.sleep(0.01)
+
+
+async def close_while_paused(run: hfg.Run) -> None:
+    run.pause()
+    await run.edit(c.Disable("between"))
+    await asyncio.sleep(0.1)
+    assert run.report().edges["pump.many -> join.a"].grown == 0
+    run.resume()
+
+
+CLOSE: dict[str, Callable[[hfg.Run], Awaitable[None]]] = {
+    "an edge is removed": lambda run: close_by_edit(run, c.Disconnect("between.out", "relay.hear")),
+    "a node is removed": lambda run: close_by_edit(run, c.Remove("between")),
+    "a node is disabled": lambda run: close_by_edit(run, c.Disable("between")),
+    "a node is replaced": lambda run: close_by_edit(
+        run, c.Disconnect("first.out", "between.value"), c.Replace("between", "hfg.testing.nodes:double")
+    ),
+    "an edge comes to lead elsewhere": lambda run: close_by_edit(
+        run, c.Disconnect("relay.passed", "join.b"), c.Connect("pump.once", "join.b")
+    ),
+    "disable": close_by_itself,  # the slot
+    "it is disabled in a pause": close_while_paused,
+}
+
+
+@pytest.mark.rule("F8", "R4", "F10", "R3")
+@pytest.mark.parametrize("how", CLOSE)
+def test_a_ring_grows_when_what_opened_it_is_gone(how: str) -> None:
+    """Beside what lives on, and so the graph is never quiet; at the moment at which the ring closes."""
+    trace: list[TraceEvent] = []
+    slot = how if CLOSE[how] is close_by_itself else ""
+
+    async def main() -> tuple[Any, list[int], int]:
+        async with asyncio.timeout(10), hfg.running(opened(slot), trace=trace) as run:
+            await asyncio.sleep(0.05)
+            before = run.report().edges["pump.many -> join.a"].grown
+            await CLOSE[how](run)
+            await asyncio.sleep(0)
+            await asyncio.sleep(0.001)
+            keep: Any = run.graph["keep"]
+            values = list(keep.values)
+            run.stop()
+        return before, values, run.report().edges["pump.many -> join.a"].grown
+
+    assert drive(main) == (0, [7], 4)
+    replaying = Replay(opened(slot), held_open=True)
+    for event in trace if CLOSE[how] is not close_while_paused else ():  # of which a trace does not tell
+        if isinstance(event, RunEnded) or (isinstance(event, TokenDropped) and event.reason == "stopped"):
+            break
+        replaying.see(event)
+    replaying.machine.close()
+
+
+class Slowly(hfg.Node):
+    """Asks often; an edit waits for it meanwhile."""
+
+    many = hfg.Event(int)
+    once = hfg.Event(int)
+
+    @hfg.slot
+    async def begin(self) -> None:
+        for number in range(5):
+            await self.many.trigger_wait(number)
+        self.once.trigger(7)
+
+
+@pytest.mark.rule("F8", "R4")
+def test_a_ring_grows_whose_nodes_an_edit_waits_for() -> None:
+    """The edit waits for the code of one and holds the other: nothing but a longer queue lets it go on."""
+
+    async def main() -> list[int]:
+        graph = hfg.Graph()
+        asks, join, keep = graph.add(Slowly(), name="asks"), graph.add(add(), name="join"), graph.add(Keep())
+        graph.connect(graph.input("go", int), asks.begin)
+        graph.connect(asks.many, join.a, capacity=2)
+        graph.connect(asks.once, join.b)
+        graph.connect(join.out, keep.value)
+        a_task(graph)
+        async with hfg.running(graph) as run:
+            await asyncio.sleep(0.05)
+            await run.trigger(asks.begin)
+            async with asyncio.timeout(1):
+                await run.edit(c.Rename("asks", "asked"), c.Disconnect("join.out", f"{keep.place.path}.value"))
+            run.stop()
+        return keep.values
+
+    drive(main)
 
 
 # --- random graphs ---
