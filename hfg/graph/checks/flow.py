@@ -8,6 +8,7 @@ from __future__ import annotations
 import dis
 from collections import deque
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from types import CodeType
 
 from hfg.graph.checks.endless import endless
@@ -282,8 +283,12 @@ def _may_trigger_often(flat: FlatGraph, edge: FlatEdge) -> bool:
 
 
 def _has_loop(code: CodeType) -> bool:
-    names = (instruction.opname for instruction in dis.get_instructions(code))
-    return any("JUMP_BACKWARD" in name and not name.endswith("NO_INTERRUPT") for name in names)  # which is an await's
+    """Whether it jumps back, but for an await: that does so itself, and in Python 3.12 behind what cleans up after it."""
+    names = ["", *(instruction.opname for instruction in dis.get_instructions(code))]
+    return any(
+        "JUMP_BACKWARD" in name and not name.endswith("NO_INTERRUPT") and before != "CLEANUP_THROW"
+        for before, name in pairwise(names)
+    )
 
 
 def _listed(edges: list[FlatEdge]) -> str:
