@@ -283,7 +283,7 @@ def _may_trigger_often(flat: FlatGraph, edge: FlatEdge) -> bool:
 
 
 def _has_loop(code: CodeType) -> bool:
-    """Whether it jumps back, but for an await: that does so itself, and in Python 3.12 behind what cleans up after it."""
+    """Whether it jumps back, but for an await, which jumps itself, and in Python 3.12 behind its clean-up."""
     names = ["", *(instruction.opname for instruction in dis.get_instructions(code))]
     return any(
         "JUMP_BACKWARD" in name and not name.endswith("NO_INTERRUPT") and before != "CLEANUP_THROW"
