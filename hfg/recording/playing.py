@@ -221,6 +221,7 @@ def play_into(
         recorded = recorded_ports(recording)
         spoke, beside = _spoke(recording)
         playing.gaps = _gaps(recording)
+        uncounted = _with_one_output(recording) if recording.losses_met() else []
     sending, fed = _sorted(graph, path, recorded, ports or {})
     edit = _feed(graph, path, recorded, fed, speed, playing)
     if sending or not fed:
@@ -228,6 +229,7 @@ def play_into(
         how = _How(speed, pickle, playing)
         edit += _replace(graph, path, _Recorded(own, spoke, beside, sending), how)
     graph.edit(*edit)
+    playing.gaps += _misaligned(uncounted, playing.played)
     for sentence in playing.warnings:
         _LOGGER.warning("%s", sentence)
     return playing
@@ -240,6 +242,23 @@ def _unnumbered(recording: File) -> list[str]:
     outputs = [one for one in recorded_ports(recording).values() if one.metadata.get("kind") == "output"]
     nodes = Counter(one.metadata.get("node", "") for one in outputs)
     return [node for node, count in nodes.items() if node and count > 1]
+
+
+def _with_one_output(recording: File) -> list[str]:
+    """Nodes of which one output was recorded, so that its tokens have no numbers."""
+    outputs = [one for one in recorded_ports(recording).values() if one.metadata.get("kind") == "output"]
+    return [node for node, count in Counter(one.metadata.get("node", "") for one in outputs).items() if count == 1]
+
+
+def _misaligned(uncounted: list[str], played: Mapping[str, str]) -> list[str]:
+    """What a join may meet behind a loss, where several nodes are played, and firings of some have no numbers."""
+    nodes = {port.rpartition(".")[0] for port in played}
+    return [
+        f'firings of "{node}" have no numbers in the recording, as one output of it was recorded: those that are lost '
+        "are not played as silence, and what comes later may meet other tokens in a join"
+        for node in uncounted
+        if node in nodes and len(nodes) > 1
+    ]
 
 
 def _gaps(recording: File) -> list[str]:

@@ -23,6 +23,7 @@ from hfg.types import accepts, describe
 __all__ = ["Record", "Step", "Track", "recorded_ports"]
 
 _PROCESSED = "processed"
+_MOST_LOST: Final = 100_000  # firings; more are not believed, for anybody can write a number
 
 
 class Record(msgspec.Struct):
@@ -155,8 +156,26 @@ class Track:
         self._has_outputs = "output" in kinds
 
     def firings(self) -> Iterator[Step]:
-        """Go through the firings."""
-        return (step for step in self._steps() if step.fires)
+        """Go through the firings; those that a damaged file has lost are silence, as far as they are known by numbers.
+
+        So what comes later meets in a join what it met.
+        """
+        last: Step | None = None
+        for step in self._steps():
+            if step.fires:
+                yield from self._lost_between(last, step)
+                last = step if step.number else None
+                yield step
+
+    def _lost_between(self, last: Step | None, step: Step) -> Iterator[Step]:
+        """Those of which nothing was read, between two firings, or before the first one; evenly in that time."""
+        before, began = (last.number, last.when) if last is not None else (0, self.began)
+        lost = step.number - before - 1
+        if lost < 1 or lost > _MOST_LOST or not self._file.losses_met():
+            return
+        for number in range(1, lost + 1):
+            when = min(began + (step.began - began) * number / (lost + 1), step.began)
+            yield Step(when, when, fires=True, number=before + number)
 
     def others(self) -> Iterator[Step]:
         """Go through what else there was: slot calls, and signals beside them."""

@@ -18,7 +18,7 @@ import hfg
 from hfg.cli.app import main
 from hfg.errors import HfgError, UsageError
 from hfg.nodes.recordings import Playback
-from hfg.recording import File, RecordingInfo, play_into, recover
+from hfg.recording import File, RecordingInfo, play_into, record, recover, writing
 from hfg.recording.layout import Layout
 from hfg.recording.reading import RawMessage
 from hfg.recording.values import CannotKeep, Codec
@@ -316,3 +316,76 @@ def test_a_message_that_is_no_token_is_a_sentence(tmp_path: Path, value: str) ->
     with pytest.raises(HfgError, match="is damaged: a message in it|a value of .* cannot be read as") as caught:
         hfg.run(graph, clock="virtual")
     assert isinstance(caught.value.__cause__, UsageError)
+
+
+class Pairs(hfg.Node):
+    """Sends multiples of a number by two outputs; a recording of that numbers its firings."""
+
+    factor = hfg.Parameter(1)
+    left = hfg.Output(int)
+    right = hfg.Output(int)
+    sent = hfg.State(0)
+
+    def process(self) -> None:
+        """Send the next one."""
+        if self.sent == 40:
+            raise hfg.EndOfStream
+        self.sent += 1
+        self.left.send(self.sent * self.factor)
+        self.right.send(-self.sent * self.factor)
+
+
+@hfg.node
+def quotient(one: int, other: int) -> float:
+    """Tells whether two tokens belong together."""
+    return other / one
+
+
+def joined() -> hfg.Graph:
+    graph = hfg.Graph()
+    one, other, far = graph.add(Pairs(), name="one"), graph.add(Pairs(factor=7), name="other"), graph.add(quotient())
+    graph.connect(one.left, far.one)
+    graph.connect(other.right, far.other)
+    sums = graph.add(quotient(), name="near")
+    graph.connect(one.right, sums.one)
+    graph.connect(one.left, sums.other)
+    graph.connect(other.left, graph.output("spare", int))
+    graph.connect(far.out, graph.output("out", float))
+    graph.connect(sums.out, graph.output("near", float))
+    return graph
+
+
+@pytest.mark.parametrize("number", range(1, 7))
+def test_sources_stay_aligned_behind_a_chunk_that_is_lost(
+    tmp_path: Path, written: Written, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    """Firings that are lost are silence, as far as the numbers of others tell."""
+    monkeypatch.setattr(writing, "_CHUNK_MESSAGES", 17)
+    monkeypatch.setattr(writing, "_BATCH", 17)
+    first = hfg.run(joined(), clock="virtual", begin=lambda run: record(run, tmp_path / "run.mcap"))
+    assert first.outputs["out"] == [-7.0] * 40
+    data = (tmp_path / "run.mcap").read_bytes()
+    graph = joined()
+    playing = play_into(graph, written(flipped(data, in_a_chunk(data, number))), speed=None)
+    assert "is damaged" in playing.gaps[0]
+    report = hfg.run(graph, clock="virtual")
+    assert report.outcome == "done"
+    assert 0 < len(report.outputs["out"]) < 40
+    assert set(report.outputs["out"]) == {-7.0}
+    assert set(report.outputs["near"]) == {-1.0}
+
+
+def test_sources_of_one_output_have_no_numbers_and_that_is_said(
+    tmp_path: Path, written: Written, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writing, "_CHUNK_MESSAGES", 17)
+    monkeypatch.setattr(writing, "_BATCH", 17)
+    hfg.run(joined(), clock="virtual", begin=lambda run: record(run, tmp_path / "run.mcap", select=["*.left"]))
+    data = (tmp_path / "run.mcap").read_bytes()
+    said = [
+        f'firings of "{node}" have no numbers in the recording, as one output of it was recorded: those that are lost '
+        "are not played as silence, and what comes later may meet other tokens in a join"
+        for node in ("one", "other")
+    ]
+    assert play_into(joined(), written(data)).gaps == []
+    assert play_into(joined(), written(flipped(data, in_a_chunk(data, 1)))).gaps[1:] == said
