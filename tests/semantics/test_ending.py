@@ -13,7 +13,17 @@ import hfg
 from hfg import END
 from hfg.testing import recorder, replay
 from hfg.testing.nodes import Doubter
-from hfg.trace import ActivityChanged, ActivityLost, NodeEnded, TokenDrained, TokenDropped, TokenSent, TraceEvent
+from hfg.trace import (
+    ActivityChanged,
+    ActivityLost,
+    ErrorRaised,
+    FiringEnded,
+    NodeEnded,
+    TokenDrained,
+    TokenDropped,
+    TokenSent,
+    TraceEvent,
+)
 from tests.semantics.nodes import (
     Both,
     Clock,
@@ -257,6 +267,41 @@ def test_what_lies_before_a_node_is_drained_before_its_end_hook_speaks() -> None
     run(graph, trace=trace)
     assert trace.drained("speaks_at_its_end.said -> speaks_at_its_end.b") == [2, 7]  # there was room again for 7
     replay(graph, trace)
+
+
+class FailsAtItsEnd(hfg.Node):
+    """Has last words and then fails."""
+
+    a = hfg.Input(int)
+    out = hfg.Output(int)
+
+    async def process(self, a: int) -> int:
+        return a
+
+    async def end(self) -> None:
+        self.out.send(99)
+        raise ValueError("not so")
+
+
+@pytest.mark.rule("F4", "X1", "R7")
+@pytest.mark.parametrize("concurrency", [1, 2])
+@pytest.mark.parametrize("policy", ["skip", "disable", "restart"])
+def test_an_end_hook_that_fails_is_seen_to_fail_and_says_nothing(policy: Any, concurrency: int) -> None:
+    def build() -> hfg.Graph:
+        graph = hfg.Graph()
+        node = graph.add(FailsAtItsEnd(), name="node", on_error=policy, concurrency=concurrency)
+        graph.connect(graph.add(numbers(count=1)).out, node.a)
+        graph.connect(node.out, graph.add(Ear(), name="ear").hear)
+        graph.connect(node.failed, graph.add(Ear(), name="other").hear)
+        return graph
+
+    trace = recorder()
+    assert run(build(), trace=trace).nodes["node"].failed == 1
+    assert [event.outcome for event in trace.of(FiringEnded) if event.node == "node"] == ["done", "failed"]
+    assert [error.policy for error in trace.of(ErrorRaised)] == [policy]
+    assert len(trace.values("node.failed -> other.hear")) == 1
+    assert trace.values("node.out -> ear.hear") == [1, *([] if policy == "disable" else [END])]  # what it said is void
+    replay(build, trace)
 
 
 class SlowEnd(hfg.Node):

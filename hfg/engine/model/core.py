@@ -231,8 +231,19 @@ class Upstairs(Protocol):
     def idle_again(self, worker: Worker) -> None:
         """What kept a worker busy is over."""
 
-    def fail(self, worker: Worker, what: str, error: BaseException, *, answer: bool) -> None:
-        """X1: a firing (`answer`: it still owes its outputs) or something beside one has failed."""
+    def fail(
+        self,
+        worker: Worker,
+        what: str,
+        error: BaseException,
+        *,
+        answer: bool,
+        then: Callable[[], None] | None = None,
+    ) -> None:
+        """X1: a firing (`answer`: it still owes its outputs) or something beside one has failed.
+
+        Where no answer is owed, `then` comes before the node is disabled or restarted.
+        """
 
     def fail_call(self, worker: Worker, slot: str, error: BaseException) -> None:
         """X1: a slot call has failed."""

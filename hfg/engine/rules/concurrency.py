@@ -255,7 +255,7 @@ def _leave(flight: Flight) -> None:
     elif flight.outcome in ("done", "ended"):
         _announce(flight, written)
     _tell_end(flight, flight.outcome)
-    if flight.outcome != "ended":
+    if flight.number != _flights(worker).end_number:
         return
     if worker.given_up:
         worker.take_deferred()  # nobody is left who would hear END (R5)
@@ -320,7 +320,7 @@ def _ended(flight: Flight, result: Any, error: BaseException | None) -> None:
         errors.fail(worker, "end()", error, answer=False)
     if written is not None and not any(entry is not None for entry in written):
         written = None
-    flight.be_over("ended", written)
+    flight.be_over("ended" if error is None else "failed", written)
     flights.over(flight)
     if written is None:
         flight.say_nothing()

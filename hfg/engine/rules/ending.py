@@ -6,6 +6,7 @@ Stands on `releasing`; a node's code is run by the host.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from hfg.engine.model.worker import DISABLED, Worker
@@ -99,13 +100,14 @@ def _ended(worker: Worker, result: object, error: BaseException | None) -> None:
         error = gave_back(result)
     if error is not None:
         written = None
-        worker.core.upstairs.fail(worker, "end()", error, answer=False)
+        then = partial(flush_automatic, worker)  # that it has failed is told before it may be disabled
+        worker.core.upstairs.fail(worker, "end()", error, answer=False, then=then)
     if written is not None and any(entry is not None for entry in written):
         put_outputs(worker, written)
         announce(worker, written, processed=False)
     flush_automatic(worker)
     if core.trace is not None:
-        core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended"))
+        core.trace(FiringEnded(core.now(), worker.path, worker.firings, "ended" if error is None else "failed"))
     worker.be_over()
     release(worker.release_early())
     stamp = worker.stamp

@@ -87,15 +87,17 @@ def _wrong_value(worker: Worker, error: Exception) -> str:
     return ""
 
 
-def fail(worker: Worker, what: str, error: BaseException, *, answer: bool) -> None:
-    """A firing (`answer`: it still owes its outputs) or something beside one has failed."""
+def fail(
+    worker: Worker, what: str, error: BaseException, *, answer: bool, then: Callable[[], None] | None = None
+) -> None:
+    """A firing (`answer`: it still owes its outputs) or something beside one has failed; see `apply_policy`."""
     if isinstance(error, QueueLimit):
         worker.core.host.finish("failed", error)
         return
     if answer and retry(worker, error):
         return
     worker.count_failure()
-    apply_policy(worker, as_node_error(worker, what, error), answer=answer)
+    apply_policy(worker, as_node_error(worker, what, error), answer=answer, then=then)
 
 
 def fail_beside(worker: Worker, what: str, error: BaseException) -> None:
@@ -184,7 +186,7 @@ def follow(worker: Worker, policy: str, *, restarts: bool) -> None:
 
 
 def apply_policy(worker: Worker, problem: NodeError, *, answer: bool, then: Callable[[], None] | None = None) -> None:
-    """X1: the node's policy decides."""
+    """X1: the node's policy decides; where no answer is owed `then` comes before a node is disabled or restarted."""
     policy = judge(worker, problem)
     worker.take_written()
     if policy == "stop":

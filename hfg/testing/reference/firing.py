@@ -327,7 +327,7 @@ class Firing(RunningCode):
         index = station.leaf.index
         assert flight.over is not None
         (outcome, failure), flight.leaving = flight.over, True
-        if not flight.void and (outcome != "ended" or flight.writes):
+        if not flight.void and (flight.kind != "end" or (outcome == "ended" and flight.writes)):
             self.send(index, self.shipments(flight, outcome), flight)
         self.announce(flight, outcome)
         if failure is not None:
@@ -434,8 +434,14 @@ class Firing(RunningCode):
             return
         if options.on_error == "disable":
             flight.void = True
-            self.end_firing(flight, outcome, failure)
-            self.disable(station.leaf.index)
+            if flight.kind != "end":
+                self.end_firing(flight, outcome, failure)
+                self.disable(station.leaf.index)
+                return
+            station.changes.append((self.next_tick(), "failed", Failure(failure, {}), None))
+            self.flush_changes(station)
+            self.disable(station.leaf.index)  # before END, which goes nowhere
+            self.end_firing(flight, outcome)
             return
         if policy == "restart" and not station.is_restarting:
             station.restarts += 1
