@@ -1,6 +1,6 @@
 """The command line: one module per verb.
 
-    app         the command itself: verbs, options of all, what an error looks like
+    app         the command itself: options of all, what an error looks like    verbs  which there are
     run         hfg run TARGET      run a graph to its end
     tap         hfg tap TARGET PATH run it and print what passes a port
     top         hfg top             watch a graph that runs in another process

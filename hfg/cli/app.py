@@ -1,6 +1,6 @@
 """The command `hfg`: its verbs, and what becomes of an error that a verb does not expect.
 
-Stands on the verbs. Verbs return their exit code; only `main` knows about the process.
+Stands on `verbs`. Verbs return their exit code; only `main` knows about the process.
 """
 
 from __future__ import annotations
@@ -16,55 +16,21 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hfg.cli import (
-    agent,
-    check,
-    convert,
-    draw,
-    info,
-    keys,
-    new,
-    nodes,
-    play,
-    record,
-    recover,
-    run,
-    runs,
-    show,
-    tap,
-    top,
-)
+from hfg.cli import show
 from hfg.cli.interrupt import Interrupt
+from hfg.cli.verbs import Verbs
 from hfg.errors import FileError, HfgError, TargetError
 
 __all__ = ["app", "main"]
 
 app = typer.Typer(
     name="hfg",
+    cls=Verbs,
     help="Build, check and run activity flow graphs.",
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("run")(run.run)
-app.command("check")(check.check)
-app.command("convert")(convert.convert)
-app.command("draw")(draw.draw)
-app.command("nodes")(nodes.nodes)
-app.command("tap")(tap.tap)
-app.command("record")(record.record)
-app.command("play")(play.play)
-app.command("info")(info.info)
-app.command("recover")(recover.recover)
-app.command("top")(top.top)
-app.command("agent")(agent.agent)
-app.command("deploy")(runs.deploy)
-app.command("ps")(runs.ps)
-app.command("logs")(runs.logs)
-app.command("restart")(runs.restart)
-app.command("stop")(runs.stop)
-app.add_typer(new.new, name="new")
-app.add_typer(keys.keys, name="keys")
 
 
 @app.callback(invoke_without_command=True)

@@ -14,9 +14,9 @@ from hfg.cli import show
 from hfg.cli.certificates import AUTHORITY, Kind, make_authority, make_certificate
 from hfg.errors import TargetError
 
-__all__ = ["keys"]
+__all__ = ["verbs"]
 
-keys = typer.Typer(help="Make certificates for agents, workers and viewers, signed by an authority for tests.")
+verbs = typer.Typer()
 
 _NEXT = """{folder} holds authority, agent, worker and viewer, each with a .pem and a .key. Settings of an agent say:
 
@@ -35,7 +35,12 @@ Whoever can read {authority}.key can be anybody: it is for tests, and belongs on
 """
 
 
-@keys.command("secret")
+@verbs.callback()
+def keys() -> None:
+    """Make certificates for agents, workers and viewers, signed by an authority for tests."""
+
+
+@verbs.command("secret")
 def _secret(file: Annotated[Path, typer.Argument(help="where it is to lie; it must not be there yet")]) -> int:
     """Make a secret that all programs of a realm have, instead of certificates: key = "..." in their settings."""
     try:
@@ -55,7 +60,7 @@ Hosts = Annotated[
 Days = Annotated[int, typer.Option(help="how long they are valid", min=1, max=3650)]
 
 
-@keys.command("new")
+@verbs.command("new")
 def _new(folder: Folder, host: Hosts = None, days: Days = 365) -> int:
     """Make an authority, and a certificate each for an agent, a worker and a viewer."""
     make_authority(folder, days=days)
@@ -65,7 +70,7 @@ def _new(folder: Folder, host: Hosts = None, days: Days = 365) -> int:
     return 0
 
 
-@keys.command("add")
+@verbs.command("add")
 def _add(
     folder: Folder,
     name: Annotated[str, typer.Argument(help="by which [access] knows it")],

@@ -15,28 +15,33 @@ import typer
 from hfg.cli import show, templates
 from hfg.errors import TargetError
 
-__all__ = ["new"]
+__all__ = ["verbs"]
 
-new = typer.Typer(help="Begin a node type, a graph or a package of node types: files that work, and their test.")
+verbs = typer.Typer()
 
 Name = Annotated[str, typer.Argument(help="as in map_lookup, MapLookup or nodes/map_lookup.py")]
 
 _LONGEST_NAME = 40  # a longer one would make lines that formatters break
 
 
-@new.command("node")
+@verbs.callback()
+def new() -> None:
+    """Begin a node type, a graph or a package of node types: files that work, and their test."""
+
+
+@verbs.command("node")
 def _node(name: Name) -> int:
     """Write a node type with ports of all kinds, and its test."""
     return _write(name, templates.NODE, templates.NODE_TEST, "")
 
 
-@new.command("graph")
+@verbs.command("graph")
 def _graph(name: Name) -> int:
     """Write a graph of three nodes, and its test."""
     return _write(name, templates.GRAPH, templates.GRAPH_TEST, "run")
 
 
-@new.command("plugin")
+@verbs.command("plugin")
 def _plugin(
     name: Annotated[str, typer.Argument(help="of the package, as in my_lamps, MyLamps or plugins/my-lamps")],
 ) -> int:

@@ -14,9 +14,6 @@ from contextlib import suppress
 from typing import Any
 
 import msgspec
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from hfg.clock import current_elapsed
 from hfg.controls import escaped
@@ -163,6 +160,10 @@ def json(value: Any) -> None:
 
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]], *, to_stderr: bool = False) -> None:
     """Write a table; numbers stand to the right."""
+    from rich.console import Console  # most verbs draw none
+    from rich.table import Table
+    from rich.text import Text
+
     cells = [[escaped(str(cell)) for cell in row] for row in rows]
     drawn = Table(title=Text(escaped(title)), title_justify="left", title_style="bold", box=None, pad_edge=False)
     for index, column in enumerate(columns):
