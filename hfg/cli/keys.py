@@ -14,7 +14,7 @@ from hfg.cli import show
 from hfg.cli.certificates import AUTHORITY, Kind, make_authority, make_certificate
 from hfg.errors import TargetError
 
-__all__ = ["verbs"]
+__all__ = ["keys", "verbs"]
 
 verbs = typer.Typer()
 

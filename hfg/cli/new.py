@@ -15,7 +15,7 @@ import typer
 from hfg.cli import show, templates
 from hfg.errors import TargetError
 
-__all__ = ["verbs"]
+__all__ = ["new", "verbs"]
 
 verbs = typer.Typer()
 
