@@ -82,7 +82,7 @@ def fusing_differs(calls: Calls, plan: GraphPlan, look: int = 0) -> str | None:
     Args:
       calls: where calls are noted.
       plan: what to run.
-      look: who looks at a second fused run: nobody but on the real clock, taps on all edges, or who measures.
+      look: who looks at one more fused run: nobody, who measures, or nobody but on the real clock.
     """
     interpreted = noted_run(calls, plan, fast=False)
     fused = noted_run(calls, plan, fast=True)
@@ -110,13 +110,12 @@ def oracle_differs(plan: GraphPlan, watched: Ran, oracle: tuple[list[Any], dict[
 
 
 def looking_differs(calls: Calls, plan: GraphPlan, interpreted: Ran, trace: Recorder, look: int) -> str | None:
-    """Fused once more: with taps that see what a trace sees, measured, or on the real clock, where waves repeat."""
+    """Fused with taps, which see what a trace sees, and now and then measured, or on the clock where waves repeat."""
+    tapped = noted_run(calls, plan, fast=True, tapped=True)
+    passed = {label: tokens for label, tokens in tapped.passed.items() if tokens}
+    if not are_one(plan, tapped, interpreted) or passed != passed_by_trace(trace):
+        return f"untapped: {interpreted}\n  {passed_by_trace(trace)}\n  tapped: {tapped}"
     match look % 3:
-        case 0:
-            tapped = noted_run(calls, plan, fast=True, tapped=True)
-            passed = {label: tokens for label, tokens in tapped.passed.items() if tokens}
-            if not are_one(plan, tapped, interpreted) or passed != passed_by_trace(trace):
-                return f"untapped: {interpreted}\n  {passed_by_trace(trace)}\n  tapped: {tapped}"
         case 1:
             measured = noted_run(calls, plan, fast=True, measured=True)
             if not are_one(plan, measured, interpreted):
