@@ -142,9 +142,8 @@ class Part:
             if keeper is None and edge.target == name and is_synchronous(edge) and edge.label not in counted
         )
         self._over: set[str] = set()  # edges on which END has come
-        self._fresh: set[str] = (
-            set()
-        )  # signals of which no number is known: they count from where their consumer goes on
+        # Edges from a ledger, whose numbers may be those of a former run: they count from where their consumer goes on.
+        self._fresh: set[str] = set()
         self._producers = {edge.label: edge.source for edge in edges if edge.target == name}
         self._returns = returns and keeper is None
         self._progresses = list(self._make_progresses(edges, components))
@@ -354,12 +353,11 @@ class Part:
     def _say_lost(self, label: str, inlet: Inlet, count: int) -> None:
         """Tokens of an edge are lost with a process: that is counted, said at once, and part of the report."""
         inlet.count_lost(count)
-        whose = name_of(self._producers[label])
+        is_own = self._start.get(label, 0) > inlet.received  # the producer has sent them, and former lives lost them
+        whose = self.name if is_own else self._producers[label]
         tokens = "1 token was" if count == 1 else f"{count} tokens were"
-        what = f'edge "{label}": {tokens} lost with a process of {whose}'
-        if self._start.get(label, 0) > inlet.received:
-            what = f'edge "{label}": {tokens} lost with a process of {name_of(self.name)}'
-        else:
+        what = f'edge "{label}": {tokens} lost with a process of {name_of(whose)}'
+        if not is_own:
             what += "; silence takes their place, so that what belongs together still meets"
         self._report(what)
 
