@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import subprocess
@@ -17,7 +18,10 @@ from hfg.engine.observing.glance import Glance
 from hfg.graph.flat import cut, flatten
 from hfg.parts.model.components import components
 from hfg.parts.model.costs import costs_of_deaths
+from hfg.parts.processes import launching
+from hfg_transports.memory import Faults, Network
 from tests.parts.test_deaths import Killer, at, killed, numbers, pair, relay
+from tests.parts.test_losses_at_random import Hearing, Telling, origins, passing
 
 __all__ = ["killed"]
 
@@ -96,7 +100,7 @@ def into_a_ledger(*, joins: bool, **options: Any) -> hfg.Graph:
     graph.group("loses", process=True, **options)
     graph.group("keeps", process=True, ledger=True)
     source = graph.add(numbers(count=40))
-    first, then = (graph.add(relay(), name=name, group="loses") for name in ("first", "then"))
+    first, then = (graph.add(passing(takes_s=0.01), name=name, group="loses") for name in ("first", "then"))
     graph.start.activates(first.activate)
     graph.connect(source.out, first.value)
     graph.connect(first.out, then.value, active=True)
@@ -129,6 +133,38 @@ def test_a_join_behind_a_ledger_is_not_torn_by_a_death_before_it(killed: Any) ->
     killed(at(0.03, "loses"))
     with pytest.raises(hfg.errors.RunError, match=r'"pair" would pair what does not belong together'):
         hfg.run(into_a_ledger(joins=True), clock="virtual", until_s=30.0)
+
+
+@pytest.mark.rule("L2")
+@pytest.mark.parametrize(("seed", "lost"), [(2, 2), (10, 4)])
+def test_what_is_lost_before_a_ledger_is_counted_and_the_run_ends(
+    monkeypatch: pytest.MonkeyPatch, seed: int, lost: int
+) -> None:
+    class Made(launching.LoopLauncher):
+        def __init__(self) -> None:
+            super().__init__(network=Network(Faults(loss=0.2, repetition=0.1, delay_s=(0.001, 0.003)), seed=seed))
+
+        async def launch(self, run: str, part: str, host: str, lives: tuple[int, int]) -> Any:
+            launched = await super().launch(run, part, host, lives)
+            if part == "loses" and lives[0] == 1:
+                asyncio.get_running_loop().call_later(0.0537 + 0.0113 * seed, launched.kill)
+            return launched
+
+    monkeypatch.setattr(launching, "LoopLauncher", Made)
+    graph = hfg.Graph()
+    graph.group("loses", process=True)
+    graph.group("keeps", process=True, ledger=True)
+    source, first = graph.add(origins()), graph.add(passing(takes_s=0.01), name="first", group="loses")
+    tells, hears = graph.add(Telling(), group="loses"), graph.add(Hearing(), group="loses")
+    last = graph.add(passing(), name="last", group="keeps")
+    graph.connect(source.out, first.value)
+    graph.connect(first.out, tells.value)
+    graph.connect(tells.said, hears.hear)
+    graph.connect(tells.out, last.value)
+    graph.connect(last.out, graph.output("out", int))
+    report = hfg.run(graph, clock="virtual", until_s=60.0)
+    assert report.outcome == "done"
+    assert report.edges["telling.out -> last.value"].lost == 40 - len(report.outputs["out"]) == lost
 
 
 @pytest.mark.rule("L2")

@@ -135,11 +135,16 @@ class Part:
         self._speaking = dict.fromkeys(self.outlets, True)
         self._said: list[tuple[str, bool, int]] = []
         self._remembered = remembered
+        self._gone: dict[str, int] = {}  # of edges into a ledger: how many were lost before it, and count as come
+        self._came_before: dict[str, int] = {}  # how many had come when the producer of an edge began anew
         counted = remembered - inherited  # by a ledger, whose numbers may be those of a former run
         self._by_number = frozenset(
             edge.label
             for edge in edges
             if keeper is None and edge.target == name and is_synchronous(edge) and edge.label not in counted
+        )
+        self._counted_by_number = frozenset(
+            edge.label for edge in edges if is_synchronous(edge) and edge.label not in remembered
         )
         self._over: set[str] = set()  # edges on which END has come
         # Edges from a ledger, whose numbers may be those of a former run: they count from where their consumer goes on.
@@ -357,7 +362,7 @@ class Part:
         whose = self.name if is_own else self._producers[label]
         tokens = "1 token was" if count == 1 else f"{count} tokens were"
         what = f'edge "{label}": {tokens} lost with a process of {name_of(whose)}'
-        if not is_own:
+        if not is_own and self.keeper is None:
             what += "; silence takes their place, so that what belongs together still meets"
         self._report(what)
 
@@ -434,7 +439,7 @@ class Part:
         """What was said behind tokens holds when those are here."""
         waiting = []
         for label, speaking, total in self._said:
-            if self.inlets[label].received < total:
+            if self._came(label) < total:
                 waiting.append((label, speaking, total))
                 continue
             self.inlets[label].speak(speaking)
@@ -489,6 +494,22 @@ class Part:
             self.engine.at_once(partial(self._align, progress))
         elif label in self._by_number and inlet.received < number and label not in self._over:
             self.engine.at_once(partial(self._lose_up_to, label, number))
+        elif self.keeper is not None and label in self._counted_by_number:
+            self._lose_before_ledger(label, number)
+
+    def _lose_before_ledger(self, label: str, number: int) -> None:
+        """What is kept says what has come; so nothing takes the place of what has not, but both ends count it."""
+        inlet = self.inlets[label]
+        lost = number - self._came_before.get(label, number)  # and not of now: what comes next may overtake the word
+        if lost > 0:
+            self._is_at_rest = False
+            self._gone[label] = self._gone.get(label, 0) + lost
+            self._say_lost(label, inlet, lost)
+            self._listen()
+            self.engine.kick()
+
+    def _came(self, label: str) -> int:
+        return self.inlets[label].received + self._gone.get(label, 0)
 
     def _lose_up_to(self, label: str, number: int) -> None:
         """All up to there is lost that has not come."""
@@ -506,7 +527,7 @@ class Part:
 
     def came(self, label: str) -> int | None:
         """How many tokens have come on an edge, by the numbers of its producer; None: that was not told yet."""
-        return self.inlets[label].received if self.is_aligned(label) else None
+        return self._came(label) if self.is_aligned(label) else None
 
     def begun_at(self, label: str) -> int:
         """The number with which this life goes on on an edge."""
@@ -544,6 +565,7 @@ class Part:
         """The producer of an edge that comes in begins anew; unless it remembers, nobody waits for what has come."""
         self._is_at_rest = False
         inlet, progress = self.inlets[label], self._of.get(label)
+        self._came_before[label] = self._came(label)
         if progress is not None and not progress.has_begun and label not in self._by_number:
             self._fresh.add(label)
             progress.alignment.done(label, 0)
@@ -667,8 +689,9 @@ class Part:
 
     def _coming_account(self, label: str, inlet: Inlet) -> Account:
         """By the numbers of the producer, which may be behind those that this side goes on with."""
-        heard = inlet.heard if label in self._of else inlet.received
-        return self._account(inlet, heard, min(inlet.settled, heard))
+        gone = self._gone.get(label, 0)
+        heard = inlet.heard if label in self._of else inlet.received + gone
+        return self._account(inlet, heard, min(inlet.settled + gone, heard))
 
     def _account(self, end: Outlet | Inlet, count: int, done: int) -> Account:
         """Give what the two ends of an edge have to agree on.
