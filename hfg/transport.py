@@ -81,7 +81,7 @@ class Traffic(enum.Enum):
     BULK = "bulk"
     """Tokens of links that may lose some: may wait a moment to be sent together."""
     BACKGROUND = "background"
-    """Heartbeats, statistics, logs and taps: the first to be left out."""
+    """Statistics, logs and taps: the first to be left out."""
 
 
 class Presence(NamedTuple):

@@ -16,6 +16,7 @@ from hfg.encoding.plain import json_value
 from hfg.nodes.files.reading import json_of, read_bytes
 from hfg.recording import File
 from tests.attacks.fuzzing import KINDS
+from tests.limits import patience
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "howto" / "untrusted.md"
 
@@ -87,5 +88,7 @@ def test_no_value_of_json_costs_more_than_a_hundred_bytes(part: bytes) -> None:
         "used = lambda: int(open('/proc/self/statm').read().split()[1]) * 4096\n"
         "before = used()\nvalue = json_value(data)\nprint((used() - before) / marks)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=100)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=patience(100)
+    )
     assert 10 < float(done.stdout) < 100

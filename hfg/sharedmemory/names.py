@@ -123,7 +123,8 @@ def open_existing(name: str, *, writable: bool) -> tuple[int, int]:
     Raises:
       SharedMemoryError: there is none, or it is another's.
     """
-    flags = (os.O_RDWR if writable else os.O_RDONLY) | os.O_CLOEXEC | os.O_NOFOLLOW
+    # Without O_NONBLOCK, opening a FIFO that another user has made under this name would wait for ever.
+    flags = (os.O_RDWR if writable else os.O_RDONLY) | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
     try:
         file = os.open(_path(name), flags)
     except OSError as error:

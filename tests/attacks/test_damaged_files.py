@@ -19,6 +19,7 @@ from hfg.nodes import _structured
 from hfg.nodes.learning._models import model_of
 from hfg.nodes.vision import CascadeDetector
 from tests.attacks.fuzzing import KINDS, damaged, trial
+from tests.limits import patience
 
 pytestmark = pytest.mark.rule("L4")
 
@@ -52,7 +53,7 @@ def in_a_process(kind: str, first: int, count: int, folder: Path) -> list[object
     progress = folder / "progress"
     progress.touch()
     command = [sys.executable, "-m", "tests.attacks.fuzzing", kind, str(first), str(count), str(progress)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=3000)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=patience(750))
     wrong: list[object] = [json.loads(line) for line in done.stdout.splitlines()]
     if done.returncode:
         wrong.append([progress.read_text(), f"the process ended with {done.returncode}: {done.stderr[-400:]}"])

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from reactivex import operators as ops
 
 import hfg
+from hfg.controls import name_problem
 from hfg.graph.drawing.parts import Card
 from hfg.graph.drawing.picture import Box, Pin, Shape, View, picture
 from hfg.graph.drawing.sheet import Sheet, sheet
@@ -473,6 +474,8 @@ def check_text(name: str) -> None:
 
 def named(name: str, value: object) -> str:
     """Draw a graph in which everything that can be has this name, and a value that shows itself by its text."""
+    if name_problem(name) is not None:
+        name = "name"  # nothing can be named so; values can
     graph = hfg.Graph(name)
     graph.group(name)
     first, second = graph.add(source(), name=name, group=name), graph.add(hear(), name=f"x{name}")

@@ -33,6 +33,8 @@ ON_THE_LOOP = {
     "Deadline",
     "Debounce",
     "Delay",
+    "MemoryCell",
+    "Retry",
     "Schedule",
     "Throttle",
     "Ticker",

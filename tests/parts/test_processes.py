@@ -55,13 +55,14 @@ NODES = """
 """
 
 
-def program(folder: Path, body: str) -> subprocess.Popen[str]:
+def program(folder: Path, body: str, *, cwd: Path | None = None) -> subprocess.Popen[str]:
     """Begin a program that has these nodes."""
     file = folder / "program.py"
     file.write_text(textwrap.dedent(NODES) + textwrap.dedent(body))
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "TMPDIR": str(folder)}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "TMPDIR": str(folder)}
     return subprocess.Popen(
         [sys.executable, str(file)],
+        cwd=cwd,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -441,3 +442,34 @@ def test_what_nodes_print_and_log_elsewhere_is_seen_here(tmp_path: Path) -> None
         "hfg.node.talks WARNING logged 0",
         "hfg.node.talks WARNING logged 1",
     ]
+
+
+@pytest.mark.rule("L5")
+def test_a_process_of_a_group_runs_nothing_that_lies_in_the_current_folder(tmp_path: Path) -> None:
+    """Another user may have put it there."""
+    anywhere = tmp_path / "anywhere"
+    anywhere.mkdir()
+    (anywhere / "msgspec.py").write_text("raise SystemExit('code of another user')")
+    running = program(
+        tmp_path,
+        """
+    @hfg.node
+    def numbers() -> Iterator[int]:
+        yield from range(3)
+
+    @hfg.node
+    def where(value: int) -> int:
+        return value
+
+    if __name__ == "__main__":
+        graph = hfg.Graph()
+        graph.group("far", process=True)
+        source, one = graph.add(numbers()), graph.add(where(), group="far")
+        graph.connect(source.out, one.value)
+        graph.connect(one.out, graph.output("out", int))
+        print(*hfg.run(graph).outputs["out"])
+    """,
+        cwd=anywhere,
+    )
+    out, err = running.communicate(timeout=patience(60))
+    assert (running.returncode, out.split()) == (0, ["0", "1", "2"]), err

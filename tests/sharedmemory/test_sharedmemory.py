@@ -19,6 +19,7 @@ from hfg.errors import EncodingError, SharedMemoryError, UsageError
 from hfg.images import Image
 from hfg.sharedmemory import Reader, Ring, segment_name, segment_prefix, sweep, unavailable
 from hfg.sharedmemory.layout import MAGIC
+from hfg.sharedmemory.names import open_existing
 from hfg.token import Token
 from tests.sharedmemory import actors
 
@@ -406,3 +407,16 @@ def test_what_killed_consumers_held_comes_back_and_others_go_on(many: int) -> No
     end(steady)
     assert sum(path.stat().st_blocks for path in SHM.glob(f"{ring.name}*")) == size
     ring.close()
+
+
+@pytest.mark.rule("L5")
+def test_a_fifo_of_somebody_else_under_the_name_of_a_segment_stops_nobody() -> None:
+    """To open it in the usual way would wait for whoever opens its other end."""
+    fifo = SHM / f"hfg-{REALM}-1-edge_0"
+    os.mkfifo(fifo, 0o666)
+    try:
+        sweep(f"hfg-{REALM}-")
+        with pytest.raises(SharedMemoryError):
+            open_existing(fifo.name, writable=False)
+    finally:
+        fifo.unlink(missing_ok=True)

@@ -101,7 +101,7 @@ def _import(begun: Begun) -> RunError | None:
 
 async def _beat(session: Session, begun: Begun) -> None:
     """Say again and again that this loop goes round."""
-    publisher = session.publisher(begun.beat, Traffic.BACKGROUND)
+    publisher = session.publisher(begun.beat, Traffic.ACKNOWLEDGEMENTS)  # one left out could cost this process its life
     with contextlib.suppress(TransportError):
         while True:
             publisher.put(b"beat")

@@ -39,9 +39,11 @@ async def start(name: str, module: str = PROCESS, *, keeps_output: bool = False)
     """
     return await asyncio.create_subprocess_exec(
         sys.executable,
+        "-P",  # not what lies in the current folder, which may be anybody's: this program's own path comes later
         "-m",
         module,
         name,
+        env=_environment(),
         stdin=PIPE,
         stdout=PIPE if keeps_output else None,
         stderr=STDOUT if keeps_output else None,
@@ -105,6 +107,18 @@ class Spares:
             self._spare = None
         if self._ending:
             await asyncio.wait(self._ending)
+
+
+def _environment() -> dict[str, str]:
+    """Return this program's environment, with which hfg is found where this program has found it.
+
+    An installed hfg is found by itself. Its folder must then not come before the standard library.
+    """
+    root = Path(__file__).absolute().parents[3]
+    if root.name in ("site-packages", "dist-packages"):
+        return dict(os.environ)
+    paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def _surroundings() -> object:
