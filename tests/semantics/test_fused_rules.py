@@ -296,8 +296,10 @@ def test_who_feeds_a_head_waits_for_those_behind_it_outside(fast: bool, group: s
     graph = hfg.Graph()
     graph.group("work", threads=1)
     source, head = outside(graph, seconds()), graph.add(same(), group=group, release="sequential")
+    member = graph.add(same(), name="member", group=group)
     graph.connect(source.out, head.value)
-    graph.connect(head.out, outside(graph, takes_a_second(), release="sequential").value)
+    graph.connect(head.out, member.value)
+    graph.connect(member.out, outside(graph, takes_a_second(), release="sequential").value)
     graph.connect(source.out, graph.output("seconds", int))
     assert run(graph, fast).outputs["seconds"] == [0, 1, 2, 3]
 
