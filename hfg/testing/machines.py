@@ -28,7 +28,7 @@ from hfg.trace import TraceEvent
 
 __all__ = ["STIMULATED", "EngineAgainstOracle"]
 
-STIMULATED = Allowed(max_nodes=5, feeds=True, gates=False, operators=False, failing_calls=False)
+STIMULATED = Allowed(max_nodes=5, feeds=True, gates=False, operators=False, failing_calls=False, doing=True)
 """What occurs in the graphs of the machine."""
 
 MOST_MOVES = 800
