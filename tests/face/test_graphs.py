@@ -96,7 +96,11 @@ def test_graph_of_the_face_does_what_its_lines_say() -> None:
     assert list(graph.nodes) == ["camera", "map_lookup", "drive", "explore", "wait", "deliver"]
     assert [edge.active for edge in graph.edges] == [False, True, True, True, False, True]
     # What a reader of these lines may see too: nothing leads activity to the lookup, and "vision" has no priorities.
-    assert [(found.severity, found.path) for found in graph.check()] == [("warning", "map_lookup"), ("hint", "vision")]
+    assert [(found.severity, found.path, found.check) for found in graph.check()] == [
+        ("warning", "map_lookup", "never-active"),
+        ("warning", "map_lookup", "unheard-timeout"),
+        ("hint", "vision", "unused-scheduling"),
+    ]
     report = hfg.run(graph, clock="virtual")
     assert report.outcome == "stopped"
     assert drive.goals == [(0.0, False)]
@@ -318,6 +322,8 @@ def test_refusal_of_a_graph_with_very_many_errors_stays_readable() -> None:
 RESERVED = [
     "setup",
     "process",
+    "do",
+    "completed",
     "ready",
     "end",
     "teardown",

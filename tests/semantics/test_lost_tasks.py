@@ -47,8 +47,6 @@ async def starts_async(value: int) -> int:
 
 
 class InSlot(hfg.Node):
-    value = hfg.Input(int, optional=True)
-
     @hfg.slot
     def begin(self) -> None:
         KEPT.append(asyncio.get_running_loop().create_task(stays()))
