@@ -10,6 +10,7 @@ import functools
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import Any, Literal
 
 import msgspec
@@ -217,11 +218,15 @@ def _documented(doc: str) -> Mapping[str, str]:
 
 
 def look_up(module: str, qualname: str) -> Any:
-    """Find a name in a module that is already imported; None if there is no such name."""
-    found: Any = sys.modules.get(module)
-    for part in qualname.split("."):
-        found = getattr(found, part, None)
-    return found
+    """Find a name in a module that is already imported, or in classes there; None if there is no such name.
+
+    What the module has imported itself is not in it: `my_robot:os.system` names nothing.
+    """
+    first, *nested = qualname.split(".")
+    found: Any = getattr(sys.modules.get(module), first, None)
+    for part in nested:
+        found = getattr(found, part, None) if isinstance(found, type) else None
+    return None if isinstance(found, ModuleType) else found
 
 
 def parameter_values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:

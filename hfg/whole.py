@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import itertools
 import os
+import stat
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -89,6 +90,33 @@ def _keep_the_name(file: Path) -> None:
             os.close(folder)
 
 
+def _own_part(path: Path) -> BinaryIO:
+    """Open an empty file under a name that anybody can foresee: none that another user put there, and through no link.
+
+    One that an earlier run of this user left is emptied.
+    """
+    # what waits for a reader does not open, and nothing is emptied before it is known to be ours
+    flags = os.O_WRONLY | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    try:
+        number = os.open(path, flags | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0), 0o666)
+    except OSError as error:
+        if path.is_symlink():
+            raise PermissionError(errno.EPERM, "a symbolic link is in its place; take it away", str(path)) from error
+        raise
+    try:
+        there = os.fstat(number)
+        is_ours = not hasattr(os, "geteuid") or there.st_uid == os.geteuid()
+        if not (stat.S_ISREG(there.st_mode) and is_ours and there.st_nlink == 1):
+            raise PermissionError(
+                errno.EPERM, "what is in its place is no file of yours alone; take it away", str(path)
+            )
+        os.ftruncate(number, 0)
+        return os.fdopen(number, "wb", buffering=0)
+    except BaseException:
+        os.close(number)
+        raise
+
+
 class GrowingFile:
     """A file that grows piece by piece, each whole, and has its name when it is complete.
 
@@ -114,7 +142,7 @@ class GrowingFile:
         self._target = _target(path)
         in_place = append or _is_no_file(self._target)
         self.place = self._target if in_place else self._target.with_name(f"{self._target.name}.part")
-        self._file = self.place.open("ab" if append else "wb", buffering=0)
+        self._file = self.place.open("ab" if append else "wb", buffering=0) if in_place else _own_part(self.place)
         self._at_once = at_once
         self._held: list[bytes] = []
         self._held_bytes = 0

@@ -12,7 +12,7 @@ Whoever wants a value in a file takes `encode` and `decode`; whoever sends token
 
 from hfg.encoding.arrays import ArrayHead, Lease
 from hfg.encoding.codecs import codec_for, wire_problem
-from hfg.encoding.data import TAG, Find, decode, encode, find_reference, has_tag, read_text, reference_to
+from hfg.encoding.data import TAG, Find, decode, encode, find_reference, has_tag, is_data_type, read_text, reference_to
 from hfg.encoding.descriptions import description_of, difference, type_fingerprint
 from hfg.encoding.wire import Limits, TokenCodec
 
@@ -30,6 +30,7 @@ __all__ = [
     "encode",
     "find_reference",
     "has_tag",
+    "is_data_type",
     "read_text",
     "reference_to",
     "type_fingerprint",

@@ -35,7 +35,17 @@ from hfg.errors import EncodingError
 from hfg.types import accepts, bare_type, describe, describe_value
 from hfg.values import Colour, Span, same
 
-__all__ = ["TAG", "Find", "decode", "encode", "find_reference", "has_tag", "read_text", "reference_to"]
+__all__ = [
+    "TAG",
+    "Find",
+    "decode",
+    "encode",
+    "find_reference",
+    "has_tag",
+    "is_data_type",
+    "read_text",
+    "reference_to",
+]
 
 TAG: Final = "$type"
 """The key of data that says of itself what it is."""
@@ -200,10 +210,11 @@ def _already_imported(reference: str) -> Any:
 
 
 def _found(module: str, name: str) -> Any:
-    found: Any = sys.modules.get(module)
-    for part in name.split("."):
-        found = getattr(found, part, None)
-    return found
+    first, *nested = name.split(".")
+    found: Any = getattr(sys.modules.get(module), first, None)
+    for part in nested:  # classes in classes, never what the module has imported itself
+        found = getattr(found, part, None) if isinstance(found, type) else None
+    return None if isinstance(found, types.ModuleType) else found
 
 
 # --- from values ---
@@ -352,7 +363,7 @@ def _untagged(data: dict[str, Any], where: str, find: Find) -> Any:
     hint = _TAGGED.get(name)
     if hint is None:
         hint = find(name)
-        if not _is_data(hint):
+        if not is_data_type(hint):
             raise EncodingError(f'{where} is of type "{name}", which is no type of data')
     elif name == "dict":
         return _pairs(inner, Any, Any, where, find)
@@ -374,7 +385,7 @@ _TAGGED: Final[dict[str, Any]] = {
 }
 
 
-def _is_data(kind: Any) -> bool:
+def is_data_type(kind: Any) -> bool:
     """Whether values of a class are made of data alone, so that reading one runs none but its own checks."""
     return isinstance(kind, type) and (issubclass(kind, (enum.Enum, *_TEXTS)) or _fields_of(kind) is not None)
 

@@ -1,8 +1,9 @@
 """Which modules a graph file may have imported: reading a file runs no other code (docs/howto/files.md, rule L4).
 
 Allowed are hfg itself, packages that installed node types (entry points `hfg.nodes`), what the program has imported
-already, and what the caller allows; a module beside the file is not, as it came with the file. Stands on the
-catalogue's offers.
+already, and what the caller allows; a module beside the file is not, as it came with the file. To be imported already
+does not make all that a module holds open to files: they name node types, operators and types of data, and other
+functions only of modules that the caller allows. Stands on the catalogue's offers.
 """
 
 from __future__ import annotations
@@ -16,11 +17,19 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Final
 
+from hfg.description import look_up
+from hfg.encoding import is_data_type
+from hfg.files import boxes
+from hfg.functions import NodeFunction
+from hfg.graph.structure.operators import OperatorFunction
+from hfg.nodetype import Node
+
 __all__ = ["Allowed", "installed_packages", "project_of"]
 
 _ALWAYS: Final = ("hfg", "reactivex.operators")
 _REMEDY: Final = '--allow {top} or hfg.load(..., allow=["{top}"])'
 _MARK: Final = "pyproject.toml"
+_PLAIN: Final = (bool, int, float, complex, str, bytes, list, tuple, dict, set, frozenset)
 
 
 def project_of(file: Path) -> Path:
@@ -62,11 +71,18 @@ class Allowed:
 
     def refusal(self, module: str) -> str | None:
         """Say why a module must not be imported, with the remedy; None if it may be."""
-        if module in sys.modules or _is_in(module, _ALWAYS) or _is_in(module, installed_packages()):
+        if module in sys.modules:
             return None
-        top = module.partition(".")[0]
-        if not top.isidentifier():
-            return None  # what is no name is told by whoever looks for it
+        if module.endswith(".__main__"):
+            return f'"{module:.80}" is a program, no module; name the module that has what this file needs'
+        if _is_in(module, _ALWAYS) or _is_in(module, installed_packages()):
+            return None
+        if not module:
+            return None  # which is told by whoever looks for it
+        parts = module.split(".")
+        if not all(part.isidentifier() for part in parts):
+            return f'"{module:.80}" is no name of a module; write "module:name", as in "my_robot.nodes:Camera"'
+        top = parts[0]
         spec, folder = _spec(top), None
         if spec is None:
             folder = self._folder_of(top)
@@ -84,6 +100,30 @@ class Allowed:
             f"{self._remedy.format(top=top)}"
         )
 
+    def refusal_of_value(self, reference: str, found: object) -> str | None:
+        """Say why a value must not be what a reference stands for, though its module may be imported."""
+        module = reference.partition(":")[0]
+        if isinstance(found, NodeFunction | OperatorFunction) or _is_declared(found):
+            return None
+        top = module.partition(".")[0]
+        if _is_in(module, self._extra) and str(getattr(found, "__module__", "")).partition(".")[0] == top:
+            return None
+        sentence = f'"{reference:.80}" is {found!r:.80}, and a file alone must not have any function called'
+        if top in sys.stdlib_module_names:
+            return f"{sentence}; name a function of yours that calls it, with @hfg.operator or @hfg.node above"
+        self.wanted[top] = None
+        return (
+            f"{sentence}; write @hfg.operator or @hfg.node above it, or if you trust the module allow it, with "
+            f"{self._remedy.format(top=top)}"
+        )
+
+    def refusal_of_reference(self, reference: str) -> str | None:
+        """Say why what is named must not be looked for."""
+        module, colon, name = reference.partition(":")
+        if module == boxes.__name__ and name.startswith("File["):
+            return f'"{reference:.80}" stands for another file; include that, with file: below the node'
+        return self.refusal(module) if colon else None
+
     def refusal_of_type(self, text: str) -> str | None:
         """Say the same of the modules that a type written as a text names."""
         return next((why for module in _modules_in(text) if (why := self.refusal(module)) is not None), None)
@@ -94,6 +134,11 @@ class Allowed:
             if (folder / f"{top}.py").is_file() or (folder / top).is_dir():
                 return folder
         return None
+
+
+def _is_declared(found: object) -> bool:
+    """Whether that is a class of nodes or of data, which a file may name."""
+    return isinstance(found, type) and (found in _PLAIN or issubclass(found, Node) or is_data_type(found))
 
 
 def _place(spec: ModuleSpec | None, folder: Path | None, top: str) -> str:
@@ -119,7 +164,7 @@ def _spec(top: str) -> ModuleSpec | None:
 
 
 def _modules_in(text: str) -> Iterator[str]:
-    """The modules that may be imported to find what a text names: the longest that is imported already, or all."""
+    """The modules that are imported to find what a text names: none but the one that has it already, or the longest."""
     try:
         tree = ast.parse(text, mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -129,4 +174,10 @@ def _modules_in(text: str) -> Iterator[str]:
             parts = ast.unparse(node).split(".")
             if all(part.isidentifier() for part in parts):
                 modules = [".".join(parts[:end]) for end in range(len(parts) - 1, 0, -1)]
-                yield next((one for one in modules if one in sys.modules), modules[0])
+                known = (one for one in modules if one in sys.modules and _has(one, parts))
+                yield next(known, modules[0])
+
+
+def _has(module: str, parts: list[str]) -> bool:
+    """Whether a module that is imported has what a type names, so that no other is imported to look for it."""
+    return look_up(module, ".".join(parts[module.count(".") + 1 :])) is not None

@@ -216,19 +216,23 @@ class _Loading:
         """Give what a value refers to by "module:name".
 
         Raises:
-          GraphError: it must not be imported.
+          GraphError: it must not be imported, or is no value for a file to have.
           EncodingError: there is none.
         """
-        why = self.allowed.refusal(reference.partition(":")[0])
+        why = self.allowed.refusal_of_reference(reference)
         if why is not None:
             raise GraphError(why)
-        return find_reference(reference)
+        found = find_reference(reference)
+        why = self.allowed.refusal_of_value(reference, found)
+        if why is not None:
+            raise GraphError(why)
+        return found
 
     def may_import(self, read: Read) -> bool:
         """Report all that a document names and must not be imported; if there is any, nothing is."""
         before = len(self.findings.problems)
         for key, text, is_type in _references(read.document, ()):
-            why = self.allowed.refusal_of_type(text) if is_type else self.allowed.refusal(text.partition(":")[0])
+            why = self.allowed.refusal_of_type(text) if is_type else self.allowed.refusal_of_reference(text)
             if why is not None:
                 self.findings.add(read.file, read.lines.get(key, 0), graph_path(key), why)
         return len(self.findings.problems) == before

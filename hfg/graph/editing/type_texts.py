@@ -103,7 +103,12 @@ def _found(name: str) -> Any:  # noqa: ANN401
     *modules, last = name.split(".")
     if not modules:
         modules = ["builtins"]
-    for end in range(len(modules), 0, -1):
+    ends = range(len(modules), 0, -1)
+    for end in ends:  # what is imported already needs no import of another module that might be meant
+        found = look_up(".".join(modules[:end]), ".".join([*modules[end:], last]))
+        if found is not None:
+            return found
+    for end in ends:
         module = ".".join(modules[:end])
         try:
             importlib.import_module(module)

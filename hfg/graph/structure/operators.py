@@ -10,7 +10,7 @@ import importlib
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Generic, ParamSpec
 
-from reactivex import Observable
+from reactivex import Observable, operators
 from typing_extensions import override
 
 from hfg.description import look_up
@@ -144,8 +144,8 @@ def find_operator(
             f'{where}: operator "{reference}": importing "{module}" failed ({type(error).__name__}: {error})'
         ) from error
     found = look_up(module, name)
-    if module == _OPERATORS and callable(found) and not isinstance(found, type):
-        found = OperatorFunction(found)
+    if module == _OPERATORS:  # it has many imported names beside its own functions
+        found = OperatorFunction(found) if name in operators.__all__ else None
     if not isinstance(found, OperatorFunction):
         what = f'module "{module}" has no "{name}"' if found is None else f"it is {found!r:.60}, no operator"
         raise GraphError(f'{where}: operator "{reference}": {what}; write @hfg.operator above a function of this name')
