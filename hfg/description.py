@@ -170,6 +170,11 @@ class NodeType:
         return found
 
     @property
+    def is_there(self) -> bool:
+        """Whether this is the type itself, and not what stands in for one that cannot be found."""
+        return True
+
+    @property
     def reference(self) -> str | None:
         """Where to find it, "module:qualname"; None for what has no name of its own.
 

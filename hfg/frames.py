@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-__all__ = ["is_machinery", "is_ours", "users_part"]
+__all__ = ["is_machinery", "is_ours", "is_standard", "users_part"]
 
 _OURS: Final = str(Path(__file__).resolve().parent)
 _STANDARD: Final = str(Path(traceback.__file__).parent)
@@ -30,6 +30,11 @@ _MACHINERY: Final = (
 def is_ours(file: str) -> bool:
     """Whether a frame of this file is hfg's own."""
     return file.startswith(_OURS)
+
+
+def is_standard(file: str) -> bool:
+    """Whether a frame of this file is one of Python's own library."""
+    return file.startswith(f"{_STANDARD}/") and "site-packages" not in file
 
 
 def is_machinery(file: str) -> bool:

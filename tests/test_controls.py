@@ -94,7 +94,7 @@ def test_no_verb_writes_what_a_file_says_raw(
 def test_sentences_tables_tracebacks_and_json_are_written_out(capsys: pytest.CaptureFixture[str]) -> None:
     show.sentence(EVIL)
     show.table(EVIL, ["a"], [[EVIL]])
-    show.user_traceback(ValueError(EVIL))
+    show.user_traceback(SyntaxError(EVIL))
     show.json({"value": EVIL})
     written = capsys.readouterr()
     assert not RAW.search(written.out + written.err)

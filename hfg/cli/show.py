@@ -19,8 +19,8 @@ from hfg.clock import current_elapsed
 from hfg.controls import escaped
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import Report
-from hfg.errors import EngineInternalError, FileError, HfgError, NodeError, TeardownError
-from hfg.frames import is_machinery
+from hfg.errors import EngineInternalError, FileError, NodeError, TeardownError
+from hfg.frames import is_machinery, is_standard
 
 __all__ = [
     "Records",
@@ -141,16 +141,39 @@ def user_traceback(error: BaseException | None) -> None:
     shown = traceback.TracebackException.from_exception(error)
     if not _debug:
         _filter(shown)
-        if isinstance(error, HfgError) and not shown.stack:
+        if _is_empty(shown):
             return  # nothing of the user's in it, and its sentence follows
     write("".join(shown.format()), to_stderr=True)
 
 
 def _filter(shown: traceback.TracebackException) -> None:
-    shown.stack = traceback.StackSummary.from_list(frame for frame in shown.stack if not is_machinery(frame.filename))
+    kept: list[traceback.FrameSummary] = []
+    ours = False
+    for frame in shown.stack:
+        # What Python's library does for machinery belongs to it.
+        ours = is_machinery(frame.filename) or (ours and is_standard(frame.filename))
+        if not ours:
+            kept.append(frame)
+    shown.stack = traceback.StackSummary.from_list(kept)
     for other in (shown.__cause__, shown.__context__, *(shown.exceptions or ())):
         if other is not None:
             _filter(other)
+    # What hfg made another error of is told by that one.
+    if shown.__cause__ is not None and _is_empty(shown.__cause__):
+        shown.__cause__, shown.__suppress_context__ = None, True
+    if shown.__context__ is not None and _is_empty(shown.__context__):
+        shown.__context__ = None
+
+
+def _is_empty(shown: traceback.TracebackException) -> bool:
+    """Whether a filtered error has no frame of the user's, nor of what led to it; a wrong line of code is one."""
+    return not (
+        shown.stack
+        or shown.__cause__
+        or (shown.__context__ and not shown.__suppress_context__)
+        or shown.exceptions
+        or issubclass(shown.exc_type, SyntaxError)
+    )
 
 
 def json(value: Any) -> None:

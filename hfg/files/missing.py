@@ -42,6 +42,11 @@ class _MissingType(NodeType):
 
     @property
     @override
+    def is_there(self) -> bool:
+        return False
+
+    @property
+    @override
     def reference(self) -> str | None:
         return self.named
 

@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 import msgspec
 from msgspec import inspect
 
+from hfg.controls import name_problem
 from hfg.files.document import SUFFIX, VERSION, Document, EdgeDocument, NodeDocument, OperatorDocument
 from hfg.files.findings import Findings, Key, Lines, graph_path
 from hfg.files.opening import bytes_of, text_in
@@ -101,7 +102,13 @@ class _Reading:
             )
             return None
         read = self.struct(found, Document, ())
-        return read if isinstance(read, Document) else None
+        if not isinstance(read, Document):
+            return None
+        problem = name_problem(read.name)
+        if problem is not None:
+            self.wrong(found.value["name"], ("name",), f"a graph {problem}")
+            read.name = ""
+        return read
 
     # --- by what is expected ---
 

@@ -101,6 +101,26 @@ def test_types_that_are_not_there_are_told_with_what_else_is_wrong() -> None:
     ]
 
 
+def test_a_name_of_the_graph_that_would_steer_a_terminal_is_told_with_its_line_and_all_else(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    said = "a name is one line without characters that steer a terminal; leave them out"
+    assert refusal(
+        """
+        hfg: 1
+        name: "g\\e[31m"
+        nodes:
+          a:
+            tpye: x
+        """
+    ) == [
+        f'a.hfg.yaml:2: "name": a graph cannot be named "g\\x1b[31m": {said}',
+        'a.hfg.yaml:5: "a.tpye": nothing here is called "tpye"; did you mean "type"?',
+    ]
+    assert main(["run", "a.hfg.yaml"]) == 2
+    assert 'a.hfg.yaml:2: "name"' in capsys.readouterr().err
+
+
 def test_what_only_the_graph_shows_is_told_with_its_line_too() -> None:
     found = refusal(
         f"""
@@ -453,7 +473,8 @@ def test_an_unknown_type_keeps_its_place_with_its_data(capsys: pytest.CaptureFix
     graph = hfg.load(path)
     save(graph, "b.hfg.yaml")
     assert Path("b.hfg.yaml").read_text() == path.read_text()
-    missing = [problem for problem in graph.check() if problem.check == "missing-type"]
+    missing = [problem for problem in graph.check() if problem.severity == "error"]
+    assert {one.check for one in missing} == {"missing-type"}
     assert [(one.severity, one.path) for one in missing] == [("error", "camera"), ("error", "other")]
     assert (
         missing[0].remedy == "install what has it, or correct a.hfg.yaml, line 7; until then the node keeps its place"

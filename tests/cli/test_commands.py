@@ -202,6 +202,40 @@ def test_a_node_that_fails_shows_the_users_frames_and_a_sentence(hfg: Command) -
     )
 
 
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("graph.add(half(), max_rate_hz=-1)", 'node "half": max_rate_hz must be a number above 0'),
+        ("graph.connect('source.out', 'half.number')", 'there is no "source.out"'),
+    ],
+)
+def test_a_builder_that_is_refused_shows_one_traceback_that_begins_with_its_line(
+    hfg: Command, line: str, sentence: str
+) -> None:
+    with Path("halves.py").open("a", encoding="utf-8") as file:
+        file.write(f"\n\ndef refused() -> hfg.Graph:\n    graph = hfg.Graph()\n    {line}\n    return graph\n")
+    shown = hfg("run", "halves.py:refused")
+    assert shown.code == 2
+    assert shown.err.startswith("Traceback (most recent call last):\n  File ")
+    assert line in shown.err.splitlines()[2]
+    assert shown.err.count(sentence) == 2  # the error and the sentence
+    assert "exception" not in shown.err
+
+
+def test_what_our_own_nodes_raise_is_told_by_its_sentence_alone(hfg: Command) -> None:
+    with Path("halves.py").open("a", encoding="utf-8") as file:
+        file.write(
+            "\n\nfrom hfg.nodes.files import TextLines\n"
+            "def lost() -> hfg.Graph:\n    graph = hfg.Graph()\n"
+            "    graph.add(TextLines(path='no/such/file'))\n    return graph\n"
+        )
+    shown = hfg("run", "halves.py:lost", *VIRTUAL)
+    assert shown.code == 1
+    assert "direct cause" not in shown.err
+    assert "Traceback" not in shown.err
+    assert 'FileNotFoundError: cannot read "no/such/file"' in shown.err.splitlines()[-1]
+
+
 def test_debug_shows_our_frames_too(hfg: Command) -> None:
     assert "hfg/engine" in hfg("run", TARGET, *VIRTUAL, "--param", "half.divisor=0", "--debug").err
 

@@ -141,6 +141,7 @@ def missing_process(flat: FlatGraph) -> Iterator[Problem]:
         node
         for node in flat.nodes
         if node.node._type.process_kind == "none" and node.node._type.inputs and inside(node.node) is None
+        if node.node._type.is_there
     ]
     fed = {edge.target.node for edge in flat.edges if edge.target.kind == "input"} if lacking else set()
     for node in lacking:

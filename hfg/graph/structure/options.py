@@ -7,6 +7,7 @@ nodes nor ports.
 from __future__ import annotations
 
 import builtins
+import contextlib
 import functools
 import os
 import sys
@@ -166,10 +167,9 @@ def node_options(where: str, given: dict[str, Any]) -> NodeOptions:
       GraphError: a value is out of its range; the message begins with `where`.
     """
     given["retry_on"] = _error_names(where, given["retry_on"], retries=given["retries"])
-    try:
+    with contextlib.suppress(GraphError, TypeError):  # the second: one that cannot be hashed, and so is none
         return _right_options(**given)
-    except (GraphError, TypeError):  # the second: one that cannot be hashed, and so is none
-        return _checked(where, given)
+    return _checked(where, given)  # which refuses them in the name of the node
 
 
 @functools.lru_cache(maxsize=1024, typed=True)

@@ -107,7 +107,10 @@ def _end(level: Level, path: str, kinds: tuple[str, ...]) -> PortEnd:
     try:
         node = node_at(level, node_path)
     except GraphError:
-        find(level, path)  # says the same of the whole path
+        try:
+            find(level, path)  # says the same of the whole path
+        except GraphError as whole:
+            raise whole from None
         raise
     found = candidates(node, port)
     if inner:
