@@ -45,12 +45,28 @@ def _distribute(
     return distribute(graph, flat, options, virtual=virtual, settings=settings)
 
 
-def _refusal(modules: Iterable[str], types: Iterable[str], allow: Iterable[str]) -> str | None:
+def _refusal(
+    references: Iterable[str], values: Iterable[str], types: Iterable[str], allow: Iterable[str]
+) -> str | None:
     """Stand behind `commands.Rule`: they are as a graph file in the working directory."""
+    from hfg.encoding import find_reference
+    from hfg.errors import EncodingError
     from hfg.files.allowed import Allowed
 
     allowed = Allowed(Path("commands").absolute(), allow, 'hfg.commands.decode(..., allow=["{top}"])')
-    found = itertools.chain(map(allowed.refusal, modules), map(allowed.refusal_of_type, types))
+
+    def of_value(reference: str) -> str | None:
+        why = allowed.refusal_of_reference(reference)
+        if why is not None:
+            return why
+        try:
+            return allowed.refusal_of_value(reference, find_reference(reference))
+        except EncodingError:
+            return None  # there is none, which is told where it is applied
+
+    found = itertools.chain(
+        map(allowed.refusal_of_reference, references), map(of_value, values), map(allowed.refusal_of_type, types)
+    )
     return next(filter(None, found), None)
 
 

@@ -24,7 +24,7 @@ COMMANDS: list[dict[str, Any]] = [
     {
         "do": "SetParameter",
         "path": "a.b",
-        "value": [{"$type": "object", "class": "arm_of_others:Pose", "fields": {}}],
+        "value": [{"$type": "arm_of_others:Pose", "value": {}}],
     },
 ]
 
@@ -54,3 +54,17 @@ def test_types_of_hfg_need_no_leave() -> None:
     text = '[{"do":"Add","type":"hfg.nodes.values.constants:ConstantInt","path":"a"}]'
     graph.edit(*hfg.commands.decode(text))
     assert list(graph.nodes) == ["a"]
+
+
+def test_a_value_refers_to_no_function_that_just_is_there() -> None:
+    value = {"$type": "reference", "value": "os:system"}
+    operator = {"type": "reactivex.operators:map", "arguments": [value]}
+    command = {"do": "Connect", "source": "a.b", "target": "c.d", "through": [operator]}
+    with pytest.raises(GraphError, match="must not have any function called"):
+        hfg.commands.decode(json.dumps([command]))
+
+
+def test_a_time_of_day_in_a_value_is_no_reference() -> None:
+    value = {"$type": "datetime:datetime", "value": "2026-01-02T10:00:00"}
+    command = {"do": "SetParameter", "path": "a.b", "value": value}
+    assert hfg.commands.decode(json.dumps([command]))

@@ -379,8 +379,11 @@ def encode(commands: Iterable[Command]) -> str:
 class Rule:
     """What commands may have imported. It is that of graph files, which stands on an upper floor: see composing."""
 
-    refusal: Callable[[Iterable[str], Iterable[str], Iterable[str]], str | None]
-    """Of modules, of types as texts, and what is allowed beside; says why one must not be imported, or None."""
+    refusal: Callable[[Iterable[str], Iterable[str], Iterable[str], Iterable[str]], str | None]
+    """Of node types and operators, of what values refer to, of types as texts, and what is allowed beside.
+
+    Says why one must not be imported or had, or None.
+    """
 
 
 def decode(data: str | bytes, *, allow: Iterable[str] = ()) -> Sequence[AnyCommand]:
@@ -397,9 +400,10 @@ def decode(data: str | bytes, *, allow: Iterable[str] = ()) -> Sequence[AnyComma
       GraphError: it is no JSON, or no command, which the message says where; or they name another module.
     """
     commands = read(data)
-    references = [one for command in commands for one in (*_references(command), *_in_values(command))]
+    references = [one for command in commands for one in _references(command)]
+    values = [one for command in commands for one in _in_values(command)]
     types = [text for command in commands for text in _types(command)]
-    why = Rule.refusal([one.partition(":")[0] for one in references], types, allow)
+    why = Rule.refusal(references, values, types, allow)
     if why is not None:
         raise GraphError(f"these commands are refused: {why}")
     return commands
@@ -414,13 +418,15 @@ def _references(command: AnyCommand) -> list[str]:
 
 
 def _in_values(command: AnyCommand) -> Iterator[str]:
-    """What values name that say their type: `{"$type": "object", "class": "my_robot.types:Pose", ...}`."""
+    """What values name that say their type: `{"$type": "my_robot.types:Pose", "value": ...}`."""
     left = [msgspec.to_builtins(command)]
     while left:
         one = left.pop()
         if isinstance(one, dict):
             if TAG in one:
-                yield from (text for text in one.values() if isinstance(text, str) and ":" in text)
+                named = one.get("value") if one[TAG] == "reference" else one[TAG]
+                if isinstance(named, str) and ":" in named:
+                    yield named
             left += one.values()
         elif isinstance(one, list | tuple):
             left += one
