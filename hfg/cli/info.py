@@ -29,7 +29,7 @@ def info(
         show.json(found)
     else:
         show.write("\n".join(_lines(found)) + "\n")
-    return 0
+    return 0 if found.whole and not found.losses else 1
 
 
 def _lines(found: RecordingInfo) -> list[str]:

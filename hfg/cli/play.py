@@ -90,7 +90,7 @@ def play(
         show.sentence(f'graph "{graph.name}": interrupted; what came back is torn down')
     elif report is not None and error is None:
         show.report(graph.name, report, verbose)
-    return 1 if error is not None or interrupt.count else code
+    return 1 if error is not None or interrupt.count or playing.is_damaged else code
 
 
 def _pair(text: str) -> tuple[str, str]:

@@ -28,4 +28,4 @@ def recover(
     found = f"{count:,} message{'s' * (count != 1)}"
     lines = [f"{output}: {found} of {file}", *(told_losses(losses) or ["nothing is lost"])]
     show.write("\n".join(lines) + "\n")
-    return 0
+    return 1 if losses and not count else 0

@@ -31,7 +31,7 @@ from hfg.nodetype import Node, NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
 from hfg.recording.messages import MARKERS
 from hfg.recording.players import Player
-from hfg.recording.reading import File
+from hfg.recording.reading import File, RecordingInfo
 from hfg.recording.tracks import Track, recorded_ports
 
 __all__ = ["Playing", "play_into"]
@@ -152,6 +152,7 @@ class Playing(msgspec.Struct):
       missing: recorded ports that the graph does not have.
       live: sources of the graph that were not recorded, so they run their own code.
       gaps: what the recording itself lacks, as sentences.
+      is_damaged: whether something in it cannot be read, or was lost before it was recovered.
     """
 
     played: dict[str, str] = {}
@@ -161,6 +162,7 @@ class Playing(msgspec.Struct):
     missing: list[str] = []
     live: list[str] = []
     gaps: list[str] = []
+    is_damaged: bool = False
     _told: WeakSet[Any] = msgspec.field(default_factory=WeakSet)
 
     @property
@@ -220,7 +222,9 @@ def play_into(
     with File(path) as recording:
         recorded = recorded_ports(recording)
         spoke, beside = _spoke(recording)
-        playing.gaps = _gaps(recording)
+        info = recording.info()
+        playing.is_damaged = bool(info.losses)
+        playing.gaps = _gaps(recording, info)
         uncounted = _with_one_output(recording) if recording.losses_met() else []
     sending, fed = _sorted(graph, path, recorded, ports or {})
     edit = _feed(graph, path, recorded, fed, speed, playing)
@@ -261,9 +265,8 @@ def _misaligned(uncounted: list[str], played: Mapping[str, str]) -> list[str]:
     ]
 
 
-def _gaps(recording: File) -> list[str]:
+def _gaps(recording: File, info: RecordingInfo) -> list[str]:
     """What the recording does not hold, though it passed."""
-    info = recording.info()
     found = [f"{info.path} is damaged: {loss}" for loss in info.losses]
     found += [
         f'firings of "{node}" have no numbers in the recording, which an older version of hfg wrote: they are told '

@@ -140,7 +140,7 @@ def test_one_damaged_chunk_of_a_file_without_summary_costs_that_chunk(whole: byt
 
 
 def test_info_says_what_is_lost(whole: bytes, written: Written, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["info", str(written(flipped(whole, in_a_chunk(whole, 2))))]) == 0
+    assert main(["info", str(written(flipped(whole, in_a_chunk(whole, 2))))]) == 1
     out = capsys.readouterr().out.splitlines()
     assert out[0].endswith("damaged, see below")
     assert out[-1].startswith("damaged: chunk 3 of 5 cannot be read: ")
@@ -202,6 +202,26 @@ def test_recover_finishes_a_file_whose_process_was_killed(
     info, those = seen(tmp_path / "new.mcap")
     assert info.whole
     assert those == seen(cut)[1]
+
+
+def test_recover_of_a_file_of_which_nothing_is_left_fails(
+    whole: bytes, written: Written, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut = written(whole[: in_a_chunk(whole, 0)])
+    assert main(["recover", str(cut), "-o", str(tmp_path / "new.mcap")]) == 1
+    assert "new.mcap: 0 messages of " in capsys.readouterr().out
+    assert main(["info", str(tmp_path / "new.mcap")]) == 1
+
+
+def test_playing_a_damaged_recording_fails_and_says_so(
+    whole: bytes, written: Written, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "plays_damaged.py"
+    target.write_text("from tests.recording.test_damaged import build\n\ngraph = build()\n")
+    asked = ["--into", str(target), "--clock", "virtual"]
+    assert main(["play", str(written(flipped(whole, in_a_chunk(whole, 2)))), *asked]) == 1
+    assert "20 messages lost" in capsys.readouterr().err
+    assert main(["play", str(written(whole)), *asked]) == 0
 
 
 def test_recover_of_a_whole_file_loses_nothing(whole: bytes, written: Written, tmp_path: Path) -> None:
@@ -281,7 +301,7 @@ def test_a_limit_can_be_raised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
 
 
 def test_losses_are_in_the_json_of_info(whole: bytes, written: Written, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["info", "--json", str(written(flipped(whole, in_a_chunk(whole, 2))))]) == 0
+    assert main(["info", "--json", str(written(flipped(whole, in_a_chunk(whole, 2))))]) == 1
     found = msgspec.json.decode(capsys.readouterr().out)
     assert [one["messages"] for one in found["losses"]] == [20]
 
