@@ -10,6 +10,7 @@ one comes.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
@@ -72,6 +73,7 @@ _RULES: Final[dict[type[TraceEvent], str]] = {
     RunEnded: "R5",
     RunStarted: "A10",
 }
+_STEPS: Final = ("go on", "task", "time out")
 _LONGEST: Final = 100_000
 _PLACE: Final = re.compile(r" at 0x[0-9a-f]+")
 _SAME_TIME: Final = 1.5e-9  # one step of the grid of nanoseconds, whatever floats make of the difference
@@ -145,6 +147,7 @@ class Replay:
         self._paused = False  # time may go on although nodes are enabled (R3)
         self.expected: list[TraceEvent] = []
         self._delays: set[str] = set()
+        self._unheard: Counter[tuple[Any, ...]] = Counter()  # what only the reference has triggered yet for nobody
         self._torn_down: dict[str, TraceEvent] = {}  # nodes whose do-activity has ended for an edit that is to come
         self._look_at_edges()
         self._expect(self.machine.start())
@@ -163,7 +166,11 @@ class Replay:
         """
         if isinstance(event, RunPaused | RunResumed):
             self._paused = isinstance(event, RunPaused)
-        if self._is_idle(event) or self._was_torn_down(event):
+        if self._is_idle(event):
+            if isinstance(event, EventTriggered):
+                self._keep_up(event)
+            return
+        if self._was_torn_down(event):
             return
         if event.time > self.machine.now + _SAME_TIME:
             self._let_time_go(event)
@@ -241,6 +248,21 @@ class Replay:
 
     def _expect(self, events: list[TraceEvent]) -> None:
         self.expected += [event for event in events if not self._is_idle(event)]
+        idle = (event for event in events if isinstance(event, EventTriggered) and self._is_idle(event))
+        self._unheard.update(map(key, idle))
+
+    def _keep_up(self, event: EventTriggered) -> None:
+        """Bring code that triggers for nobody as far as in the run: an edit may change what it does next (R4)."""
+        if event.time > self.machine.now + _SAME_TIME:
+            self._let_time_go(event)
+        node, wanted = self._teller(event), key(event)
+        while self._unheard[wanted] < 1 and (steps := self._steps_of(node)):
+            self._apply(min(steps, key=lambda move: self._strangeness(move, event)))
+        self._unheard[wanted] -= 1
+
+    def _steps_of(self, node: str | None) -> list[Move]:
+        """What waiting code of a node may do next."""
+        return [move for move in self.machine.moves() if move.kind in _STEPS and move.node == node]
 
     def _is_idle(self, event: TraceEvent) -> bool:
         """Whether nobody could tell: events without edges, and what is not compared."""
@@ -342,8 +364,7 @@ class Replay:
         ringing = next((move for move in moves if self._rings(move, event)), None)
         if ringing is not None:
             return ringing
-        steps = [move for move in moves if move.kind in ("go on", "task", "time out") and move.node == node]
-        if steps:
+        if steps := [move for move in moves if move.kind in _STEPS and move.node == node]:
             return min(steps, key=lambda move: self._strangeness(move, event))
         fitting = (move for move in moves if self._leads_to(move, event, node) or self._follows_from_quiet(move, event))
         unseen = (move for move in moves if self._may_go_unseen(move, event))

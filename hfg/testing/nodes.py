@@ -1119,15 +1119,15 @@ class Gate(hfg.Node):
         if self.begun > 1:
             return
         if self.how in ("task", "both"):
-            self.start_soon(self.pump())
+            self.start_soon(self.pump(self.count))
         if self.how in ("burst", "both", "again"):
             for number in range(self.count):
                 self.request.trigger(number)
             self.aside.trigger(-1)
 
-    async def pump(self) -> None:
+    async def pump(self, count: int) -> None:
         """Ask as fast as there is room, and say something else now and then."""
-        for number in range(self.count):
+        for number in range(count):
             await self.request.trigger_wait(10 + number)
             if number % 3 == 2:
                 self.aside.trigger(number)
@@ -1150,13 +1150,13 @@ class Watch(hfg.Node):
     count = hfg.Parameter(6)
 
     def setup(self) -> None:
-        """Begin."""
-        self.start_soon(self.ticks())
+        """Begin; nobody sees when the task does, so the parameters are read here, before any edit."""
+        self.start_soon(self.ticks(self.count, self.period_s))
 
-    async def ticks(self) -> None:
+    async def ticks(self, count: int, period_s: float) -> None:
         """Tell the time."""
-        for number in range(self.count):
-            await asyncio.sleep(self.period_s)
+        for number in range(count):
+            await asyncio.sleep(period_s)
             self.tick.trigger(number)
 
 

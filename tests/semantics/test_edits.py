@@ -10,7 +10,7 @@ from hfg.testing.making import Allowed
 SEQUENCES = 300
 
 
-@pytest.mark.rule("R4", "A8", "G1", "F5", "F10")
+@pytest.mark.rule("R4", "A8", "G1", "F5", "F8", "F10")
 @pytest.mark.parametrize("block", range(20))
 def test_an_edited_run_does_what_the_oracle_permits(block: int) -> None:
     for seed in range(block * SEQUENCES // 20, (block + 1) * SEQUENCES // 20):
@@ -19,7 +19,7 @@ def test_an_edited_run_does_what_the_oracle_permits(block: int) -> None:
 
 def check(seed: int) -> int:
     """Edit one run; gives how many edits were carried out."""
-    allowed = Allowed(failures=seed % 3 == 0, waiting=seed % 2 == 0, doing=seed % 4 == 3)
+    allowed = Allowed(failures=seed % 3 == 0, waiting=seed % 2 == 0, doing=seed % 4 == 3, rings=seed % 7 == 5)
     if seed % 10 == 0:
         allowed = Allowed(threads=True, lossy=False, gates=False)
     edited = EditedRun(seed, allowed, quiet=seed % 3 == 1)
