@@ -52,8 +52,15 @@ def _refusal(
     from hfg.encoding import find_reference
     from hfg.errors import EncodingError
     from hfg.files.allowed import Allowed
+    from hfg.files.boxes import file_of
 
     allowed = Allowed(Path("commands").absolute(), allow, 'hfg.commands.decode(..., allow=["{top}"])')
+
+    def of_node(reference: str) -> str | None:
+        file = file_of(reference)  # commands have no other word for a file that is included
+        if file is not None and file.is_absolute() and file.resolve().is_relative_to(allowed.project):
+            return None
+        return allowed.refusal_of_reference(reference)
 
     def of_value(reference: str) -> str | None:
         why = allowed.refusal_of_reference(reference)
@@ -64,9 +71,7 @@ def _refusal(
         except EncodingError:
             return None  # there is none, which is told where it is applied
 
-    found = itertools.chain(
-        map(allowed.refusal_of_reference, references), map(of_value, values), map(allowed.refusal_of_type, types)
-    )
+    found = itertools.chain(map(of_node, references), map(of_value, values), map(allowed.refusal_of_type, types))
     return next(filter(None, found), None)
 
 

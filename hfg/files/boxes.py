@@ -26,7 +26,7 @@ from hfg.ports import Event, Input, Output, Parameter, ParameterSpec, slot
 from hfg.ports.conditions import Condition
 from hfg.ports.kinds import type_of_choices
 
-__all__ = ["LIMITS", "FileBox", "box_type", "conditions_in_words", "file_box_type", "limits_in_words"]
+__all__ = ["LIMITS", "FileBox", "box_type", "conditions_in_words", "file_box_type", "file_of", "limits_in_words"]
 
 Fill = Callable[[Any, Graph], None]
 """Takes a subgraph and the graph inside it."""
@@ -237,6 +237,14 @@ def limits_in_words(limits: tuple[Any, ...]) -> dict[str, Any] | None:
             return None
         found[word] = getattr(limit, LIMITS[word][1])
     return found
+
+
+def file_of(reference: str) -> Path | None:
+    """Give the file that the reference of a type stands for; None of others."""
+    module, _, name = reference.partition(":")
+    if module != __name__ or not (name.startswith("File[") and name.endswith("]")):
+        return None
+    return Path(unquote(name.removeprefix("File[").removesuffix("]")))
 
 
 def __getattr__(name: str) -> Any:

@@ -6,6 +6,7 @@ import json
 import sys
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import pytest
 
@@ -68,3 +69,14 @@ def test_a_time_of_day_in_a_value_is_no_reference() -> None:
     value = {"$type": "datetime:datetime", "value": "2026-01-02T10:00:00"}
     command = {"do": "SetParameter", "path": "a.b", "value": value}
     assert hfg.commands.decode(json.dumps([command]))
+
+
+def test_an_included_file_is_named_if_it_is_in_the_project(tmp_path: Path) -> None:
+    for folder, is_read in ((tmp_path, True), (tmp_path.parent, False)):
+        quoted = quote(str(folder / "part.hfg.yaml"), safe="").replace(".", "%2E")
+        text = json.dumps([{"do": "Add", "type": f"hfg.files.boxes:File[{quoted}]", "path": "a"}])
+        if is_read:
+            assert hfg.commands.decode(text)
+        else:
+            with pytest.raises(GraphError, match="stands for another file"):
+                hfg.commands.decode(text)
