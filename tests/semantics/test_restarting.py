@@ -126,26 +126,27 @@ def test_a_run_that_ends_in_a_back_off_does_not_tear_down_again(fast: bool) -> N
 
 @pytest.mark.rule("X1")
 def test_a_failure_beside_a_firing_waits_for_its_end_before_the_node_is_torn_down(fast: bool) -> None:
-    from annotated_types import Le
-
-    class Limited(hfg.Node):
-        level = hfg.Parameter(0, Le(0))
+    class Tends(hfg.Node):
         story: list[Any] = []  # noqa: RUF012
 
         async def process(self, value: int) -> None:
             self.story.append("begin")
+            self.start_soon(self._fail())
             await asyncio.sleep(1)
             self.story.append("end")
+
+        async def _fail(self) -> None:
+            await asyncio.sleep(0.5)
+            raise ValueError("beside")
 
         def teardown(self) -> None:
             self.story.append("close")
 
     graph = hfg.Graph()
-    node, source = graph.add(Limited(), on_error="restart"), graph.add(numbers(count=1))
-    graph.connect(source.out, node.ports.parameters["level"])
+    node, source = graph.add(Tends(), on_error="restart"), graph.add(numbers(count=1))
     graph.connect(source.out, node.ports.inputs["value"])
     run(graph, fast)
-    assert Limited.story == ["begin", "end", "close", "close"]
+    assert Tends.story == ["begin", "end", "close", "close"]
 
 
 @pytest.mark.rule("F10")
