@@ -54,9 +54,9 @@ def _rings_across(flat: FlatGraph, crossing: set[int]) -> Iterator[Problem]:
         if across is not None:
             yield Problem(
                 path=across.label,
-                severity="error",
+                severity="hint",
                 what="a ring of edges whose queues wait leads through another process",
-                why="should all of its nodes wait for each other, no process would see it (rule F8)",
+                why="if they all wait for each other, a queue grows only once no process of the run moves (rule F8)",
                 remedy='let one process have all of its nodes, or say overflow="latest" or another that does not wait',
                 check="process-border",
             )
