@@ -5,10 +5,10 @@ Stands on `components`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 
 from hfg.graph import Graph
-from hfg.graph.flat import LINK, ROOT, Cutting, cut, flatten
+from hfg.graph.flat import LINK, ROOT, Cutting, FlatGraph, FlatNode, cut, flatten
 from hfg.parts.model.components import components
 from hfg.parts.model.inheriting import keeping
 from hfg.problem import Problem
@@ -49,30 +49,32 @@ def uncounted(cutting: Cutting, part: str, kept: Collection[str]) -> tuple[str, 
     if part in kept:
         return ()
     flat = cutting.parts[part]
-    found = [one for one in components(cutting, kept)[part] if one.cost != "nothing"]
-    paths = {path for one in found for path in one.nodes}
+    costly = [one for one in components(cutting, kept)[part] if one.cost != "nothing"]
+    paths = {path for one in costly for path in one.nodes}
     nodes = {node.index: node for node in flat.nodes if node.path in paths}
-    said = []
+    sources = [one.source for one in costly if one.source]
+    again = [f'source "{source}" began again from its start: what it had sent is sent once more' for source in sources]
+    return (*_lost_work(nodes), *_lost_tokens(flat, nodes), *_repeated_starts(flat), *again)
+
+
+def _lost_work(nodes: Mapping[int, FlatNode]) -> Iterator[str]:
     if work := sum(node.options.concurrency for node in nodes.values()):
-        said.append(f"up to {_many(work, 'firing or slot call', 'firings and slot calls')} under way were lost with it")
-    tokens = sum(
-        edge.capacity if edge.is_event_edge else 1 + edge.buffer
-        for edge in flat.edges
-        if edge.source.node in nodes and (edge.is_event_edge or edge.target.node != LINK)  # else each is counted
-    )
-    if tokens:
+        yield f"up to {_many(work, 'firing or slot call', 'firings and slot calls')} under way were lost with it"
+
+
+def _lost_tokens(flat: FlatGraph, nodes: Collection[int]) -> Iterator[str]:
+    own = (edge for edge in flat.edges if edge.source.node in nodes)
+    inside = [edge for edge in own if edge.is_event_edge or edge.target.node != LINK]  # each of the others is counted
+    if tokens := sum(edge.capacity if edge.is_event_edge else 1 + edge.buffer for edge in inside):
         of_what = "on its own edges, signals not sent yet among them, were lost with it; more if queues had grown"
-        said.append(f"up to {_many(tokens, 'token', 'tokens')} {of_what}")
+        yield f"up to {_many(tokens, 'token', 'tokens')} {of_what}"
+
+
+def _repeated_starts(flat: FlatGraph) -> Iterator[str]:
     if begun := sum(edge.source.node == ROOT and edge.source.name == "start" for edge in flat.edges):
         leaves = any(edge.active and edge.target.node == LINK for edge in flat.edges)
         again = ": activity that had left it may exist once more for each" if leaves else ""
-        said.append(f"start was triggered in it again, with {_many(begun, 'signal', 'signals')}{again}")
-    said += [
-        f'source "{one.source}" began again from its start: what it had sent is sent once more'
-        for one in found
-        if one.source
-    ]
-    return tuple(said)
+        yield f"start was triggered in it again, with {_many(begun, 'signal', 'signals')}{again}"
 
 
 def _many(count: int, one: str, more: str) -> str:
