@@ -28,6 +28,7 @@ __all__ = [
     "ProcessKind",
     "Result",
     "SlotSpec",
+    "TypesByName",
     "look_up",
     "parameter_values",
     "read_only_refusal",
@@ -222,6 +223,10 @@ def _documented(doc: str) -> Mapping[str, str]:
     return {one.arg_name: " ".join(one.description.split()) for one in found if one.description}
 
 
+class TypesByName:
+    """An object whose attributes are node types, so that a reference may lead through it: "module:object.name"."""
+
+
 def look_up(module: str, qualname: str) -> Any:
     """Find a name in a module that is already imported, or in classes there; None if there is no such name.
 
@@ -230,7 +235,7 @@ def look_up(module: str, qualname: str) -> Any:
     first, *nested = qualname.split(".")
     found: Any = getattr(sys.modules.get(module), first, None)
     for part in nested:
-        found = getattr(found, part, None) if isinstance(found, type) else None
+        found = getattr(found, part, None) if isinstance(found, type | TypesByName) else None
     return None if isinstance(found, ModuleType) else found
 
 

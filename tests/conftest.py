@@ -6,6 +6,7 @@ With `--fuse-after 0` all runs fuse their regions from the first firing on.
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Generator
 
 import pytest
@@ -75,3 +76,15 @@ def _loggers_are_as_they_were() -> Generator[None, None, None]:
     for one, level, propagate, disabled, handlers in kept:
         one.setLevel(level)
         one.propagate, one.disabled, one.handlers[:] = propagate, disabled, handlers
+
+
+@pytest.fixture(autouse=True)
+def _modules_are_as_they_were(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, None]:
+    """A test leaves neither its folders on the path nor its own modules: another test has a `robot.py` too."""
+    path, loaded = list(sys.path), set(sys.modules)
+    yield
+    sys.path[:] = path
+    folder = str(tmp_path_factory.getbasetemp())
+    for name in set(sys.modules) - loaded:
+        if (getattr(sys.modules[name], "__file__", None) or "").startswith(folder):
+            del sys.modules[name]

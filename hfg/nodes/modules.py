@@ -29,6 +29,7 @@ import docstring_parser
 import numpy as np
 
 from hfg.declaration import RESERVED
+from hfg.description import TypesByName
 from hfg.errors import DeclarationError
 from hfg.functions import NodeFunction, make_type
 from hfg.nodes._making import Port, Recipe, Setting, make
@@ -68,7 +69,7 @@ def from_module(module: ModuleType, *, only: Collection[str] | None = None) -> F
     return FunctionNodes(module, names, home)
 
 
-class FunctionNodes:
+class FunctionNodes(TypesByName):
     """The functions of a module as node types, by name.
 
     Attributes:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -61,13 +60,11 @@ def aborting() -> hfg.Graph:
 
 
 @pytest.fixture
-def hfg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Command]:
+def hfg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
     """Give the command, in a folder with `halves.py`."""
     (tmp_path / "halves.py").write_text(GRAPH, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    yield Command(capsys)
-    sys.modules.pop("halves", None)
+    return Command(capsys)
 
 
 TARGET = "halves.py:graph"

@@ -617,6 +617,7 @@ def test_what_may_not_be_written_is_told(made: Any, value: Any, monkeypatch: pyt
         raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(Path, "open", forbidden)
+    monkeypatch.setattr(os, "open", forbidden)
     with pytest.raises(hfg.errors.RunError, match=r'PermissionError: cannot write "a" .*: it is not permitted; change'):
         written(made(path="a"), value)
 
