@@ -31,7 +31,7 @@ from benchmarks.measure import ROOT, Record, machine, one, versions, write
 from benchmarks.meters import Arrivals
 from benchmarks.nodes import through
 from benchmarks.ours import Kind, run
-from hfg.token import Token
+from hfg.base.token import Token
 
 __all__ = ["PARTS", "Frame", "Part", "part_of", "shares", "stacks"]
 

@@ -2,38 +2,37 @@
 
 Which floor stands on which; imports go down only, and asyncio begins on floor 5:
 
-    7  cli      meeting   composing
+    7  cli      pubsub    composing
     6  nodes    files   recording   reporting   parts   catalogue     beside: testing (sees all; nobody below sees it)
     5  engine   links at work                             outside: hfg_transports (sees floors 0-1 only)
     4  activity   links   timeline
     3  graph
-    2  nodetype, functions  <-  declaration  <-  vectors, signature  <-  hints, description     registry
+    2  nodetypes   registry
     1  ports                transport   sharedmemory
-    0  errors  problem  token  types  values  limits  bounds  controls  encoding  images  generics  clock  frames
-       logs  trace  starting  whole
+    0  errors  types  <-  base  <-  encoding  images  trace
 
 A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
 """
 
-from hfg import starting as starting  # before all that takes its time to import
+from hfg.base import starting as starting  # before all that takes its time to import
 
 # isort: split
 from hfg import composing as composing  # what stands high and is called from below
 from hfg import errors
 from hfg.activity import StateMachine
-from hfg.clock import elapsed, now
+from hfg.base.clock import elapsed, now
+from hfg.base.logs import log
+from hfg.base.token import END, NO_MESSAGE, Token
+from hfg.base.values import Colour, Span
 from hfg.engine import PunctualLoop, Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
 from hfg.errors import EndOfStream, Failure
 from hfg.files import load, save
-from hfg.functions import node
 from hfg.graph import Graph, Subgraph, commands, operator
-from hfg.logs import log
-from hfg.meeting import publish, subscribe
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
+from hfg.pubsub import publish, subscribe
 from hfg.registry import reference_of
-from hfg.token import END, NO_MESSAGE, Token
-from hfg.values import Colour, Span
 
 __all__ = [
     "END",
@@ -78,3 +77,7 @@ __all__ = [
     "slot",
     "subscribe",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

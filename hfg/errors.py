@@ -28,18 +28,18 @@
     └── EngineInternalError   a fault of hfg, never of the user
 
 A class exists when somebody would catch it apart from its neighbours. Each message names the path in the graph, what
-was expected, what was found, and what to do. Stands on nothing.
+was expected, what was found, and what to do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
-if TYPE_CHECKING:
-    from hfg.problem import Problem
+import msgspec
 
 __all__ = [
+    "SEVERITIES",
     "Aborted",
     "CheckFailed",
     "ConnectionError",
@@ -57,6 +57,7 @@ __all__ = [
     "NoAnswer",
     "NodeError",
     "NotRunning",
+    "Problem",
     "QueryRefused",
     "QueueLimit",
     "QueueOverflow",
@@ -70,6 +71,33 @@ __all__ = [
     "in_words",
     "shown",
 ]
+
+SEVERITIES: Final = ("error", "warning", "hint")
+"""The worst first."""
+
+
+class Problem(msgspec.Struct, frozen=True):
+    """One finding of `graph.check()`.
+
+    Attributes:
+      path: the node, port or edge it is about.
+      severity: a run refuses graphs with an "error"; a "warning" is only told, for what does not work as it is drawn;
+        a "hint" is for what may be meant so.
+      what: the fact, in a few words.
+      why: the rule or the consequence.
+      remedy: what to do.
+      check: the name of the check that found it, as docs/howto/checks.md lists them.
+    """
+
+    path: str
+    severity: Literal["error", "warning", "hint"]
+    what: str
+    why: str
+    remedy: str
+    check: str = ""
+
+    def __str__(self) -> str:
+        return f'{self.severity} at "{self.path}": {self.what}: {self.why}; {self.remedy}'
 
 
 _SHOWN = 20  # findings of a check that a message lists

@@ -11,10 +11,10 @@ import inspect
 import sys
 from typing import Any
 
-from hfg.description import look_up
 from hfg.errors import TargetError
-from hfg.functions import NodeFunction
-from hfg.nodetype import Node
+from hfg.nodetypes.description import look_up
+from hfg.nodetypes.functions import NodeFunction
+from hfg.nodetypes.node import Node
 
 __all__ = ["find", "reference_of"]
 

@@ -19,6 +19,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from hfg.base.whole import GrowingFile
 from hfg.errors import UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph, FlatNode, flatten
@@ -41,7 +42,6 @@ from hfg.trace import (
     TokenTaken,
     TraceEvent,
 )
-from hfg.whole import GrowingFile
 
 __all__ = ["Timeline"]
 

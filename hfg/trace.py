@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeAlias
 
 import msgspec
 
-from hfg.token import Token
+from hfg.base.token import Token
 
 __all__ = [
     "ActivityCause",

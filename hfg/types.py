@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import is_protocol
 
-from hfg import generics
+from hfg.base import generics
 from hfg.errors import shown
 
 __all__ = [

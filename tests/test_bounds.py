@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import hfg
-from hfg.bounds import BOUNDS, PICTURE_PIXELS, Bound
+from hfg.base.bounds import BOUNDS, PICTURE_PIXELS, Bound
 from hfg.encoding.pictures import need_fair_size
 from hfg.encoding.plain import json_value
 from hfg.nodes.files.reading import json_of, read_bytes

@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hfg
+from hfg.base.controls import escaped
 from hfg.cli import show
 from hfg.cli.app import main
-from hfg.controls import escaped
 from hfg.errors import FileError, GraphError
 from hfg.nodes.display import TextDisplay
 from hfg.testing import fire

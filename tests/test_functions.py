@@ -17,8 +17,8 @@ from annotated_types import Ge, Interval
 
 import hfg
 from hfg.errors import DeclarationError, UsageError
-from hfg.functions import FunctionNode, NodeFunction
 from hfg.images import Image
+from hfg.nodetypes.functions import FunctionNode, NodeFunction
 
 if TYPE_CHECKING:
     from decimal import Decimal

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 import pytest
 
 import hfg
-from hfg.declaration import RESERVED, snake_case
 from hfg.errors import DeclarationError, EngineInternalError, UsageError
-from hfg.nodetype import Place
+from hfg.nodetypes.declaration import RESERVED, snake_case
+from hfg.nodetypes.node import Place
 from hfg.ports import Relaying
 
 if TYPE_CHECKING:

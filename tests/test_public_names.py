@@ -67,7 +67,12 @@ def test_the_face_defines_nothing() -> None:
         is_docstring = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
         is_all = isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == "__all__"
         is_import = isinstance(statement, ast.Import | ast.ImportFrom)
-        assert is_docstring or is_all or is_import, f"hfg/__init__.py:{statement.lineno} defines something"
+        is_dir = isinstance(statement, ast.FunctionDef) and statement.name == "__dir__"
+        assert is_docstring or is_all or is_import or is_dir, f"hfg/__init__.py:{statement.lineno} defines something"
+
+
+def test_completion_shows_the_public_names_only() -> None:
+    assert dir(hfg) == sorted(hfg.__all__)
 
 
 def test_no_module_is_named_like_a_public_function() -> None:

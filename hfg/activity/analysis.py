@@ -12,11 +12,11 @@ from collections import deque
 from collections.abc import Iterator
 
 from hfg.activity.explicit import may_give_activity
+from hfg.errors import Problem
 from hfg.graph.checks import also
 from hfg.graph.checks.flow import never_fires
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.graph.flat.order import strongly_connected
-from hfg.problem import Problem
 
 __all__ = ["ActivityAnalysis", "activity_problems"]
 

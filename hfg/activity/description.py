@@ -11,9 +11,8 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, TypeAlias
 
-from hfg.errors import MachineError
+from hfg.errors import MachineError, Problem
 from hfg.graph.structure.naming import suggest
-from hfg.problem import Problem
 
 __all__ = [
     "Described",

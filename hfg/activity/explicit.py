@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, Final
 
-from hfg.nodetype import Node, NodeType
+from hfg.nodetypes.node import Node, NodeType
 
 __all__ = ["may_give_activity"]
 

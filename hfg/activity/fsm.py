@@ -13,10 +13,10 @@ from typing import Any
 from hfg.activity.description import Described, Missing, Transition, findings, listed, reject, unreachable
 from hfg.activity.machine_dicts import read
 from hfg.activity.translation import build, read_out
+from hfg.errors import Problem
 from hfg.graph import Graph
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import SlotPort, Source
-from hfg.problem import Problem
 
 __all__ = ["StateMachine"]
 

@@ -11,8 +11,8 @@ from enum import Enum
 from typing import Any, Final
 
 from hfg.activity.description import Described, Missing, error, findings, reject, shape
+from hfg.errors import Problem
 from hfg.graph.structure.naming import suggest
-from hfg.problem import Problem
 
 __all__ = ["read"]
 

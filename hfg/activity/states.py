@@ -12,9 +12,9 @@ from collections.abc import Iterable
 from typing import Any, Final
 from urllib.parse import quote, unquote
 
-from hfg.declaration import RESERVED
-from hfg.functions import node
-from hfg.nodetype import Node
+from hfg.nodetypes.declaration import RESERVED
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Parameter, slot
 
 __all__ = ["StateNode", "event_name", "letter_name", "one_by_one", "state_type"]

@@ -12,15 +12,14 @@ from typing import Any
 
 from hfg.activity.description import Described, Transition, both, error, reject
 from hfg.activity.states import StateNode, event_name, letter_name, one_by_one, state_type
-from hfg.errors import GraphError
+from hfg.errors import GraphError, Problem
 from hfg.graph import Graph
 from hfg.graph.flat import ROOT, FlatEdge, FlatGraph, flatten
 from hfg.graph.structure.finding import candidates
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.subgraph import is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import SlotPort
-from hfg.problem import Problem
 
 __all__ = ["build", "read_out"]
 

@@ -13,11 +13,11 @@ from typing import Any, Final
 import annotated_types
 import msgspec
 
+from hfg.base.limits import Inside
 from hfg.catalogue.documentation import Documentation, read_documentation
-from hfg.description import EventSpec, NodeType
-from hfg.functions import NodeFunction
-from hfg.limits import Inside
-from hfg.nodetype import Node
+from hfg.nodetypes.description import EventSpec, NodeType
+from hfg.nodetypes.functions import NodeFunction
+from hfg.nodetypes.node import Node
 from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.types import describe
 

@@ -20,11 +20,11 @@ from typing import Any, Final
 
 from hfg.catalogue.describing import TypeDescription, describe_type
 from hfg.catalogue.offers import Offer, offers
-from hfg.description import NodeType
 from hfg.errors import in_words
-from hfg.functions import FunctionNode, NodeFunction
 from hfg.graph import Subgraph
-from hfg.nodetype import Node
+from hfg.nodetypes.description import NodeType
+from hfg.nodetypes.functions import FunctionNode, NodeFunction
+from hfg.nodetypes.node import Node
 
 __all__ = ["Catalogue", "installed", "submodules", "types_of"]
 

@@ -12,11 +12,10 @@ import typer
 from hfg.cli import show
 from hfg.cli.options import AllowOption, ArgOption, TargetArgument
 from hfg.cli.target import load_graph
-from hfg.errors import CheckFailed, FileError, HfgError, MachineError, TargetError
+from hfg.errors import SEVERITIES, CheckFailed, FileError, HfgError, MachineError, Problem, TargetError
 from hfg.graph import Graph
 from hfg.graph.structure.refusals import keep_refusals, problem_of
 from hfg.parts.model.costs import costs_of_deaths
-from hfg.problem import SEVERITIES, Problem
 
 __all__ = ["check"]
 

@@ -17,7 +17,7 @@ import typer
 from hfg.cli.target import load_graph
 from hfg.graph import Graph
 from hfg.graph.structure.subgraph import is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["parameters", "ports", "targets"]
 

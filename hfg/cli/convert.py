@@ -11,12 +11,12 @@ from typing import Annotated
 
 import typer
 
+from hfg.base.whole import write_whole
 from hfg.cli import completing, show
 from hfg.cli.options import AllowOption, ArgOption
 from hfg.cli.target import SUFFIXES, load_graph
 from hfg.errors import TargetError, UsageError
 from hfg.files import apex, describe, save, schema, text_of, write
-from hfg.whole import write_whole
 
 __all__ = ["convert"]
 

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Final, TextIO
 
 import typer
 
+from hfg.base.whole import GrowingFile
 from hfg.cli import show
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
@@ -40,7 +41,6 @@ from hfg.errors import HfgError, TargetError
 from hfg.graph import Graph
 from hfg.timeline import Timeline
 from hfg.trace import TraceEvent
-from hfg.whole import GrowingFile
 
 __all__ = ["run"]
 

@@ -15,12 +15,12 @@ from typing import Any
 
 import msgspec
 
-from hfg.clock import current_elapsed
-from hfg.controls import escaped
+from hfg.base.clock import current_elapsed
+from hfg.base.controls import escaped
+from hfg.base.frames import is_machinery, is_standard
 from hfg.engine.observing.encoding import encode
 from hfg.engine.observing.report import Report
 from hfg.errors import EngineInternalError, FileError, NodeError, TeardownError
-from hfg.frames import is_machinery, is_standard
 
 __all__ = [
     "Records",

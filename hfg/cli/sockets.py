@@ -12,11 +12,11 @@ from typing import Final
 
 import msgspec
 
+from hfg.base.private import is_of_this_user
 from hfg.cli import show
 from hfg.engine.face.watching import Answer, Question, folder, sockets
 from hfg.engine.observing.encoding import encode
 from hfg.errors import TargetError
-from hfg.private import is_of_this_user
 
 __all__ = ["Line", "find", "is_process", "runs", "which"]
 

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
+from hfg.base.controls import escaped
 from hfg.cli import completing, show
 from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
@@ -22,7 +23,6 @@ from hfg.cli.options import AllowOption, Clock, ClockOption, DebugOption, ParamO
 from hfg.cli.settings import set_parameters
 from hfg.cli.sockets import Line, find, is_process, runs, which
 from hfg.cli.target import SUFFIXES, load_graph
-from hfg.controls import escaped
 from hfg.engine import Run
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import line_of

@@ -19,9 +19,9 @@ from typing import Any, Final
 from hfg.cli.arguments import builder_arguments
 from hfg.errors import TargetError, in_words
 from hfg.files import apex, load
-from hfg.functions import NodeFunction
 from hfg.graph import Graph
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import NodeFunction
+from hfg.nodetypes.node import Node
 
 __all__ = ["SUFFIXES", "import_from_here", "load_graph", "load_module"]
 

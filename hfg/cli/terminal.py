@@ -16,7 +16,7 @@ from typing import Any, TextIO
 
 from rich.cells import cell_len
 
-from hfg import controls
+from hfg.base import controls
 
 __all__ = ["Foot", "is_terminal"]
 

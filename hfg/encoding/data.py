@@ -31,9 +31,9 @@ from typing import Any, Final, Literal
 import msgspec
 import numpy as np
 
+from hfg.base.values import Colour, Span, same
 from hfg.errors import EncodingError
 from hfg.types import accepts, bare_type, describe, describe_value
-from hfg.values import Colour, Span, same
 
 __all__ = [
     "TAG",

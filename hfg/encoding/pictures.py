@@ -12,7 +12,7 @@ import struct
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from hfg.bounds import PICTURE_PIXELS
+from hfg.base.bounds import PICTURE_PIXELS
 
 __all__ = ["need_fair_size", "pixels_problem", "size_of"]
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import msgspec
 
-from hfg.bounds import JSON_VALUES
+from hfg.base.bounds import JSON_VALUES
 
 __all__ = ["json_value"]
 

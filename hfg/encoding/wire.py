@@ -18,10 +18,10 @@ from typing import Annotated, Any, Final, Generic, NamedTuple, TypeVar
 import msgspec
 import numpy as np
 
+from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.encoding.arrays import ArrayHead, Lease, bytes_of, view_of
 from hfg.encoding.codecs import Codec, Unfit, codec_for
 from hfg.errors import EncodingError
-from hfg.token import END, NO_MESSAGE, Marker, Token
 
 __all__ = ["Limits", "Place", "TokenCodec", "View"]
 

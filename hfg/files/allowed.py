@@ -17,12 +17,12 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Final
 
-from hfg.description import look_up
 from hfg.encoding import is_data_type
 from hfg.files import boxes
-from hfg.functions import NodeFunction
 from hfg.graph.structure.operators import OperatorFunction
-from hfg.nodetype import Node
+from hfg.nodetypes.description import look_up
+from hfg.nodetypes.functions import NodeFunction
+from hfg.nodetypes.node import Node
 
 __all__ = ["Allowed", "installed_packages", "project_of"]
 

@@ -47,7 +47,7 @@ from hfg.graph.structure.operators import find_operator
 from hfg.graph.structure.pointing import node_at, source_at, target_at
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.graph.structure.subgraph import Subgraph, inside
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["box_of_file", "build", "load", "modules_of"]
 

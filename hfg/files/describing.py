@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
+from hfg.base.values import same
 from hfg.encoding import encode
 from hfg.errors import EncodingError, UsageError
 from hfg.files.allowed import project_of
@@ -39,11 +40,10 @@ from hfg.graph.structure.operators import NamedOperator
 from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
 from hfg.graph.structure.refusals import raise_refusals
 from hfg.graph.structure.subgraph import Subgraph, inside, is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, ParameterSpec, Port
 from hfg.ports.kinds import choices_of, type_of_choices
 from hfg.ports.specs import REQUIRED
-from hfg.values import same
 
 __all__ = ["describe"]
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
-from hfg.errors import FileError
-from hfg.problem import Problem
+from hfg.errors import FileError, Problem
 
 __all__ = ["FileProblem", "Findings", "Key", "Lines", "graph_path", "split"]
 

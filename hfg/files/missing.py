@@ -13,13 +13,13 @@ from typing import Any, ClassVar, Final
 
 from typing_extensions import override
 
-from hfg.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
+from hfg.errors import Problem
 from hfg.files.document import EdgeDocument, NodeDocument
 from hfg.graph.checks.checking import also
 from hfg.graph.flat.flattening import FlatGraph
-from hfg.nodetype import Node
+from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
+from hfg.nodetypes.node import Node
 from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS, sent_of
-from hfg.problem import Problem
 
 __all__ = ["MissingNode", "missing_node", "missing_types"]
 

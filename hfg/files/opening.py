@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from hfg.bounds import GRAPH_FILE_BYTES
+from hfg.base.bounds import GRAPH_FILE_BYTES
 from hfg.files.findings import Findings
 
 __all__ = ["bytes_of", "text_in"]

@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import msgspec
 from msgspec import inspect
 
-from hfg.controls import name_problem
+from hfg.base.controls import name_problem
 from hfg.files.document import SUFFIX, VERSION, Document, EdgeDocument, NodeDocument, OperatorDocument
 from hfg.files.findings import Findings, Key, Lines, graph_path
 from hfg.files.opening import bytes_of, text_in

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
+from hfg.base.whole import write_whole
 from hfg.files.document import (
     VERSION,
     BoxDocument,
@@ -15,7 +16,6 @@ from hfg.files.document import (
     OperatorDocument,
 )
 from hfg.files.emitting import emit
-from hfg.whole import write_whole
 
 __all__ = ["text_of", "write_text"]
 

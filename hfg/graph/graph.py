@@ -16,7 +16,8 @@ from typing import Any, Final, Literal, Never, TypeVar, overload
 from reactivex import Observable
 from typing_extensions import TypeForm
 
-from hfg.errors import UsageError
+from hfg.base.token import Token
+from hfg.errors import Problem, UsageError
 from hfg.graph.checks.checking import check
 from hfg.graph.editing import transactions
 from hfg.graph.editing.commands import Command
@@ -36,10 +37,8 @@ from hfg.graph.structure.options import DEFAULT_CAPACITY, Errors, GroupSpec, OnE
 from hfg.graph.structure.pointing import node_at
 from hfg.graph.structure.promoting import promote
 from hfg.graph.structure.whole import Whole
-from hfg.nodetype import Node, Place
+from hfg.nodetypes.node import Node, Place
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort, Source, Target
-from hfg.problem import Problem
-from hfg.token import Token
 
 __all__ = ["Graph"]
 

@@ -15,12 +15,12 @@ from typing import Any
 
 import msgspec
 
+from hfg.base.logs import Log
 from hfg.errors import TransportError
 from hfg.links.bounded import BoundedConsumer, BoundedProducer
 from hfg.links.consumer import ExactConsumer
 from hfg.links.frames import Outgoing
 from hfg.links.producer import ExactProducer
-from hfg.logs import Log
 from hfg.transport import Buffer, Closing, Datagrams, Delivery, EncodedToken, Message, Position, Publisher, Traffic
 
 __all__ = ["BoundedReceiver", "BoundedSender", "LinkReceiver", "LinkSender"]

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from hfg.clock import elapsed
-from hfg.nodetype import Node
+from hfg.base.clock import elapsed
+from hfg.nodetypes.node import Node
 
 __all__ = ["Alarm"]
 

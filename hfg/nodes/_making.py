@@ -1,7 +1,7 @@
 """Makes node types of plain descriptions: how the generated families come to their functions.
 
-A generated type is a function like any other for `hfg.functions`: it has a signature, annotations and a docstring, and
-a module and a name under which it is found again.
+A generated type is a function like any other for `hfg.nodetypes.functions`: it has a signature, annotations and a
+docstring, and a module and a name under which it is found again.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from typing import Annotated, Any, Final, Literal
 
 from annotated_types import Unit
 
-from hfg.declaration import RESERVED
-from hfg.functions import NodeFunction, make_type
+from hfg.nodetypes.declaration import RESERVED
+from hfg.nodetypes.functions import NodeFunction, make_type
 from hfg.ports.specs import REQUIRED
 
 __all__ = ["Port", "Recipe", "Setting", "holds_reals", "make", "port_name"]

@@ -7,7 +7,7 @@ from typing import Any
 import cv2
 
 from hfg.images import Picture, wrong_image
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["colour", "gray", "need_picture", "refusal"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from hfg.controls import escaped, is_terminal
+from hfg.base.controls import escaped, is_terminal
 
 __all__ = ["print_line"]
 

@@ -15,7 +15,7 @@ from annotated_types import Ge
 
 from hfg.graph import Graph, Subgraph
 from hfg.nodes._alarm import Alarm
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
 
 __all__ = [

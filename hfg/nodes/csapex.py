@@ -15,9 +15,9 @@ from typing import Any, Final, Literal
 import numpy as np
 from annotated_types import Interval, Predicate
 
-from hfg.functions import node
 from hfg.images import AnyImage, Color
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Inputs, Output, Parameter
 
 __all__ = ["ExampleImage", "UserSwitch", "combine_images"]

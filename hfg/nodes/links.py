@@ -15,7 +15,8 @@ from typing import Any, Literal
 
 from annotated_types import Ge, Predicate
 
-from hfg.clock import now
+from hfg.base.clock import now
+from hfg.base.token import END, Token
 from hfg.encoding import type_fingerprint, wire_problem
 from hfg.errors import EndOfStream, HfgError, UsageError
 from hfg.graph import Graph
@@ -25,9 +26,8 @@ from hfg.links.meeting import OutboxFile, Publication, Subscription
 from hfg.links.offers import need_link_name
 from hfg.nodes._sessions import share
 from hfg.nodes.files.access import is_a_path
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter
-from hfg.token import END, Token
 from hfg.types import describe
 
 __all__ = ["Publish", "Subscribe"]

@@ -10,9 +10,9 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
 from hfg.nodes._equality import same
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Parameter, Slots, State, slot
 
 __all__ = [

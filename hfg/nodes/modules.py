@@ -28,11 +28,11 @@ from typing import Any, Final, Literal
 import docstring_parser
 import numpy as np
 
-from hfg.declaration import RESERVED
-from hfg.description import TypesByName
 from hfg.errors import DeclarationError
-from hfg.functions import NodeFunction, make_type
 from hfg.nodes._making import Port, Recipe, Setting, make
+from hfg.nodetypes.declaration import RESERVED
+from hfg.nodetypes.description import TypesByName
+from hfg.nodetypes.functions import NodeFunction, make_type
 from hfg.ports.specs import REQUIRED
 from hfg.types import Array, accepts, is_hint
 

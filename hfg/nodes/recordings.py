@@ -12,7 +12,7 @@ from annotated_types import Ge
 
 from hfg.errors import UsageError
 from hfg.graph.structure.naming import suggest
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Output, Parameter
 from hfg.recording.players import Player, tell_losses
 from hfg.recording.reading import File

@@ -14,12 +14,12 @@ from typing import Annotated, Any
 
 from annotated_types import Ge, Gt, Unit
 
-from hfg import clock
-from hfg.functions import node
+from hfg.base import clock
+from hfg.base.token import Token
 from hfg.nodes._alarm import Alarm
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
-from hfg.token import Token
 
 __all__ = [
     "Clock",

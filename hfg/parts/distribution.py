@@ -20,13 +20,13 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from hfg.base.logs import Log
 from hfg.engine import Run
 from hfg.engine.face.composition import Composition
 from hfg.engine.observing.report import EdgeReport, Report
 from hfg.errors import HfgError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, CutEdge, Cutting, FlatGraph, cut
-from hfg.logs import Log
 from hfg.parts.hosts.realm import PartIs
 from hfg.parts.hosts.standing import Standing
 from hfg.parts.model.agreement import Agreement, Question, Rest

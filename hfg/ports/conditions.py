@@ -11,9 +11,9 @@ from typing import Any, TypeAlias, cast
 import annotated_types as at
 import msgspec
 
+from hfg.base.limits import Inside, breaks, limits_of
+from hfg.base.values import same
 from hfg.errors import DeclarationError
-from hfg.limits import Inside, breaks, limits_of
-from hfg.values import same
 
 __all__ = ["Condition", "ShownIf", "conditions_of"]
 

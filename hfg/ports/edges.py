@@ -11,8 +11,8 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any, Final, Literal, TypeAlias
 
+from hfg.base.token import Token
 from hfg.errors import EngineInternalError
-from hfg.token import Token
 
 __all__ = ["ACTIVITY", "NUMBER", "VALUE", "AnyEdge", "BufferEdge", "Edge", "EventEdge", "Lying", "Overflow", "SyncEdge"]
 

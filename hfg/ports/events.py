@@ -13,11 +13,11 @@ from reactivex import abc
 from reactivex.disposable import Disposable
 from typing_extensions import TypeForm
 
-from hfg.logs import Log
+from hfg.base.logs import Log
+from hfg.base.token import Token
 from hfg.ports.base import Kind, Owner, Port, Source
 from hfg.ports.observable import RunObservable
 from hfg.ports.relays import InnerTarget, inner_target
-from hfg.token import Token
 
 __all__ = ["Event", "EventPort"]
 

@@ -15,8 +15,8 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import numpy as np
 
+from hfg.base.values import Colour, Span
 from hfg.types import Shape, bare_type
-from hfg.values import Colour, Span
 
 __all__ = [
     "ParameterKind",

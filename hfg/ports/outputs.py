@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import TypeForm
 
+from hfg.base.token import Token
 from hfg.ports.automatic import sent_name
 from hfg.ports.base import Kind, Owner, Port, Source
 from hfg.ports.events import EventPort
 from hfg.ports.relays import InnerTarget, inner_target
-from hfg.token import Token
 
 __all__ = ["Output", "OutputPort"]
 

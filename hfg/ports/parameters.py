@@ -12,14 +12,14 @@ from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar, cast, overl
 import annotated_types
 from typing_extensions import TypeForm
 
+from hfg.base.limits import kept_metadata, limits_of, limits_within, step_within
+from hfg.base.values import own_copy
 from hfg.errors import DeclarationError, UsageError
-from hfg.limits import kept_metadata, limits_of, limits_within, step_within
 from hfg.ports.base import Kind, Owner, Port, Relaying, Source, Target
 from hfg.ports.conditions import ShownIf, conditions_of
 from hfg.ports.kinds import choices_of, type_of_default, without_none
 from hfg.ports.specs import REQUIRED, ParameterSpec, Required
 from hfg.types import accepts
-from hfg.values import own_copy
 
 __all__ = ["Parameter", "ParameterPort", "spec_of"]
 

@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar, overload
 
 from typing_extensions import TypeForm
 
+from hfg.base.token import Token
 from hfg.errors import DeclarationError, UsageError
 from hfg.ports.base import Kind, Owner, Port, Target
 from hfg.ports.relays import InnerSource, inner_source
-from hfg.token import Token
 
 __all__ = ["UNSET", "Slot", "SlotPort", "slot"]
 

@@ -15,12 +15,12 @@ import msgspec
 import numpy as np
 
 from hfg import encoding
+from hfg.base.limits import breaks, numbers_within
+from hfg.base.values import Colour, Span, same
 from hfg.errors import shown
-from hfg.limits import breaks, numbers_within
 from hfg.ports.conditions import Condition
 from hfg.ports.kinds import ParameterKind, kind_of_type, shape_of
 from hfg.types import accepts, bare_type, describe, describe_value
-from hfg.values import Colour, Span, same
 
 __all__ = ["REQUIRED", "ParameterSpec", "Required"]
 

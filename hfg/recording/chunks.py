@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 
-from hfg.bounds import CHUNK_BYTES
+from hfg.base.bounds import CHUNK_BYTES
 
 __all__ = [
     "CHANNEL",

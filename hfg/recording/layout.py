@@ -20,7 +20,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, ChunkIndex, Footer, Header, Metadata, Schema, Statistics
 
-from hfg.bounds import CHUNK_BYTES
+from hfg.base.bounds import CHUNK_BYTES
 from hfg.recording.chunks import CHUNK, HEAD, MESSAGE, Damaged, chunk_head
 from hfg.recording.mcap import MAGIC
 

@@ -14,13 +14,13 @@ from typing import Any, Final, Literal
 import msgspec
 import numpy as np
 
+from hfg.base.token import Token
 from hfg.encoding.pictures import need_fair_size
 from hfg.engine.observing.recorder import Told
 from hfg.errors import UsageError
 from hfg.recording import schemas
 from hfg.recording.forms import is_plain
 from hfg.recording.values import CannotKeep, Codec
-from hfg.token import Token
 from hfg.types import describe, describe_value
 
 __all__ = [

@@ -13,15 +13,15 @@ from typing import Any, Final
 
 import msgspec
 
+from hfg.base.logs import Log
+from hfg.base.token import NO_MESSAGE
 from hfg.engine.model.worker import UNREADY
 from hfg.engine.rules.agenda import unblock
 from hfg.errors import EndOfStream, HfgError, UsageError
 from hfg.graph.structure.level import level_of
-from hfg.logs import Log
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.recording.reading import File, Loss
 from hfg.recording.tracks import Record, Step, Track
-from hfg.token import NO_MESSAGE
 
 __all__ = ["Player", "tell_losses"]
 

@@ -21,13 +21,13 @@ from weakref import WeakKeyDictionary, WeakSet
 
 import msgspec
 
+from hfg.base.logs import Log
 from hfg.errors import UsageError
 from hfg.graph import Graph, commands
 from hfg.graph.flat import flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
-from hfg.logs import Log
-from hfg.nodetype import Node, NodeType
+from hfg.nodetypes.node import Node, NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
 from hfg.recording.messages import MARKERS
 from hfg.recording.players import Player

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import msgspec
 
+from hfg.base.logs import Log
 from hfg.engine import Run
 from hfg.engine.model.worker import DISABLED
 from hfg.engine.observing.recorder import Place, Recorder
@@ -18,7 +19,6 @@ from hfg.errors import GraphError, UsageError
 from hfg.graph import commands
 from hfg.graph.flat import flatten
 from hfg.graph.structure.naming import suggest
-from hfg.logs import Log
 from hfg.ports import Port
 from hfg.ports.automatic import sent_name
 from hfg.recording.forms import reference

@@ -16,12 +16,12 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 from mcap.writer import CompressionType, Writer
 
+from hfg.base.whole import write_whole
 from hfg.errors import UsageError
 from hfg.recording.chunks import Damaged
 from hfg.recording.layout import read_record
 from hfg.recording.reading import RECOVERED, File, Loss
 from hfg.recording.writing import is_there
-from hfg.whole import write_whole
 
 __all__ = ["recover"]
 

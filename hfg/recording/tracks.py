@@ -13,11 +13,11 @@ from typing import Any, Final
 
 import msgspec
 
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import HfgError, UsageError, in_words
 from hfg.ports.automatic import sent_of
 from hfg.recording.messages import EVENTS, MARKERS, TokenReader
 from hfg.recording.reading import File, number_in
-from hfg.token import END, NO_MESSAGE, Token
 from hfg.types import accepts, describe
 
 __all__ = ["Record", "Step", "Track", "recorded_ports"]

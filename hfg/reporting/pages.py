@@ -10,14 +10,14 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
+from hfg.base.logs import Log
+from hfg.base.whole import need_writable, write_whole
 from hfg.engine import Run, VirtualTimeLoop
 from hfg.errors import UsageError
-from hfg.logs import Log
 from hfg.reporting.html import Page, drawing
 from hfg.reporting.observing import Observed
 from hfg.reporting.sections import Sections
 from hfg.trace import RunEnded, TraceEvent
-from hfg.whole import need_writable, write_whole
 
 __all__ = ["ReportPage", "report_page"]
 

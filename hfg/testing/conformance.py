@@ -14,11 +14,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
+from hfg.base.token import END, Token
 from hfg.errors import Failure, shown
 from hfg.testing.reference import Move, ReferenceMachine
 from hfg.testing.reference.machine import TEARDOWN_LIMIT_S
 from hfg.testing.reference.state import Task
-from hfg.token import END, Token
 from hfg.trace import (
     ActivityChanged,
     ActivityLost,

@@ -30,11 +30,11 @@ from itertools import pairwise
 from typing import Any, Final
 
 import hfg
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import UsageError
 from hfg.graph import Graph
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.testing.recording import Recorder
-from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import ActivityChanged, TokenSent
 
 __all__ = ["Step", "check", "draw", "parse", "run"]

@@ -13,16 +13,16 @@ from typing import Any, Final
 from weakref import WeakSet
 
 from hfg.activity.rules import asked_for
-from hfg.clock import time_told_by
-from hfg.declaration import HOOKS
+from hfg.base.clock import time_told_by
+from hfg.base.token import Token
 from hfg.errors import EndOfStream, UsageError
-from hfg.functions import NodeFunction
 from hfg.graph import Graph
 from hfg.graph.structure.naming import suggest
-from hfg.nodetype import Node, Place
+from hfg.nodetypes.declaration import HOOKS
+from hfg.nodetypes.functions import NodeFunction
+from hfg.nodetypes.node import Node, Place
 from hfg.ports.automatic import AUTOMATIC_EVENTS
 from hfg.testing.reference.waiting import hand_turned_loop
-from hfg.token import Token
 from hfg.types import accepts, describe, describe_value
 
 __all__ = ["Firing", "Sent", "fire"]

@@ -25,12 +25,12 @@ import annotated_types
 import msgspec
 import numpy as np
 
-from hfg.generics import callable_parts
+from hfg.base.generics import callable_parts
+from hfg.base.values import Colour, Span
 from hfg.ports.specs import ParameterSpec
 from hfg.testing.opening import opened
 from hfg.testing.samples import PATHS
 from hfg.types import ArrayFacts, array_facts, bare_type
-from hfg.values import Colour, Span
 
 __all__ = ["Hostile"]
 

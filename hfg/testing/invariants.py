@@ -13,8 +13,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
+from hfg.base.token import NO_MESSAGE
 from hfg.errors import UsageError, in_words
-from hfg.token import NO_MESSAGE
 from hfg.trace import (
     ActivityChanged,
     ActivityLost,

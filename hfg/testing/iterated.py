@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hfg.functions import node
 from hfg.graph import Graph, Subgraph
+from hfg.nodetypes.functions import node
 from hfg.ports import Input, Output
 from hfg.testing.making import FEEDS, Allowed, SeededChooser, description, make_plan
 from hfg.testing.plans import EdgePlan, GraphPlan

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
 import hfg
+from hfg.base.token import END
 from hfg.errors import HfgError
 from hfg.testing.conformance import Replay
 from hfg.testing.making import Allowed
@@ -23,7 +24,6 @@ from hfg.testing.plans import GraphPlan
 from hfg.testing.recording import Recorder
 from hfg.testing.reference import ReferenceMachine, reference_run
 from hfg.testing.strategies import graphs
-from hfg.token import END
 from hfg.trace import TraceEvent
 
 __all__ = ["STIMULATED", "EngineAgainstOracle"]

@@ -13,12 +13,12 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from hfg.base.values import Colour, Span
 from hfg.ports.automatic import sent_name
 from hfg.testing import nodes as types
 from hfg.testing.operators import through
 from hfg.testing.plans import BoxPlan, EdgePlan, GatePlan, GraphPlan, NodePlan
 from hfg.testing.strange import STRANGE
-from hfg.values import Colour, Span
 
 __all__ = [
     "FEEDS",

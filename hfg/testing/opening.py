@@ -5,7 +5,7 @@ from __future__ import annotations
 import typing
 from typing import Any
 
-from hfg.limits import limits_of
+from hfg.base.limits import limits_of
 
 __all__ = ["opened"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from hfg.token import Token
+from hfg.base.token import Token
 from hfg.trace import (
     ActivityChanged,
     CallStarted,

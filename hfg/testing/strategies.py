@@ -15,9 +15,9 @@ from typing import Any, TypeVar
 
 from hypothesis import strategies as st
 
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.testing.making import SYNCHRONOUS, Allowed, make_plan
 from hfg.testing.plans import GraphPlan
-from hfg.token import END, NO_MESSAGE, Token
 
 __all__ = ["SYNCHRONOUS", "Allowed", "graphs", "schedules", "tokens"]
 

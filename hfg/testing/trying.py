@@ -20,11 +20,11 @@ from hypothesis.errors import Flaky, ResolutionFailed, Unsatisfiable
 
 import hfg
 from hfg.catalogue import TypeDescription, describe_type
-from hfg.description import NodeType
 from hfg.errors import EndOfStream, NotRunning, RunError, UsageError
-from hfg.functions import NodeFunction
 from hfg.graph.structure.edge import type_of
-from hfg.nodetype import Node
+from hfg.nodetypes.description import NodeType
+from hfg.nodetypes.functions import NodeFunction
+from hfg.nodetypes.node import Node
 from hfg.ports.specs import REQUIRED
 from hfg.registry import find
 from hfg.testing.firing import Firing, fire

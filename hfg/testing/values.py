@@ -25,13 +25,13 @@ import msgspec
 import numpy as np
 from hypothesis import strategies as st
 
-from hfg.generics import callable_parts
-from hfg.limits import limits_of
+from hfg.base.generics import callable_parts
+from hfg.base.limits import limits_of
+from hfg.base.values import Colour, Span
 from hfg.ports.specs import ParameterSpec
 from hfg.testing.opening import opened
 from hfg.testing.samples import PATHS
 from hfg.types import ArrayFacts, array_facts, bare_type
-from hfg.values import Colour, Span
 
 __all__ = ["Alike", "values_of", "values_of_parameter"]
 

@@ -11,9 +11,8 @@ import hfg
 from hfg.activity.analysis import ActivityAnalysis
 from hfg.activity.explicit import may_give_activity
 from hfg.engine.runtime import engine
-from hfg.errors import RunError
+from hfg.errors import Problem, RunError
 from hfg.graph.flat import flatten, scope_end
-from hfg.problem import Problem
 from hfg.testing import recorder
 from hfg.testing.making import Allowed, random_plan
 from hfg.testing.nodes import Greeter, double, script, sink

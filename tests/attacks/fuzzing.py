@@ -92,7 +92,7 @@ def _tokens() -> list[bytes]:
         {"$type": "array", "dtype": [["a", "<i4"], ["b", "|S3", [2]]], "shape": [1], "data": "AAAAAAAAAAAAAA=="},
         {"$type": "tuple", "value": [1, {"$type": "set", "value": ["a"]}]},
         {"$type": "datetime", "value": "02026-01-01T00:00:00"},
-        {"$type": "object", "class": "hfg.token:Token", "fields": {"value": 1, "activity": 0, "stamp": 0.0}},
+        {"$type": "object", "class": "hfg.base.token:Token", "fields": {"value": 1, "activity": 0, "stamp": 0.0}},
         {"$type": "enum", "class": "enum:Enum", "name": "x"},
         {"$type": "dict", "value": [[1, 2]]},
         {"$type": "text", "value": "00d8"},

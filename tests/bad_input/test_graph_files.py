@@ -13,7 +13,7 @@ from typing import Any, cast
 import pytest
 
 import hfg
-from hfg.bounds import GRAPH_FILE_BYTES
+from hfg.base.bounds import GRAPH_FILE_BYTES
 from hfg.cli import main
 from hfg.files import Document, NodeDocument, build, describe, parsing, read, save, text_of
 from tests.files.programs import double, numbers

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from hfg.starting import is_command
+from hfg.base.starting import is_command
 from tests.limits import patience
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")

@@ -19,10 +19,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from hfg.base.values import Colour, Span, same
 from hfg.encoding import decode, encode, has_tag, read_text
 from hfg.errors import EncodingError
 from hfg.types import Shape
-from hfg.values import Colour, Span, same
 from tests.encoding.kinds import Found, Mode, Plan, Pose, Sides
 
 

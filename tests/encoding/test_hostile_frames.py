@@ -15,12 +15,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hfg.base.token import Token
+from hfg.base.values import Colour
 from hfg.encoding import Limits, TokenCodec
 from hfg.errors import EncodingError
 from hfg.images import Gray
-from hfg.token import Token
 from hfg.types import Array, accepts
-from hfg.values import Colour
 
 
 @dataclasses.dataclass

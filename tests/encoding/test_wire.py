@@ -32,15 +32,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hfg.base.token import END, NO_MESSAGE, Token
+from hfg.base.values import Colour, Span, same
 from hfg.encoding import TokenCodec, codec_for, description_of, difference, type_fingerprint, wire_problem
 from hfg.encoding.wire import Limits
 from hfg.errors import EncodingError
 from hfg.images import AnyImage, Color, Gray, Image, Points
 from hfg.testing import values_of
 from hfg.testing.strategies import tokens
-from hfg.token import END, NO_MESSAGE, Token
 from hfg.types import Array, Shape
-from hfg.values import Colour, Span, same
 from tests.encoding.kinds import Found, Mode, Plan, Pose, Sides
 
 T = TypeVar("T")

@@ -11,12 +11,12 @@ import pytest
 
 import hfg
 from hfg import registry
-from hfg.description import NodeType
 from hfg.files import Document, apex, build, describe, text_of
 from hfg.files.apex.converting import convert
 from hfg.files.apex.reading import read_file
 from hfg.files.apex.table import rule_of, rules
 from hfg.files.findings import Findings
+from hfg.nodetypes.description import NodeType
 
 PLACES = [folder / "shared/data/apex" for folder in Path(__file__).parents]
 REAL = next((one for one in PLACES if one.is_dir()), PLACES[0])  # files of CS::APEX itself, which are not ours to keep

@@ -12,10 +12,10 @@ from urllib.parse import quote
 import pytest
 
 import hfg
+from hfg.base.whole import GrowingFile
 from hfg.cli import main
 from hfg.encoding import find_reference
 from hfg.errors import EncodingError, FileError
-from hfg.whole import GrowingFile
 
 pytestmark = pytest.mark.rule("L4")
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from reactivex import operators as ops
 
 import hfg
+from hfg.base.values import same
 from hfg.files import build, describe, text_of
 from hfg.testing.plans import GraphPlan
 from hfg.testing.shrinking import shrink
 from hfg.types import Shape
-from hfg.values import same
 from tests.files.programs import Ear, Merged, Mode, Pose, Scaling, difference, double, numbers, plan_of, shown
 
 Turn = Annotated[NDArray[np.float64], Shape(3, 3)]

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.errors import Problem
 from hfg.graph import Graph, Subgraph
 from hfg.graph.checks import check
 from hfg.graph.flat import flatten
-from hfg.problem import Problem
 
 
 class Unit(hfg.Node):

@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 
 import hfg
-from hfg.errors import CheckFailed
+from hfg.errors import CheckFailed, Problem
 from hfg.graph import Graph, Subgraph
-from hfg.problem import Problem
 from hfg.testing.making import Allowed, random_plan
 from hfg.testing.nodes import script, slow_double
 

@@ -11,8 +11,8 @@ import pytest
 
 import hfg
 from hfg.engine.executing.watchdog import remedy_for
+from hfg.errors import Problem
 from hfg.nodes import activity
-from hfg.problem import Problem
 
 
 def found(graph: hfg.Graph, check: str) -> list[Problem]:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from reactivex import operators as ops
 
 import hfg
-from hfg.controls import name_problem
+from hfg.base.controls import name_problem
 from hfg.errors import UsageError
 from hfg.graph.drawing import dot, mermaid
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from reactivex import operators as ops
 
 import hfg
-from hfg.controls import name_problem
+from hfg.base.controls import name_problem
 from hfg.graph.drawing.parts import Card
 from hfg.graph.drawing.picture import Box, Pin, Shape, View, picture
 from hfg.graph.drawing.sheet import Sheet, sheet

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hfg.bounds import PICTURE_PIXELS
+from hfg.base.bounds import PICTURE_PIXELS
 from hfg.encoding.pictures import need_fair_size, size_of
 from hfg.errors import HfgError
 from hfg.images import Image

@@ -19,6 +19,7 @@ import pytest
 
 import hfg
 from hfg import images, registry
+from hfg.base.values import Colour
 from hfg.catalogue import describe_type, undocumented
 from hfg.nodes import cv
 from hfg.nodes.cv import _docs, _overrides, _recipes, _stub
@@ -26,7 +27,6 @@ from hfg.nodes.cv._room import copy_with_room, with_room
 from hfg.ports.specs import REQUIRED
 from hfg.testing import fire
 from hfg.types import accepts, compatible, describe
-from hfg.values import Colour
 from tests.nodes.cv_samples import PARAMETERS, picture, sample
 
 TABLE = Path(cv.__file__).with_name("_measured.json")

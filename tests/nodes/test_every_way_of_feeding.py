@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.nodes import activity, flow, time
-from hfg.nodetype import Node
-from hfg.token import END, NO_MESSAGE, Token
+from hfg.nodetypes.node import Node
 from hfg.trace import ActivityChanged, TokenSent, TraceEvent
 from hfg.types import accepts
 

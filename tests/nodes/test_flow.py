@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import hfg
+from hfg.base.token import NO_MESSAGE
 from hfg.nodes import flow
 from hfg.testing import fire
 from hfg.testing.diagrams import check, run
-from hfg.token import NO_MESSAGE
 
 
 def listed(*lists: list[Any]) -> dict[str, Any]:

@@ -18,11 +18,11 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.base.whole import GrowingFile, need_writable, write_whole
 from hfg.catalogue import installed
 from hfg.catalogue.offers import Offer
 from hfg.errors import UsageError
 from hfg.registry import find
-from hfg.whole import GrowingFile, need_writable, write_whole
 from tests.nodes.full_disk import ways
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -82,7 +82,7 @@ class _Disk:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, room: int) -> None:
         self.room = room
-        monkeypatch.setattr("hfg.whole.os.fsync", self._sync)
+        monkeypatch.setattr("hfg.base.whole.os.fsync", self._sync)
 
     def _sync(self, descriptor: int) -> None:
         if os.fstat(descriptor).st_size > self.room:

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import EncodingError
 from hfg.graph.flat import flatten
 from hfg.parts.steering.crossing import Crossing
-from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import (
     EventTriggered,
     NodeEnded,

@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.base.token import NO_MESSAGE
 from hfg.parts.model.lives import LIMIT
 from hfg.parts.processes import launching
-from hfg.token import NO_MESSAGE
 from hfg.trace import TokenTaken, TraceEvent
 from hfg_transports.memory import Network
 from tests.parts.test_deaths_at_random import BAD, BETWEEN_DEATHS_S

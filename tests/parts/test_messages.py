@@ -10,6 +10,7 @@ import msgspec
 import pytest
 
 import hfg
+from hfg.base.token import Token
 from hfg.engine.face.composition import Composition
 from hfg.engine.runtime.settings import Settings
 from hfg.graph.flat import MAIN, cut, flatten
@@ -43,7 +44,6 @@ from hfg.parts.model.sieve import sieve
 from hfg.parts.running.carrier import Carrier
 from hfg.parts.running.channels import Channel, name_of
 from hfg.parts.running.part import Part
-from hfg.token import Token
 from hfg.trace import NodeEnded, TokenProcessed, TokenSent, TokenTaken, TraceEvent
 from hfg.transport import Traffic
 from hfg_transports.memory import Network

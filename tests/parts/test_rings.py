@@ -15,12 +15,12 @@ import numpy.typing as npt
 import pytest
 
 import hfg
+from hfg.base.token import Token
 from hfg.encoding import TokenCodec
 from hfg.errors import EncodingError
 from hfg.parts.model.messages import Sees, Shares
 from hfg.parts.running.rings import Borrowing, Lending, LendingCounts, segment_of, segments_of, sweep_run, sweep_runs
 from hfg.sharedmemory import Ring, unavailable
-from hfg.token import Token
 from tests.limits import patience
 
 PROGRAM = Path(__file__).with_name("pictures.py")

@@ -10,8 +10,8 @@ import annotated_types as at
 import pytest
 
 import hfg
+from hfg.base.limits import limits_of
 from hfg.errors import DeclarationError
-from hfg.limits import limits_of
 from hfg.ports.specs import ParameterSpec
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import hfg
 from hfg.errors import DeclarationError, NotRunning, UsageError
-from hfg.nodetype import Place
+from hfg.nodetypes.node import Place
 from hfg.ports import EventPort, InnerSource, InnerTarget, Relaying, Source, Target
 
 

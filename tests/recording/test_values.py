@@ -19,8 +19,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hfg.base.values import same
 from hfg.recording.values import CannotKeep, Codec
-from hfg.values import same
 
 
 class Pose(msgspec.Struct):

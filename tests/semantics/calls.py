@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import pytest
 
 import hfg
+from hfg.base.token import Token
 from hfg.engine.model.worker import Worker
 from hfg.testing.conformance import value_key
 from hfg.testing.plans import GraphPlan
 from hfg.testing.recording import Recorder
-from hfg.token import Token
 from hfg.trace import TokenSent
 
 __all__ = ["Calls", "Ran", "begun", "by_node", "note_calls", "noted_run", "passed_by_trace"]

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Iterat
 from typing import Any, NamedTuple, TypeVar, cast
 
 import hfg
-from hfg.functions import NodeFunction
+from hfg.nodetypes.functions import NodeFunction
 from hfg.registry import reference_of
 from hfg.trace import ActivityChanged, FiringStarted, TokenSent, TraceEvent
 

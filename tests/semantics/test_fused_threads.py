@@ -11,12 +11,12 @@ import pytest
 
 import hfg
 from hfg import commands as c
+from hfg.base.token import Marker
 from hfg.engine.executing.groups import Job, ThreadGroup
 from hfg.engine.runtime import settings
 from hfg.testing import ReferenceReport, reference_run
 from hfg.testing.making import SYNCHRONOUS, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
-from hfg.token import Marker
 from tests.semantics import meddling
 from tests.semantics.meddling import PATIENCE_S, Gate
 from tests.semantics.nodes import (

@@ -15,10 +15,10 @@ from hypothesis.extra import numpy as arrays
 
 import hfg
 from hfg import commands as c
+from hfg.base.values import Colour, Span, same
 from hfg.errors import GraphError
 from hfg.testing import reference_run
 from hfg.trace import ParameterSet, TraceEvent
-from hfg.values import Colour, Span, same
 from tests.ports.test_parameter_kinds import SPECS, Everything, Mode, Sides
 from tests.semantics.nodes import Keep, drive
 

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hfg.base.token import Token
 from hfg.encoding import ArrayHead, Lease, TokenCodec
 from hfg.errors import EncodingError, SharedMemoryError, UsageError
 from hfg.images import Image
 from hfg.sharedmemory import Reader, Ring, segment_name, segment_prefix, sweep, unavailable
 from hfg.sharedmemory.layout import MAGIC
 from hfg.sharedmemory.names import open_existing
-from hfg.token import Token
 from tests.sharedmemory import actors
 
 pytestmark = pytest.mark.skipif(unavailable() is not None, reason="no shared memory here")

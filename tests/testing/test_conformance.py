@@ -7,10 +7,10 @@ from collections.abc import Callable
 import pytest
 
 import hfg
+from hfg.base.token import Token
 from hfg.testing import Divergence, Recorder, recorder, replay
 from hfg.testing.nodes import Doubter, Relay, Script, Tally, ascript, double, script, sink, some
 from hfg.testing.operators import through
-from hfg.token import Token
 from hfg.trace import (
     ActivityChanged,
     CallStarted,

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
+from hfg.base.token import END
 from hfg.testing import reference_run
 from hfg.testing.making import WIDE, random_plan
 from hfg.testing.operators import WITH_TIME
 from hfg.testing.plans import EdgePlan, GraphPlan, NodePlan
 from hfg.testing.reference import ReferenceReport
-from hfg.token import END
 from hfg.trace import ActivityChanged, TokenDrained, TokenDropped, TokenSent
 
 SEEDS = range(500)

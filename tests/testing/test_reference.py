@@ -10,6 +10,7 @@ import pytest
 import reactivex.operators as ops
 
 import hfg
+from hfg.base.token import END, NO_MESSAGE
 from hfg.graph.structure.options import Release
 from hfg.testing import ReferenceMachine, ReferenceReport, recorder, reference_run, replay
 from hfg.testing.nodes import (
@@ -37,7 +38,6 @@ from hfg.testing.nodes import (
     slow_double,
     some,
 )
-from hfg.token import END, NO_MESSAGE
 from hfg.trace import ActivityChanged, CallStarted, FiringEnded, FiringStarted, TokenDropped, TokenProcessed, TokenSent
 
 SEEDS = range(12)

@@ -23,11 +23,11 @@ from hypothesis.errors import ResolutionFailed
 import hfg
 import hfg.testing.values
 from hfg import images
-from hfg.description import NodeType
+from hfg.base.values import Colour, Span
+from hfg.nodetypes.description import NodeType
 from hfg.testing import values_of
 from hfg.testing.values import Alike, values_of_parameter
 from hfg.types import Shape, accepts
-from hfg.values import Colour, Span
 
 
 class Mode(enum.Enum):

@@ -13,9 +13,10 @@ from reactivex import Observable
 from reactivex import operators as ops
 
 import hfg
-from hfg.functions import FunctionNode
+from hfg.errors import Problem
 from hfg.graph import Edge, GraphInput, GraphOutput, GroupSpec
 from hfg.images import Image
+from hfg.nodetypes.functions import FunctionNode
 from hfg.ports import (
     EventPort,
     InnerSource,
@@ -28,7 +29,6 @@ from hfg.ports import (
     Source,
     Target,
 )
-from hfg.problem import Problem
 
 T = TypeVar("T")
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import msgspec
 
+from hfg.base.values import same
 from hfg.engine.editing.applying import apply
 from hfg.engine.editing.holding import Held
 from hfg.engine.editing.plan_diff import PlanDiff, diff
@@ -52,7 +53,6 @@ from hfg.graph.flat import FlatNode, flatten
 from hfg.graph.structure.membership import write_parameter
 from hfg.graph.structure.places import node_place
 from hfg.trace import ParameterSet, StructureChanged
-from hfg.values import same
 
 __all__ = ["Edits"]
 

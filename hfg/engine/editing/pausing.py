@@ -13,14 +13,14 @@ from typing import Any, Protocol
 
 import msgspec
 
+from hfg.base.logs import Log
+from hfg.base.token import Token
 from hfg.engine.model.worker import NO_CALLS, Worker
 from hfg.engine.rules import iterating, quiet
 from hfg.engine.runtime.callbacks import Edited
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.places import behind, edges_at, is_gone, is_near, place_of
 from hfg.errors import UsageError
-from hfg.logs import Log
-from hfg.token import Token
 from hfg.trace import RunPaused, RunResumed, TokenSent, TraceEvent
 
 __all__ = ["Breakpoint", "Pausing", "Step"]

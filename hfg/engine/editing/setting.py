@@ -9,16 +9,16 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from hfg.description import read_only_refusal
+from hfg.base.values import own_copy
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, Worker
 from hfg.engine.rules import lifecycle
 from hfg.errors import NotRunning, UsageError
 from hfg.graph.structure.promoting import stands_for
 from hfg.graph.structure.subgraph import inside
-from hfg.nodetype import Node
+from hfg.nodetypes.description import read_only_refusal
+from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 from hfg.trace import ParameterSet
-from hfg.values import own_copy
 
 if TYPE_CHECKING:
     from hfg.engine.runtime.engine import Engine

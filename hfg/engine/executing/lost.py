@@ -20,10 +20,10 @@ from typing import Any, Final
 
 import anyio
 
+from hfg.base.frames import is_ours, users_part
+from hfg.base.logs import node_log
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.model.worker import Worker
-from hfg.frames import is_ours, users_part
-from hfg.logs import node_log
 
 __all__ = ["LostTasks"]
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import inspect
 
+from hfg.base.logs import Log, Logger
 from hfg.engine.executing.code import whose_code
 from hfg.engine.executing.groups import current_job
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import Worker
-from hfg.logs import Log, Logger
 
 __all__ = ["log_of_speaker", "speaker"]
 

@@ -12,7 +12,8 @@ from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any, Protocol
 
-from hfg.clock import current_clock, current_elapsed
+from hfg.base.clock import current_clock, current_elapsed
+from hfg.base.logs import current_log
 from hfg.engine.executing.carrier import Carrier
 from hfg.engine.executing.code import CodeRunner, speak_for
 from hfg.engine.model.core import PENDING, Core
@@ -22,7 +23,6 @@ from hfg.engine.model.worker import DISABLED, ENDED, TORN_DOWN, Worker
 from hfg.engine.rules import doing as do_activity
 from hfg.engine.rules import errors
 from hfg.errors import NodeError, NotRunning, UsageError
-from hfg.logs import current_log
 
 __all__ = ["TaskRunner"]
 

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from contextvars import Context, copy_context
 from typing import Any
 
-from hfg.clock import current_clock
+from hfg.base.clock import current_clock
 
 __all__ = ["Held", "VirtualTimeLoop"]
 

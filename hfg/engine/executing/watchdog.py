@@ -11,11 +11,11 @@ import sys
 import threading
 import time
 
+from hfg.base.logs import Log
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import Worker
 from hfg.graph.checks.nodes import needs_loop
-from hfg.logs import Log
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["Watch", "remedy_for", "watchdog"]
 

@@ -13,6 +13,7 @@ from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from hfg.activity.rules import asked_for
+from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.engine.executing.code import answer
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.rules.releasing import take_from_reader
@@ -20,7 +21,6 @@ from hfg.engine.rules.sending import enqueue, put_outputs
 from hfg.engine.runtime.engine import Engine
 from hfg.engine.runtime.plan import prepare_slot
 from hfg.errors import NotRunning, UsageError
-from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.types import accepts, describe, describe_value
 
 __all__ = ["Feed", "collect", "need_sendable", "read", "signal", "until"]

@@ -12,6 +12,7 @@ from functools import partial
 from types import ModuleType
 from typing import Any, ClassVar, Literal, TypeVar, overload
 
+from hfg.base.token import Token
 from hfg.engine.editing.pausing import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
 from hfg.engine.executing.code import answer
@@ -35,9 +36,8 @@ from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge, PortEnd
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.pointing import parameter_at
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort
-from hfg.token import Token
 from hfg.trace import Consumer
 from hfg.types import accepts, describe
 

@@ -13,6 +13,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, Unpack
 
+from hfg.base.logs import Log
 from hfg.engine.executing.punctual import PunctualLoop
 from hfg.engine.executing.virtual import VirtualTimeLoop
 from hfg.engine.face import outside
@@ -29,7 +30,6 @@ from hfg.graph.checks.endless import endless
 from hfg.graph.flat import FlatGraph, flatten
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
-from hfg.logs import Log
 
 __all__ = ["run", "run_async", "running"]
 

@@ -23,13 +23,13 @@ from typing import Final, Literal
 
 import msgspec
 
+from hfg.base.logs import Log
+from hfg.base.private import is_of_this_user
 from hfg.engine.face.run import Run
 from hfg.engine.observing.encoding import encode, line_of
 from hfg.engine.observing.glance import Glance
 from hfg.engine.observing.taps import Tap
 from hfg.errors import HfgError, TargetError
-from hfg.logs import Log
-from hfg.private import is_of_this_user
 
 __all__ = ["Answer", "Door", "Question", "folder", "sockets", "watched"]
 

@@ -27,6 +27,7 @@ from collections.abc import Callable, Collection, Sequence
 from types import CodeType, CoroutineType, FrameType
 from typing import Any
 
+from hfg.base.token import NO_MESSAGE, Token
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.telling import tell_rest
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
@@ -36,7 +37,6 @@ from hfg.engine.rules import agenda, calls, errors, firing
 from hfg.engine.rules.releasing import release
 from hfg.errors import EngineInternalError
 from hfg.ports.edges import EventEdge, SyncEdge
-from hfg.token import NO_MESSAGE, Token
 
 __all__ = ["Region"]
 

@@ -12,6 +12,7 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
+from hfg.base.token import Token
 from hfg.engine.model.core import Core
 from hfg.engine.model.groups import Group
 from hfg.engine.model.worker import NO_CALLS, RunningEvent, Worker
@@ -22,7 +23,6 @@ from hfg.engine.rules.modifiers import derive_scopes, tell_activity
 from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import bring_activity, trigger
 from hfg.ports.edges import AnyEdge, EventEdge, SyncEdge
-from hfg.token import Token
 
 __all__ = ["calls_step", "emitter"]
 

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from typing_extensions import override
 
+from hfg.base.token import NO_MESSAGE
 from hfg.engine.fusion.region import Region
 from hfg.engine.fusion.schedule import Schedule
 from hfg.engine.fusion.writing import Wave, Writer, write_wave
@@ -31,7 +32,6 @@ from hfg.engine.rules.agenda import consider, idle_again, let_follow
 from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import put
 from hfg.ports.edges import ACTIVITY, SyncEdge
-from hfg.token import NO_MESSAGE
 
 __all__ = ["SOONER_IN_THREADS", "ThreadRegion"]
 

@@ -20,6 +20,7 @@ from time import monotonic
 from types import CodeType, CoroutineType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from hfg.base.token import NO_MESSAGE, Token
 from hfg.engine.fusion.schedule import asks_who_hears
 from hfg.engine.fusion.telling import Passed, Telling
 from hfg.engine.model.worker import Worker
@@ -27,7 +28,6 @@ from hfg.engine.rules.firing import take
 from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import put
 from hfg.ports.edges import ACTIVITY, BufferEdge, EventEdge, SyncEdge
-from hfg.token import NO_MESSAGE, Token
 
 if TYPE_CHECKING:
     from hfg.engine.fusion.region import Region

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
 
 from typing_extensions import override
 
+from hfg.base.token import Token
 from hfg.engine.model.flights import Flight
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.model.scopes import Gate, Scope
@@ -23,7 +24,6 @@ from hfg.engine.model.worker import RunningEvent, Worker
 from hfg.errors import EngineInternalError, HfgError
 from hfg.ports.edges import BufferEdge, EventEdge, SyncEdge
 from hfg.ports.events import EventPort
-from hfg.token import Token
 from hfg.trace import TraceEvent
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TypeAlias
 
+from hfg.base.token import Token
 from hfg.ports.edges import AnyEdge
-from hfg.token import Token
 
 __all__ = ["FirstLiveLook", "Look", "WaveLook", "look_inside"]
 

@@ -22,11 +22,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from hfg.base.token import Marker, Token
 from hfg.engine.model.worker import Worker
 from hfg.errors import in_words
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports.edges import NUMBER, Edge, Lying, SyncEdge
-from hfg.token import Marker, Token
 
 __all__ = ["DEPTH", "Sharing"]
 

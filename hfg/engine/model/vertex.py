@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from hfg.engine.model.shape import Shape
 from hfg.graph.structure.options import NodeOptions
-from hfg.nodetype import Node, NodeType
+from hfg.nodetypes.node import Node, NodeType
 from hfg.ports.automatic import AUTOMATIC_EVENTS, sent_of
 from hfg.ports.edges import Edge
 from hfg.ports.events import EventPort

@@ -16,7 +16,7 @@ from hfg.engine.model.flights import Attempts, Flights
 from hfg.engine.model.vertex import RunningEvent, Vertex
 from hfg.errors import EngineInternalError
 from hfg.graph.structure.options import NodeOptions
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports.barrier import Barrier
 from hfg.ports.edges import AnyEdge, Edge, EventEdge
 from hfg.ports.events import EventPort

@@ -17,10 +17,10 @@ from typing import Any
 
 import anyio
 
+from hfg.base.logs import Log
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import UsageError
-from hfg.logs import Log
 from hfg.trace import TraceEvent
 
 __all__ = ["Consumers", "Listener", "check_consumer"]

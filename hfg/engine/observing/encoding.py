@@ -13,7 +13,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-from hfg.token import Token
+from hfg.base.token import Token
 
 __all__ = ["encode", "line_of", "text"]
 

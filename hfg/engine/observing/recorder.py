@@ -21,14 +21,14 @@ from typing import Any, Final, Protocol
 
 from msgspec.structs import replace
 
+from hfg.base.logs import Log
+from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.engine.model.looks import Look, WaveLook
 from hfg.engine.model.worker import ENDED, RECORDED, Worker
 from hfg.engine.observing.consumers import Consumers, Listener
 from hfg.engine.observing.taps import Taps
 from hfg.engine.rules.agenda import unblock
 from hfg.engine.runtime.engine import Engine
-from hfg.logs import Log
-from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import TraceEvent
 
 __all__ = [

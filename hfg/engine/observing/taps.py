@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
+from hfg.base.token import Token
 from hfg.engine.fusion.specialise import specialise
 from hfg.engine.model.looks import FirstLiveLook, Look
 from hfg.engine.model.worker import RunningEvent, Worker
@@ -24,9 +25,8 @@ from hfg.errors import GraphError, UsageError
 from hfg.graph.structure.edge import Edge as DrawnEdge
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
-from hfg.token import Token
 
 __all__ = ["Looker", "Tap", "Taps", "make_tap"]
 

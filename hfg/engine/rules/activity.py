@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from hfg.base.token import Token
 from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Gate, Scope
 from hfg.engine.model.worker import AMID_NOTHING, RESTING, Worker
@@ -20,7 +21,6 @@ from hfg.engine.rules.agenda import consider, must_wait
 from hfg.engine.rules.modifiers import automatic, set_active, touch
 from hfg.engine.rules.sending import flush_automatic, tell, trigger
 from hfg.ports.edges import AnyEdge
-from hfg.token import Token
 
 __all__ = ["changed", "deactivate_inside", "gate_changed", "reset_activity", "rest", "scopes_changed"]
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from hfg.base.token import Token
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import lifecycle, subgraphs
 from hfg.engine.rules.modifiers import set_active
 from hfg.errors import Aborted, shown
-from hfg.token import Token
 
 __all__ = ["run"]
 

@@ -6,6 +6,7 @@ from collections.abc import Coroutine
 from types import CoroutineType
 from typing import Any
 
+from hfg.base.token import Token
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules import builtin_slots, sharing
 from hfg.engine.rules.agenda import idle_again
@@ -14,7 +15,6 @@ from hfg.engine.rules.releasing import make_room, release
 from hfg.engine.rules.sending import flush_automatic
 from hfg.errors import UsageError
 from hfg.ports.edges import AnyEdge, SyncEdge
-from hfg.token import Token
 from hfg.trace import CallEnded, CallOutcome, CallStarted, ParameterSet, TokenTaken
 
 __all__ = ["await_call", "call", "finish_call", "refuse_coroutine", "set_parameter"]

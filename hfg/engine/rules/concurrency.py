@@ -12,6 +12,7 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
+from hfg.base.token import Marker, Token
 from hfg.engine.model.flights import Flight, Flights, current_flight
 from hfg.engine.model.worker import DISABLED, REMOVED, Worker
 from hfg.engine.rules import errors, firing
@@ -21,7 +22,6 @@ from hfg.engine.rules.ending import drain_left, drop_taken, ends_itself, gave_ba
 from hfg.engine.rules.retries import try_again
 from hfg.engine.rules.sending import flush_automatic, put_outputs, send_end, trigger
 from hfg.errors import Failure, FiringTimeout, QueueLimit, UsageError
-from hfg.token import Marker, Token
 from hfg.trace import FiringEnded
 
 __all__ = ["abandon", "begin", "land", "time_out", "triggering", "write"]

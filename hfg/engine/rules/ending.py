@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+from hfg.base.token import Marker, Token
 from hfg.engine.model.worker import DISABLED, Worker
 from hfg.engine.rules.agenda import freed, idle_again
 from hfg.engine.rules.modifiers import derive_scopes, touch
@@ -16,7 +17,6 @@ from hfg.engine.rules.releasing import release
 from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, send_end
 from hfg.errors import EndOfStream, shown
 from hfg.ports.edges import EventEdge
-from hfg.token import Marker, Token
 from hfg.trace import FiringEnded, TokenDrained, TokenDropped
 
 __all__ = ["drain_left", "drop_taken", "end", "end_itself", "ends_itself", "gave_back"]

@@ -8,6 +8,8 @@ from __future__ import annotations
 import dis
 from collections.abc import Callable
 
+from hfg.base.frames import users_part
+from hfg.base.logs import node_log
 from hfg.engine.model.iteration import amid_element
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, Worker
 from hfg.engine.rules import calls, firing, lifecycle
@@ -15,8 +17,6 @@ from hfg.engine.rules.modifiers import automatic, report_error
 from hfg.engine.rules.retries import retry
 from hfg.engine.rules.sending import flush_automatic, put_outputs
 from hfg.errors import EndOfStream, Failure, FiringTimeout, NodeError, QueueLimit, in_words, shown
-from hfg.frames import users_part
-from hfg.logs import node_log
 from hfg.ports.edges import EventEdge
 from hfg.trace import FiringOutcome
 from hfg.types import accepts, describe

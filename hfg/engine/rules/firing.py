@@ -11,6 +11,8 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
+from hfg.base.token import END, NO_MESSAGE, Marker, Token
+from hfg.base.values import own_copy
 from hfg.engine.model.worker import DISABLED, NO_CALLS, SAME_MOMENT_S, UNREADY, Worker
 from hfg.engine.rules import sharing
 from hfg.engine.rules.agenda import consider, idle_again
@@ -22,10 +24,8 @@ from hfg.engine.rules.sending import announce, flush_automatic, put_outputs, put
 from hfg.engine.rules.wiring import rewire
 from hfg.errors import EndOfStream, UsageError
 from hfg.ports.edges import VALUE, AnyEdge
-from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import FiringEnded, FiringKind, FiringOutcome, FiringStarted, TokenTaken
 from hfg.types import accepts, describe, describe_value
-from hfg.values import own_copy
 
 __all__ = [
     "arguments_of",

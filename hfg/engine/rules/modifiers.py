@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from hfg.activity.rules import after_receipt
+from hfg.base.token import Token
 from hfg.engine.model.core import Core
 from hfg.engine.model.scopes import Scope
 from hfg.engine.model.worker import REMOVED, Worker
 from hfg.engine.rules.agenda import freed
 from hfg.engine.rules.listening import may_listen
 from hfg.ports.edges import AnyEdge, Edge, EventEdge
-from hfg.token import Token
 from hfg.trace import ActivityCause, ActivityChanged, ActivityLost, DropReason, ErrorRaised, TokenDropped
 
 __all__ = [

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import Any
 
+from hfg.base.token import END
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import (
     BACKOFF,
@@ -29,7 +30,6 @@ from hfg.engine.rules.sending import enqueue, put_outputs
 from hfg.engine.rules.sources import judge_sources
 from hfg.errors import Stalled
 from hfg.ports.edges import AnyEdge, EventEdge
-from hfg.token import END
 
 __all__ = [
     "complete_edge",

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import Any
 
+from hfg.base.token import Token
 from hfg.engine.model.worker import Worker
 from hfg.engine.rules.agenda import consider, freed
 from hfg.engine.rules.sending import send_end
 from hfg.ports.edges import AnyEdge, EventEdge
-from hfg.token import Token
 from hfg.trace import TokenProcessed, TokenTaken
 
 __all__ = ["make_room", "outputs_free", "release", "take_from_reader"]

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any, TypeAlias
 
 from hfg.activity.rules import asked_for, leaving
+from hfg.base.token import END, NO_MESSAGE, Marker, Token
 from hfg.engine.model.core import Core
 from hfg.engine.model.worker import AMID_NOTHING, DISABLED, ENDED, RunningEvent, Worker
 from hfg.engine.rules.agenda import add_call, arrived, let_follow, note_full
@@ -26,7 +27,6 @@ from hfg.engine.rules.modifiers import (
 )
 from hfg.errors import QueueOverflow
 from hfg.ports.edges import ACTIVITY, AnyEdge, BufferEdge, EventEdge, Lying, SyncEdge
-from hfg.token import END, NO_MESSAGE, Marker, Token
 from hfg.trace import EventTriggered, NodeEnded, TokenDrained, TokenProcessed, TokenSent
 
 __all__ = [

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from hfg.base.token import Token
 from hfg.engine.model.worker import Worker
 from hfg.errors import UsageError
 from hfg.ports.edges import Edge
-from hfg.token import Token
 
 __all__ = ["need_unchanged", "need_unwritten", "taken"]
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from itertools import islice
 from typing import Any, Literal, TypeAlias
 
+from hfg.base.token import END, Token
 from hfg.engine.model.worker import DISABLED, ENDED, Worker
 from hfg.engine.rules.ending import drain_left
 from hfg.engine.rules.lifecycle import disable_around, enable_around
@@ -22,7 +23,6 @@ from hfg.engine.rules.sending import enqueue, put_arrived
 from hfg.engine.rules.wiring import reaches
 from hfg.engine.runtime.engine import Engine
 from hfg.ports.edges import EventEdge, SyncEdge
-from hfg.token import END, Token
 
 __all__ = ["Hearing", "Inlet", "Outlet"]
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence, Set
 import msgspec
 
 from hfg.engine.model.worker import Worker
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports.edges import EventEdge
 
 __all__ = ["Callbacks", "Edited"]

@@ -14,7 +14,8 @@ from collections import deque
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from hfg.clock import current_clock, current_elapsed
+from hfg.base.clock import current_clock, current_elapsed
+from hfg.base.logs import Log, current_log
 from hfg.engine.executing.code import CodeRunner, answer
 from hfg.engine.executing.groups import CheckedTurn, Dispatching, LoopGroup, SideGroup, ThreadGroup
 from hfg.engine.executing.speaking import log_of_speaker
@@ -34,8 +35,7 @@ from hfg.engine.runtime.upstairs import Deciders
 from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
-from hfg.logs import Log, current_log
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import EventPort
 
 __all__ = ["Engine"]

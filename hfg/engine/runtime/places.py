@@ -16,7 +16,7 @@ from hfg.errors import GraphError
 from hfg.graph.structure.edge import Edge as DrawnEdge
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.naming import suggest
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Port
 
 if TYPE_CHECKING:

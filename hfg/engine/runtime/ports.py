@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from hfg.base.token import Token
 from hfg.engine.fusion import slots
 from hfg.engine.model.vertex import RunningEvent
 from hfg.engine.model.worker import Worker
@@ -19,7 +20,6 @@ from hfg.engine.runtime import plan, relays
 from hfg.errors import UsageError
 from hfg.ports.automatic import is_automatic_event
 from hfg.ports.events import EventPort
-from hfg.token import Token
 from hfg.trace import ParameterSet
 from hfg.types import accepts, describe, describe_value
 

@@ -23,6 +23,7 @@ from reactivex.scheduler.periodicscheduler import PeriodicScheduler
 from reactivex.subject import Subject
 from typing_extensions import override
 
+from hfg.base.token import Token
 from hfg.engine.model.core import Host
 from hfg.engine.model.iteration import Iteration
 from hfg.engine.rules.errors import operator_failed
@@ -30,7 +31,6 @@ from hfg.engine.rules.modifiers import drop
 from hfg.engine.rules.sending import enqueue
 from hfg.engine.rules.wiring import reaches
 from hfg.ports.edges import EventEdge
-from hfg.token import Token
 
 _MOST_AT_ONCE: Final = 1000  # actions of operators before the loop has its turn
 

@@ -20,7 +20,7 @@ from hfg.files.missing import MissingNode
 from hfg.graph import Graph
 from hfg.graph.structure.level import level_of
 from hfg.graph.structure.pointing import node_at
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["prove"]
 

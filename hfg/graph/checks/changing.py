@@ -15,9 +15,9 @@ from itertools import islice
 from types import CodeType, FunctionType
 from typing import Any, Final
 
+from hfg.errors import Problem
 from hfg.graph.flat.flattening import FlatGraph, FlatNode
-from hfg.nodetype import Node, NodeType
-from hfg.problem import Problem
+from hfg.nodetypes.node import Node, NodeType
 
 __all__ = ["changed_inputs"]
 

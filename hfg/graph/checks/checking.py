@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Final, TypeAlias
 
+from hfg.errors import SEVERITIES, Problem
 from hfg.graph.checks.changing import changed_inputs
 from hfg.graph.checks.edges import borders, joined_edges, promotions, unseen_parameters
 from hfg.graph.checks.flow import (
@@ -36,7 +37,6 @@ from hfg.graph.checks.nodes import (
 )
 from hfg.graph.checks.processes import process_borders
 from hfg.graph.flat.flattening import FlatGraph, flatten
-from hfg.problem import SEVERITIES, Problem
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from hfg.errors import Problem
 from hfg.graph.flat.flattening import ROOT, FlatEdge, FlatGraph
 from hfg.graph.structure.edge import Edge, is_feed, type_of
 from hfg.graph.structure.subgraph import inside
 from hfg.ports import ParameterPort
-from hfg.problem import Problem
 from hfg.types import describe, why_not
 
 __all__ = ["borders", "joined_edges", "promotions", "unseen_parameters"]

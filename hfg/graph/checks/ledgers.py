@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hfg.errors import Problem
 from hfg.graph.flat.cutting import MAIN, cut
 from hfg.graph.flat.flat_graph import LINK, ROOT, FlatEdge, FlatGraph, FlatNode, scope_end
 from hfg.ports.automatic import AUTOMATIC_SLOTS
-from hfg.problem import Problem
 
 __all__ = ["kept_groups"]
 

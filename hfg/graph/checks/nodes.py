@@ -10,13 +10,13 @@ from collections.abc import Iterator
 from types import CodeType, FunctionType
 from typing import Any
 
+from hfg.errors import Problem
 from hfg.graph.flat.flattening import FlatGraph
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.options import NodeOptions
 from hfg.graph.structure.subgraph import Subgraph, inside
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Port
-from hfg.problem import Problem
 
 __all__ = [
     "async_in_threads",

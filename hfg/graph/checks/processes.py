@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hfg.encoding import wire_problem
-from hfg.errors import Failure
+from hfg.errors import Failure, Problem
 from hfg.graph.flat.cutting import MAIN, cut
 from hfg.graph.flat.flat_graph import FlatGraph
 from hfg.graph.flat.order import rings
-from hfg.problem import Problem
 
 __all__ = ["process_borders"]
 

@@ -12,15 +12,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
-from hfg.controls import escaped
+from hfg.base.controls import escaped
+from hfg.base.whole import write_whole
 from hfg.errors import GraphError, UsageError
 from hfg.graph.drawing.picture import EVERYTHING, Arrow, Box, Look, Picture, Shape, View, picture
 from hfg.graph.drawing.svg import svg
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.pointing import meant, node_at
 from hfg.graph.structure.subgraph import is_box
-from hfg.nodetype import Node
-from hfg.whole import write_whole
+from hfg.nodetypes.node import Node
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

@@ -18,7 +18,7 @@ from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.options import DEFAULT_CAPACITY, EdgeOptions, NodeOptions
 from hfg.graph.structure.subgraph import inside, is_box
-from hfg.nodetype import Node, NodeType
+from hfg.nodetypes.node import Node, NodeType
 from hfg.ports import InnerSource, InnerTarget, Port
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.membership import close_box, leave, open_box, place, set_options, settle, write_parameter
 from hfg.graph.structure.options import NodeOptions
 from hfg.graph.structure.subgraph import inside
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 
 __all__ = [

@@ -10,7 +10,7 @@ from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.membership import leave, open_box, set_options
 from hfg.graph.structure.subgraph import inside, is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 
 __all__ = ["copy_of"]

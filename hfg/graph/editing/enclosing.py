@@ -21,7 +21,7 @@ from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import ACTIVE, PLAIN, EdgeOptions, NodeOptions, in_group
 from hfg.graph.structure.subgraph import Subgraph, inside
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, InnerSource, InnerTarget, Input, Output, ParameterPort, Port, slot
 
 __all__ = ["Enclosed", "declared_box", "dissolve", "enclose"]

@@ -12,7 +12,7 @@ from hfg import registry
 from hfg.encoding import decode, has_tag
 from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing.commands import Replace
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import ParameterSpec
 from hfg.types import accepts
 

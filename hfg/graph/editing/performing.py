@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 import msgspec
 
+from hfg.base.values import own_copy, same
 from hfg.errors import ConnectionError as EdgeRefused
 from hfg.errors import GraphError, HfgError
 from hfg.graph.editing import commands as c
@@ -52,9 +53,8 @@ from hfg.graph.structure.places import side_of
 from hfg.graph.structure.pointing import level_and_name, node_at, parameter_at, source_at, target_at
 from hfg.graph.structure.promoting import refuse_promotion, refuse_standing, stands_for
 from hfg.graph.structure.subgraph import is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort, Port
-from hfg.values import own_copy, same
 
 __all__ = ["perform"]
 

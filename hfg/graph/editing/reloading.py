@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 from hfg.errors import GraphError
-from hfg.functions import NodeFunction
 from hfg.graph.editing.commands import Replace
 from hfg.graph.structure.subgraph import inside
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import NodeFunction
+from hfg.nodetypes.node import Node
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from hfg.base.values import same
 from hfg.encoding import encode
 from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing import commands as c
@@ -26,8 +27,7 @@ from hfg.graph.structure.pointing import parameter_at
 from hfg.graph.structure.promoting import stands_for
 from hfg.graph.structure.subgraph import Subgraph, inside, is_box
 from hfg.graph.structure.whole import Whole
-from hfg.nodetype import Node
-from hfg.values import same
+from hfg.nodetypes.node import Node
 
 __all__ = ["as_commands"]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from hfg.errors import GraphError, UsageError
+from hfg.errors import GraphError, Problem, UsageError
 from hfg.graph.checks.checking import check_flat
 from hfg.graph.editing.changes import Change, undo_all
 from hfg.graph.editing.commands import (
@@ -34,7 +34,6 @@ from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat.flattening import flatten
 from hfg.graph.structure.history import History
 from hfg.graph.structure.level import level_of
-from hfg.problem import Problem
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

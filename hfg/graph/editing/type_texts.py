@@ -11,8 +11,8 @@ import sys
 import types
 from typing import Any, Literal, Union, get_args, get_origin
 
-from hfg.description import look_up
 from hfg.errors import GraphError
+from hfg.nodetypes.description import look_up
 
 __all__ = ["text_of_type", "type_of_text"]
 

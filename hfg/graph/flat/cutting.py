@@ -13,9 +13,9 @@ from typing import Any, Final, Literal, TypedDict, Unpack
 
 import msgspec
 
+from hfg.errors import Problem
 from hfg.graph.flat.flat_graph import LINK, ROOT, End, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
 from hfg.graph.structure.options import GroupSpec, Overflow
-from hfg.problem import Problem
 
 __all__ = ["DEFAULT_WINDOW", "MAIN", "CutEdge", "Cutting", "cut"]
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 import msgspec
 
+from hfg.errors import Problem
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.options import GroupSpec, NodeOptions, Overflow
-from hfg.nodetype import Node
-from hfg.problem import Problem
+from hfg.nodetypes.node import Node
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

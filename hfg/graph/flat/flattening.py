@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 from reactivex import Observable
 
+from hfg.errors import Problem
 from hfg.graph.flat.flat_graph import ROOT, End, EndKind, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, is_port
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.options import NodeOptions, in_group
 from hfg.graph.structure.subgraph import inside, iterated
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, ParameterPort, Port
-from hfg.problem import Problem
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

@@ -12,7 +12,7 @@ from hfg.graph.structure.naming import need_name, path_of, suggest
 from hfg.graph.structure.options import NodeOptions, node_options
 from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import Subgraph, inside, is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["add"]
 

@@ -11,7 +11,7 @@ from hfg.graph.structure.naming import path_of, suggest
 from hfg.graph.structure.options import GroupSpec, Policy, group_spec, in_group
 from hfg.graph.structure.pointing import meant, node_at
 from hfg.graph.structure.refusals import Refusable
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["declare_group", "move"]
 

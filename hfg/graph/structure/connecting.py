@@ -11,16 +11,16 @@ from typing import Any, Final, NoReturn
 from reactivex import Observable
 
 from hfg import errors
+from hfg.base.token import Token
 from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, TargetEnd, end_path, is_port, type_of
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.options import PLAIN, EdgeOptions, edge_options
 from hfg.graph.structure.pointing import source_at, target_at
 from hfg.graph.structure.refusals import Refusable
 from hfg.graph.structure.subgraph import is_box, iterated
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, OutputPort, Port, PortVector, Source, Target
 from hfg.ports.observable import RunObservable
-from hfg.token import Token
 from hfg.types import accepts, describe, why_not
 
 __all__ = ["connect", "declare_edge", "refuse"]

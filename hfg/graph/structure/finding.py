@@ -12,7 +12,7 @@ from hfg.errors import GraphError
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.subgraph import inside, is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 
 __all__ = ["candidates", "find", "inner_side", "same_port", "split_inner"]

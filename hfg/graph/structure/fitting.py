@@ -8,7 +8,7 @@ from __future__ import annotations
 from hfg.errors import GraphError
 from hfg.graph.structure.options import NodeOptions
 from hfg.graph.structure.subgraph import is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["need_fitting"]
 

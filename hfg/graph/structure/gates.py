@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import msgspec
 
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["Gate", "Gates"]
 

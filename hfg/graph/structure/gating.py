@@ -8,7 +8,7 @@ from hfg.graph.structure.level import Level
 from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.pointing import meant, node_at
 from hfg.graph.structure.refusals import Refusable
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["refuse_gate", "set_gate"]
 

@@ -18,7 +18,7 @@ from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.promotions import Promotions
 from hfg.graph.structure.subgraph import Subgraph, inside
 from hfg.graph.structure.whole import Whole
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hfg.graph.structure.sequence import Sequence
 from hfg.graph.structure.subgraph import Subgraph, is_box
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["Members"]
 

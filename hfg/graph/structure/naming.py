@@ -5,9 +5,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-from hfg.controls import name_problem
+from hfg.base.controls import name_problem
 from hfg.errors import GraphError
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 __all__ = ["need_name", "path_of", "suggest"]
 

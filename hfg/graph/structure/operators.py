@@ -13,8 +13,8 @@ from typing import Any, Final, Generic, ParamSpec
 from reactivex import Observable, operators
 from typing_extensions import override
 
-from hfg.description import look_up
 from hfg.errors import DeclarationError, GraphError
+from hfg.nodetypes.description import look_up
 
 __all__ = ["NamedOperator", "OperatorFunction", "find_operator", "operator"]
 

@@ -17,7 +17,7 @@ from typing import Any, Final, Literal, TypeAlias, TypeGuard, TypeVar
 import msgspec
 
 from hfg import errors
-from hfg.controls import name_problem
+from hfg.base.controls import name_problem
 from hfg.errors import GraphError, HfgError
 
 __all__ = [

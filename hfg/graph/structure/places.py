@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.level import Level, level_of
 from hfg.graph.structure.subgraph import iterated
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

@@ -14,7 +14,7 @@ from hfg.graph.structure.finding import candidates, find, inner_side, split_inne
 from hfg.graph.structure.level import Level
 from hfg.graph.structure.naming import need_name, suggest
 from hfg.graph.structure.subgraph import inside
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 
 __all__ = ["level_and_name", "meant", "node_at", "parameter_at", "source_at", "target_at"]

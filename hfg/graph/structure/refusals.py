@@ -14,10 +14,9 @@ from contextvars import ContextVar
 from pathlib import Path
 from types import FrameType
 
-from hfg.errors import GraphError
+from hfg.errors import GraphError, Problem
 from hfg.graph.structure.naming import path_of
-from hfg.nodetype import Node
-from hfg.problem import Problem
+from hfg.nodetypes.node import Node
 
 __all__ = ["Refusable", "keep_refusals", "problem_of", "raise_refusals"]
 

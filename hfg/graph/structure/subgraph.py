@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 from typing_extensions import TypeIs
 
 from hfg.errors import UsageError
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Relaying
 
 if TYPE_CHECKING:

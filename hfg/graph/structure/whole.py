@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from hfg.graph.structure.groups import Groups
 from hfg.graph.structure.history import History
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 
 if TYPE_CHECKING:
     from hfg.graph.graph import Graph

@@ -2,7 +2,7 @@
 
 Only its user can enter the folder, which is checked each time it is opened. Sockets are reached through the handle that
 was checked, so a folder that is exchanged later leads nobody astray, and paths may have any length.
-Depends on `hfg.private`.
+Depends on `hfg.base.private`.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import stat
 from pathlib import Path
 from typing import Final
 
+from hfg.base.private import MACHINE, is_of_this_user, open_private, state_folder
 from hfg.errors import TransportError
-from hfg.private import MACHINE, is_of_this_user, open_private, state_folder
 
 __all__ = ["NAME_SIZE", "Place", "user_folder"]
 

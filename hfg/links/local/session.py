@@ -16,13 +16,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from hfg.base.logs import log
+from hfg.base.private import is_of_this_user
 from hfg.errors import MessageTooLarge, NoAnswer, QueryRefused, TransportError, in_words
 from hfg.links.local.connection import Incoming, Outgoing, greet, introduce
 from hfg.links.local.place import NAME_SIZE, Place, user_folder
 from hfg.links.local.proof import Caller, Listener, Refused
 from hfg.links.local.wire import LONGEST_HEADER, LONGEST_KEY, Frame, Kind
-from hfg.logs import log
-from hfg.private import is_of_this_user
 from hfg.transport import Answer, Buffer, Message, Presence, Receive, Traffic, Watch, size_of
 
 __all__ = ["LocalPublisher", "LocalSession", "LocalTransport", "transport"]

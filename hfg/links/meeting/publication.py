@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeAlias
 import msgspec
 from msgspec.structs import replace
 
+from hfg.base.token import END, Token
 from hfg.errors import EncodingError, RunError, TransportError
 from hfg.links import Outbox
 from hfg.links.meeting.end import MOST, End
@@ -19,7 +20,6 @@ from hfg.links.meeting.outbox import KeptValue, OutboxFile
 from hfg.links.meeting.returning import Returning, identity_of
 from hfg.links.offers import key_of, read_introduction, unfit
 from hfg.links.running import BoundedSender, LinkSender
-from hfg.token import END, Token
 from hfg.transport import Closing, EncodedToken, Presence, Session
 
 __all__ = ["Absent", "Publication", "PublicationCounts"]

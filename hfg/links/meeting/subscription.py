@@ -11,11 +11,11 @@ from typing import Any, Final, Literal
 
 import msgspec
 
+from hfg.base.token import END, Token
 from hfg.errors import EncodingError, QueueOverflow, TransportError
 from hfg.links.meeting.end import MOST, End
 from hfg.links.offers import Introduction, key_of, read_introduction, unfit
 from hfg.links.running import BoundedReceiver, LinkReceiver
-from hfg.token import END, Token
 from hfg.transport import Closing, LinkOverflow, Presence, Session
 
 __all__ = ["Subscription", "SubscriptionCounts"]

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from annotated_types import Interval
 
-from hfg.functions import node
 from hfg.nodes._equality import same
 from hfg.nodes.collections.fields import read_field
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Parameter, State, slot
 
 __all__ = [

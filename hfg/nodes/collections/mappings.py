@@ -7,9 +7,9 @@ from typing import Any, TypeAlias
 
 from annotated_types import MinLen
 
-from hfg.functions import node
 from hfg.nodes.collections.fields import read_field, record_fields
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Outputs, Parameter, State, slot
 
 __all__ = [

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Ge, Gt, Interval, Le, Len, MinLen, Predicate
 
+from hfg.base.values import Colour
 from hfg.encoding.pictures import need_fair_size
 from hfg.images import Color, Gray, Labels, Mask, Matrix, OneOf, Points, Rows
 from hfg.nodes._encodable import is_encodable
@@ -22,7 +23,6 @@ from hfg.nodes.cv._room import copy_with_room
 from hfg.nodes.cv._stub import enumerations
 from hfg.ports.specs import REQUIRED
 from hfg.types import Named, Pixels, Shape
-from hfg.values import Colour
 
 __all__ = ["COMMON", "FUNCTIONS", "NEEDS", "Need", "Say"]
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from annotated_types import Interval, Predicate
 
-from hfg.clock import now
-from hfg.functions import node
+from hfg.base.clock import now
 from hfg.images import AnyImage, Image
 from hfg.nodes.files.access import is_a_path, named, write_whole
 from hfg.nodes.files.sinks import PICTURES, encoded
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Parameter, State
 
 __all__ = ["ImageDisplay", "image_grid", "visible"]

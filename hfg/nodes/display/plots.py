@@ -12,13 +12,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from annotated_types import Interval, Predicate
 
+from hfg.base.token import Token
 from hfg.images import Color
 from hfg.nodes._extras import require
 from hfg.nodes.files.access import is_a_path, named, write_whole
 from hfg.nodes.values.vectors import Vector
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Inputs, Output, Parameter, State, slot
-from hfg.token import Token
 
 __all__ = ["HistogramPlot", "ScatterPlot", "TimePlot", "VectorPlot", "finite"]
 

@@ -12,12 +12,12 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from annotated_types import Interval, MaxLen, Predicate
 
-from hfg.clock import now
-from hfg.functions import node
-from hfg.logs import log
+from hfg.base.clock import now
+from hfg.base.logs import log
 from hfg.nodes._printing import print_line
 from hfg.nodes.values.text import format_safely, is_a_format
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Parameter, State, slot
 
 __all__ = ["Indicator", "SignalLight", "TextDisplay", "format_table", "log_value", "print_line"]

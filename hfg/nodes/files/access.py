@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, AnyStr, BinaryIO, Final, Literal, TypeAlias
 
-from hfg import whole
-from hfg.bounds import FILE_BYTES
+from hfg.base import whole
+from hfg.base.bounds import FILE_BYTES
 
 __all__ = ["FilePath", "find_files", "is_a_path", "lines_of", "named", "reaching", "read_whole", "write_whole"]
 
@@ -101,7 +101,7 @@ def lines_of(file: IO[AnyStr], path: Path) -> Iterator[AnyStr]:
 
 
 def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:
-    """Write a file as `hfg.whole.write_whole` does. Directories that are missing are made.
+    """Write a file as `hfg.base.whole.write_whole` does. Directories that are missing are made.
 
     Raises:
       OSError: it cannot be written; the sentence says why, and the old file is whole.

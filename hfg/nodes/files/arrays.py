@@ -12,7 +12,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from hfg.bounds import FILE_BYTES
+from hfg.base.bounds import FILE_BYTES
 
 __all__ = ["need_fair_arrays"]
 

@@ -13,14 +13,14 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 import numpy as np
 from annotated_types import MaxLen, MinLen
 
-from hfg.bounds import FILE_BYTES
+from hfg.base.bounds import FILE_BYTES
 from hfg.encoding.pictures import need_fair_size
 from hfg.encoding.plain import json_value
-from hfg.functions import node
 from hfg.images import AnyImage, Image
 from hfg.nodes._extras import require
 from hfg.nodes.files.access import FilePath, named, reaching, read_whole
 from hfg.nodes.files.arrays import need_fair_arrays
+from hfg.nodetypes.functions import node
 from hfg.types import Array
 
 __all__ = [

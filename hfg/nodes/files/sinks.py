@@ -18,17 +18,17 @@ import msgspec
 import numpy as np
 from annotated_types import Interval, MaxLen, MinLen, Predicate
 
-from hfg.clock import now
+from hfg.base.clock import now
+from hfg.base.whole import GrowingFile
 from hfg.images import AnyImage
 from hfg.nodes._extras import require
 from hfg.nodes._printing import print_line
 from hfg.nodes.files.access import FilePath, is_a_path, named, reaching, write_whole
 from hfg.nodes.values.parsing import json_bytes
 from hfg.nodes.values.text import format_safely, is_a_format
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 from hfg.types import Array
-from hfg.whole import GrowingFile
 
 __all__ = [
     "StackArrays",

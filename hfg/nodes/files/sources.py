@@ -17,7 +17,7 @@ from hfg.images import Image
 from hfg.nodes.files.access import find_files, is_a_path, lines_of, named, reaching
 from hfg.nodes.files.keyboard import lines_of_standard_input
 from hfg.nodes.files.reading import Column, json_of, load_array, load_image, rows_of
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Output, Parameter, State, slot
 from hfg.types import Array
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from annotated_types import Ge
 
-from hfg.nodetype import Node
+from hfg.base.token import Token
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Parameter, State
-from hfg.token import Token
 
 __all__ = ["Background"]
 

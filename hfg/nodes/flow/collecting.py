@@ -8,10 +8,10 @@ from typing import Any
 
 from annotated_types import Ge, Gt
 
+from hfg.base.token import Token
 from hfg.nodes._rounding import slack_s
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State
-from hfg.token import Token
 
 __all__ = ["Accumulate", "Count", "CountItems", "Recent", "TimeWindow", "Window"]
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from annotated_types import Ge
 
+from hfg.base.token import NO_MESSAGE, Token
 from hfg.nodes._rounding import slack_s
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
-from hfg.token import NO_MESSAGE, Token
 
 __all__ = ["CombineLatest", "Join", "JoinByStamp", "SampleAndHold", "Synchronizer"]
 

@@ -9,11 +9,11 @@ from typing import Any, Final
 
 from annotated_types import Ge, Gt, Interval
 
-from hfg.clock import elapsed
+from hfg.base.clock import elapsed
 from hfg.errors import EndOfStream
 from hfg.graph import Graph
 from hfg.graph.structure.level import level_of
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
 __all__ = ["Cache", "HoldableBuffer", "Latch", "MemoryCell", "TriggeredLatch"]

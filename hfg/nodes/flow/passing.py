@@ -7,12 +7,12 @@ from typing import Any, Literal, TypeVar
 
 from annotated_types import Ge
 
+from hfg.base.token import NO_MESSAGE
 from hfg.errors import EndOfStream
-from hfg.functions import node
 from hfg.nodes._equality import same
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
-from hfg.token import NO_MESSAGE
 
 __all__ = [
     "AtEnd",

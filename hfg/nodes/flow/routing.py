@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from hfg.functions import node
-from hfg.nodetype import Node
+from hfg.base.token import NO_MESSAGE
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Output, Outputs, Parameter, Slots, slot
-from hfg.token import NO_MESSAGE
 
 __all__ = ["Demux", "Gate", "Merge", "Mux", "Rejoin", "switch"]
 

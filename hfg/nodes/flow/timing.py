@@ -8,11 +8,11 @@ from typing import Any, Final
 
 from annotated_types import Ge, Gt
 
-from hfg.clock import elapsed
+from hfg.base.clock import elapsed
+from hfg.base.token import Token
 from hfg.nodes._alarm import Alarm
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
-from hfg.token import Token
 
 __all__ = ["Debounce", "Delay", "Throttle"]
 

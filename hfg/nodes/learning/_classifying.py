@@ -13,7 +13,7 @@ from hfg.nodes._pictures import refusal
 from hfg.nodes.files.access import is_a_path, named, read_whole
 from hfg.nodes.learning._models import model_of, table_of
 from hfg.nodes.learning._samples import Sample
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 
 __all__ = ["Classifier"]

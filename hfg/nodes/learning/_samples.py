@@ -10,8 +10,8 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 from annotated_types import Interval
 
 from hfg.errors import EndOfStream
-from hfg.functions import node
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Outputs, Parameter, State
 
 __all__ = ["FunctionSamples", "Sample", "SampleSplitter", "filter_samples", "label_samples", "make_sample"]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from annotated_types import Interval
 
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State, slot
 
 __all__ = ["Landmark", "LandmarkMap", "LandmarkMixture"]

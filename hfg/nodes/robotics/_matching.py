@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
 from hfg.nodes.robotics._scans import Pose, Positions, Segments
+from hfg.nodetypes.functions import node
 from hfg.types import Named, Shape
 
 __all__ = ["Covariance", "ScanMatch", "match_scan", "moved"]

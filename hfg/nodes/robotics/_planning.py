@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
 from hfg.nodes._extras import require
 from hfg.nodes.robotics._scans import Positions
+from hfg.nodetypes.functions import node
 from hfg.types import Named, Shape
 
 __all__ = ["Costs", "Place", "plan_path"]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
+from hfg.nodetypes.functions import node
 from hfg.types import Named, Shape
 
 __all__ = [

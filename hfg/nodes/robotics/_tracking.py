@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from annotated_types import Interval
 
-from hfg.clock import now
+from hfg.base.clock import now
 from hfg.nodes.robotics._scans import Disk, Pose, Ranges, need_pairs
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 
 __all__ = ["DiskTracks", "TrackDisks"]

@@ -8,7 +8,7 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
+from hfg.nodetypes.functions import node
 from hfg.ports import Inputs
 
 __all__ = [

@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Predicate
 
-from hfg.functions import node
-from hfg.nodetype import Node
+from hfg.base.values import Colour
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Output, Parameter, State, slot
 from hfg.ports.events import EventPort
 from hfg.types import Shape
-from hfg.values import Colour
 
 __all__ = [
     "BoolOnTrigger",

@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias
 
 from annotated_types import MaxLen, Predicate
 
-from hfg.functions import node
+from hfg.nodetypes.functions import node
 from hfg.ports import Inputs, Parameter
 
 __all__ = ["expression", "is_a_formula", "read_formula"]

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 from annotated_types import Interval, MinLen, Predicate, Unit
 
-from hfg.functions import node
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 
 __all__ = [

@@ -14,8 +14,8 @@ import numpy as np
 from annotated_types import Interval
 
 from hfg.encoding.plain import json_value
-from hfg.functions import node
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter
 
 __all__ = [

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 from annotated_types import Interval, Predicate
 
-from hfg.nodetype import Node
+from hfg.base.token import Token
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
-from hfg.token import Token
 
 __all__ = [
     "PID",

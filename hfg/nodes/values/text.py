@@ -14,8 +14,8 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from annotated_types import Interval, MaxLen, MinLen, Predicate
 
-from hfg.functions import node
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Inputs, Parameter
 
 __all__ = [

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Inputs, Output, Parameter, State
 from hfg.types import Shape
 

@@ -12,7 +12,7 @@ from annotated_types import Interval
 from hfg.images import FlowField, Image, Mask, Picture, Rows
 from hfg.nodes._pictures import colour, need_picture, refusal
 from hfg.nodes._pictures import gray as gray_of
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 from hfg.types import Named
 

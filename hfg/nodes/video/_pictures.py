@@ -8,13 +8,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from annotated_types import Interval
 
-from hfg.functions import node
 from hfg.images import Color, Picture
 from hfg.nodes._extras import require
 from hfg.nodes._pictures import colour
 from hfg.nodes.files.access import write_whole
 from hfg.nodes.files.sinks import encoded
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Parameter, slot
 
 __all__ = ["Screenshot", "collage"]

@@ -17,13 +17,13 @@ from typing import Any, Final, Literal
 import cv2
 from annotated_types import Ge, Gt
 
-from hfg.clock import now
+from hfg.base.clock import now
 from hfg.encoding.pictures import need_fair_size, pixels_problem
 from hfg.errors import EndOfStream
 from hfg.images import Image
 from hfg.nodes._encodable import need_encodable
 from hfg.nodes.files.access import find_files
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Output, Parameter, State
 
 __all__ = ["Camera", "VideoFile"]

@@ -15,7 +15,7 @@ from hfg.images import Picture
 from hfg.nodes._encodable import need_encodable
 from hfg.nodes._pictures import colour, need_picture
 from hfg.nodes.files.access import reaching
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Parameter, State, slot
 
 __all__ = ["WriteVideo"]

@@ -13,7 +13,7 @@ from annotated_types import Interval, MultipleOf
 from hfg.images import Disparity, Picture, Rows
 from hfg.nodes._pictures import gray, need_picture, refusal
 from hfg.nodes.vision._detecting import chessboard
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
 from hfg.types import Named
 

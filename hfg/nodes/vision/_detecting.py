@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Interval, Len
 
-from hfg.functions import node
 from hfg.images import Gray, Picture, Rows
 from hfg.nodes._encodable import need_encodable
 from hfg.nodes._pictures import colour, gray, need_picture, refusal
 from hfg.nodes._structured import cascade_of, need_harmless
 from hfg.nodes.files.access import read_whole
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State
 from hfg.types import Named
 

@@ -8,10 +8,10 @@ from typing import Annotated, Final
 import cv2
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
+from hfg.base.values import Colour
 from hfg.images import Color, Picture, wrong_image
 from hfg.nodes._pictures import colour
-from hfg.values import Colour
+from hfg.nodetypes.functions import node
 
 __all__ = ["draw_boxes"]
 

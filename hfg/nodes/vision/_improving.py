@@ -7,7 +7,7 @@ from annotated_types import Interval
 
 from hfg.images import Picture
 from hfg.nodes._pictures import colour, gray, need_picture
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter
 
 __all__ = ["EqualizeLocally"]

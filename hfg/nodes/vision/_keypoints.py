@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
 from hfg.images import Mask, Picture
 from hfg.nodes._pictures import gray, need_picture, refusal
-from hfg.nodetype import Node
+from hfg.nodetypes.functions import node
+from hfg.nodetypes.node import Node
 from hfg.ports import Input, Output, Parameter, State
 from hfg.types import Named, Shape
 

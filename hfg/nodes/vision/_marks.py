@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from annotated_types import Interval, Unit
 
-from hfg.functions import node
 from hfg.images import Picture, Rows, wrong_image
 from hfg.nodes._pictures import gray
+from hfg.nodetypes.functions import node
 from hfg.types import Named
 
 __all__ = ["Bullseye", "find_bullseyes", "find_quadrilaterals"]

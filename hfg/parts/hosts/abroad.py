@@ -15,8 +15,8 @@ from collections.abc import Mapping
 from contextvars import ContextVar
 from typing import Any, Final, TypeVar
 
+from hfg.base.logs import Log
 from hfg.errors import HfgError, NoAnswer, QueryRefused, TransportError
-from hfg.logs import Log
 from hfg.parts.hosts.agent import WAITS_S
 from hfg.parts.hosts.realm import (
     FINDS_S,

@@ -13,8 +13,8 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
+from hfg.base.logs import Log
 from hfg.errors import HfgError, TransportError, UsageError, in_words
-from hfg.logs import Log
 from hfg.parts.hosts.realm import (
     GONE_S,
     AgentIs,

@@ -18,8 +18,8 @@ from typing import Any, ClassVar, Final, TypeVar
 
 import msgspec
 
+from hfg.base.logs import Log
 from hfg.errors import TransportError, UsageError
-from hfg.logs import Log
 from hfg.transport import Closing, Presence, Session
 
 __all__ = [

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 
+from hfg.errors import Problem
 from hfg.graph import Graph
 from hfg.graph.flat import LINK, ROOT, Cutting, FlatGraph, FlatNode, cut, flatten
 from hfg.parts.model.components import components
 from hfg.parts.model.inheriting import keeping
-from hfg.problem import Problem
 
 __all__ = ["costs_of_deaths", "uncounted"]
 

@@ -12,13 +12,13 @@ from typing import Any
 import msgspec
 
 from hfg import errors
+from hfg.base.frames import users_part
+from hfg.base.token import Token
 from hfg.encoding import TokenCodec
 from hfg.encoding.wire import Place, View
 from hfg.errors import EncodingError, Failure, HfgError, NodeError, RunError
-from hfg.frames import users_part
 from hfg.parts.model.messages import Failed
 from hfg.ports import Port
-from hfg.token import Token
 
 __all__ = ["as_error", "as_failed", "codec_of"]
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import msgspec
 
+from hfg.base.logs import Log
 from hfg.engine.face.composition import Composition
 from hfg.engine.observing.report import edge_reports, node_reports
 from hfg.engine.runtime.engine import Engine
@@ -22,7 +23,6 @@ from hfg.errors import EngineInternalError, HfgError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, cut, flatten
 from hfg.graph.structure.level import level_of
-from hfg.logs import Log
 from hfg.parts.model.agreement import Rest
 from hfg.parts.model.clocks import Offset, RunClock, machine
 from hfg.parts.model.components import components

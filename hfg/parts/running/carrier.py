@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from hfg.base.logs import Log
 from hfg.graph.flat import CutEdge
-from hfg.logs import Log
 from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, Untrue
 from hfg.parts.running.channels import name_of
 from hfg.parts.running.ends import IncomingEnd, OutgoingEnd, World

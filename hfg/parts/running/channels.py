@@ -9,9 +9,9 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
+from hfg.base.logs import Log
 from hfg.errors import TransportError
 from hfg.links.running import LinkReceiver, LinkSender
-from hfg.logs import Log
 from hfg.parts.model.messages import Message, Untrue, pack, unpack
 from hfg.transport import Session
 

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, NamedTuple
 
+from hfg.base.token import Token
 from hfg.encoding import TokenCodec
 from hfg.engine.runtime.borders import Hearing
 from hfg.errors import EncodingError, RunError, TransportError
@@ -27,7 +28,6 @@ from hfg.parts.running.channels import name_of
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
-from hfg.token import Token
 from hfg.transport import Delivery, EncodedToken, Position, Session
 
 __all__ = ["IncomingEnd", "OutgoingEnd", "World"]

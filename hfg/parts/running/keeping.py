@@ -17,6 +17,7 @@ from typing import Any, Final, Protocol, get_type_hints
 import msgspec
 import numpy as np
 
+from hfg.base.token import Token
 from hfg.encoding import TokenCodec, data
 from hfg.engine.model.worker import ENDED, Worker
 from hfg.engine.rules.agenda import consider, let_follow
@@ -26,11 +27,10 @@ from hfg.engine.runtime.borders import Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import EncodingError, HfgError, RunError
 from hfg.links import Outbox
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.parts.model.inheriting import Where
 from hfg.ports import Port
 from hfg.ports.edges import AnyEdge, EventEdge
-from hfg.token import Token
 from hfg.transport import Position
 
 __all__ = ["Keeper", "KeptEdge", "KeptOutbox", "Leaving", "Snapshot", "read"]

@@ -14,13 +14,14 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Final, Protocol
 
+from hfg.base.logs import Log
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.engine.face.composition import Composition
 from hfg.engine.rules import quiet, rings
 from hfg.engine.runtime.borders import Hearing, Inlet, Outlet
 from hfg.engine.runtime.engine import Engine
 from hfg.errors import HfgError, RunError, UsageError
 from hfg.graph.flat import CutEdge
-from hfg.logs import Log
 from hfg.parts.model.agreement import Account, Answer, Question, Rest
 from hfg.parts.model.components import Component, is_synchronous
 from hfg.parts.model.inheriting import Arrived, Where
@@ -29,7 +30,6 @@ from hfg.parts.running.channels import name_of
 from hfg.parts.running.keeping import Keeper
 from hfg.parts.running.progress import Progress
 from hfg.ports.edges import EventEdge
-from hfg.token import END, NO_MESSAGE, Token
 
 __all__ = ["Incoming", "Outgoing", "Part"]
 

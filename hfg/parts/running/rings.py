@@ -17,13 +17,13 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from hfg.base.logs import Log
+from hfg.base.token import Token
 from hfg.encoding import ArrayHead, Lease, TokenCodec
 from hfg.encoding.arrays import array_problem
 from hfg.errors import SharedMemoryError, UsageError
-from hfg.logs import Log
 from hfg.parts.model.messages import Sees, Shares
 from hfg.sharedmemory import Reader, Ring, RingCounts, segment_name, sweep, unavailable
-from hfg.token import Token
 
 __all__ = ["Borrowing", "Lending", "LendingCounts", "segment_of", "segments_of", "sweep_run", "sweep_runs"]
 

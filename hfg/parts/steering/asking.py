@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import msgspec
 
+from hfg.base.logs import Log
 from hfg.engine.face.composition import Composition
 from hfg.engine.runtime import relays
 from hfg.errors import EncodingError, HfgError, RunError
@@ -23,8 +24,7 @@ from hfg.graph import Graph
 from hfg.graph.flat import MAIN, Cutting, FlatGraph
 from hfg.graph.flat.flat_graph import ROOT, FlatEdge
 from hfg.graph.structure.edge import Edge as DrawnEdge
-from hfg.logs import Log
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.parts.model.failing import as_error
 from hfg.parts.model.messages import Call, Failed, Parcel, Result, Seen, Untrue
 from hfg.parts.steering.crossing import Crossing

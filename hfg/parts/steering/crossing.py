@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import msgspec
 
+from hfg.base.token import Token
 from hfg.encoding import TokenCodec
 from hfg.engine.observing.encoding import text
 from hfg.errors import EncodingError, HfgError
@@ -19,7 +20,6 @@ from hfg.graph.flat import FlatGraph
 from hfg.parts.model.failing import codec_of
 from hfg.parts.model.messages import Parcel, Passed, PlainEvent, Sight
 from hfg.ports import Port
-from hfg.token import Token
 from hfg.trace import (
     EventTriggered,
     ParameterSet,

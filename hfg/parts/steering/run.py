@@ -15,6 +15,8 @@ from typing import Any, Final, Literal, NoReturn, TypeVar
 import msgspec
 
 from hfg.activity.rules import asked_for
+from hfg.base.token import Token
+from hfg.base.values import own_copy
 from hfg.engine.editing.pausing import Breakpoint, Step
 from hfg.engine.editing.setting import need_settable, without_effect
 from hfg.engine.face.composition import Composition
@@ -29,14 +31,12 @@ from hfg.graph import Graph
 from hfg.graph.editing.commands import Command
 from hfg.graph.flat import MAIN, CutEdge
 from hfg.graph.structure.edge import Edge, PortEnd
-from hfg.nodetype import Node
+from hfg.nodetypes.node import Node
 from hfg.parts.model.messages import Seen
 from hfg.parts.steering.asking import Asking, Standing
 from hfg.parts.steering.editing import CutEdits, Drawing
 from hfg.ports import EventPort, ParameterPort, Port
-from hfg.token import Token
 from hfg.trace import Consumer
-from hfg.values import own_copy
 
 __all__ = ["Counts", "CutRun"]
 

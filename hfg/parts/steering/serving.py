@@ -14,6 +14,7 @@ from contextlib import AbstractAsyncContextManager, nullcontext
 from functools import partial
 from typing import Any, Final
 
+from hfg.base.token import Token
 from hfg.engine.editing.pausing import Breakpoint
 from hfg.engine.face.composition import Composition
 from hfg.engine.face.run import Run
@@ -27,7 +28,6 @@ from hfg.parts.model.failing import as_failed
 from hfg.parts.model.messages import Call, Failed, Message, Parcel, Result, Seen, Sight
 from hfg.parts.steering.crossing import Crossing
 from hfg.parts.steering.editing import draw, draw_redo, draw_undo, try_to_draw
-from hfg.token import Token
 from hfg.trace import RunEnded, RunPaused, RunResumed, RunStarted, TraceEvent
 
 __all__ = ["Serving"]

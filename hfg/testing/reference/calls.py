@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
+from hfg.base.token import Token
 from hfg.errors import Aborted, NodeError
 from hfg.testing.reference.state import Flight, Line, Lying, Station
 from hfg.testing.reference.structure import ROOT, boundary_of, is_box
 from hfg.testing.reference.tasks import Tending
-from hfg.token import Token
 from hfg.trace import CallEnded, CallStarted, ErrorRaised, FiringEnded, NodeEnabled, TokenProcessed, TokenTaken
 
 __all__ = ["Calling"]

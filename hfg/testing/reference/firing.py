@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable
 from typing import Any, Literal
 
+from hfg.base.token import END, NO_MESSAGE
 from hfg.errors import EndOfStream, Failure, FiringTimeout, NodeError, UsageError
 from hfg.testing.reference.running_code import RunningCode
 from hfg.testing.reference.sending import passed_on
 from hfg.testing.reference.state import Flight, Line, Lying, Station, newest
 from hfg.testing.reference.structure import boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
-from hfg.token import END, NO_MESSAGE
 from hfg.trace import (
     ErrorRaised,
     FiringEnded,

@@ -11,12 +11,12 @@ from collections.abc import Collection, Set
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import QueueLimit, Stalled, UsageError
 from hfg.testing.reference.rings import Rings
 from hfg.testing.reference.state import Flight, Line, Station, Task
 from hfg.testing.reference.structure import ROOT, Edge, End, boundary_of
 from hfg.testing.reference.waiting import MOMENT_S
-from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import (
     ActivityChanged,
     QueueGrown,

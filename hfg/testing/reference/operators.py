@@ -14,8 +14,8 @@ from reactivex.disposable import Disposable, SingleAssignmentDisposable
 from reactivex.scheduler.scheduler import Scheduler
 from reactivex.subject import Subject
 
+from hfg.base.token import Token
 from hfg.testing.reference.waiting import MOMENT_S
-from hfg.token import Token
 
 __all__ = ["Operators"]
 

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from hfg.base.token import Token
 from hfg.errors import UsageError
 from hfg.testing.reference.machine import Move, ReferenceMachine
-from hfg.token import Token
 from hfg.trace import ActivityChanged, QueueGrown, TokenDrained, TokenDropped, TokenSent, TraceEvent
 
 __all__ = ["ReferenceReport", "reference_run"]

@@ -16,7 +16,7 @@ from functools import partial
 from types import CoroutineType
 from typing import Any
 
-from hfg.clock import time_told_by
+from hfg.base.clock import time_told_by
 from hfg.errors import UsageError
 from hfg.testing.reference.sending import Sending
 from hfg.testing.reference.state import Flight, Station, Task

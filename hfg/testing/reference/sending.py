@@ -11,11 +11,11 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any, Literal
 
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import QueueOverflow
 from hfg.testing.reference.operators import Operators
 from hfg.testing.reference.state import Flight, Line, Lying, State, Station
 from hfg.testing.reference.structure import ROOT, is_box
-from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import (
     ActivityChanged,
     ActivityLost,

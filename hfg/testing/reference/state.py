@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from hfg.base.token import END, NO_MESSAGE, Token
 from hfg.errors import EndOfStream, NodeError
 from hfg.testing.reference.structure import ROOT, Edge, Leaf, Structure, is_box, whole
 from hfg.testing.reference.waiting import MOMENT_S, hand_turned_loop
-from hfg.token import END, NO_MESSAGE, Token
 from hfg.trace import TraceEvent
 
 __all__ = ["Flight", "Line", "Lying", "State", "Station", "Task", "fresh", "newest"]

@@ -29,7 +29,7 @@ from examples.fetch_delivery.showing.observing import Observer
 from examples.fetch_delivery.showing.top_view import SIZE, TopView
 from examples.fetch_delivery.showing.ways import ways
 from examples.fetch_delivery.world import Simulation
-from hfg.token import Token
+from hfg.base.token import Token
 from hfg.trace import ActivityChanged, TokenSent
 
 ROOT = Path(__file__).parents[3]

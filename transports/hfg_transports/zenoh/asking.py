@@ -9,8 +9,8 @@ import asyncio
 import contextlib
 from typing import TYPE_CHECKING, Any, Final
 
+from hfg.base.logs import log
 from hfg.errors import MessageTooLarge, NoAnswer, QueryRefused, in_words
-from hfg.logs import log
 from hfg.transport import Answer
 from hfg_transports.zenoh.config import LONG
 

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, Generic, TypeVar
 
-from hfg.logs import log
+from hfg.base.logs import log
 
 __all__ = ["Inbox", "Mailbox"]
 

@@ -12,9 +12,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from hfg.base.logs import log
+from hfg.base.private import check_parents
 from hfg.errors import TransportError
-from hfg.logs import log
-from hfg.private import check_parents
 from hfg_transports.zenoh import binding
 from hfg_transports.zenoh.config import configuration, listens, targets
 from hfg_transports.zenoh.diagnosing import files_that_do_not_fit, why_unreachable

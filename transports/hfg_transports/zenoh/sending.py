@@ -12,8 +12,8 @@ import threading
 from collections import deque
 from typing import TYPE_CHECKING, Any, Final
 
+from hfg.base.logs import log
 from hfg.errors import MessageTooLarge, TransportError
-from hfg.logs import log
 from hfg.transport import Buffer, Traffic, size_of
 from hfg_transports.zenoh.config import LONG
 

@@ -33,8 +33,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 
-from hfg.errors import FileError
-from hfg.problem import Problem
+from hfg.errors import FileError, Problem
 
 __all__ = [
     "Access",

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
+from hfg.base.logs import log
 from hfg.errors import MessageTooLarge, NoAnswer, TransportError
-from hfg.logs import log
 from hfg.transport import Answer, Message, Receive, Traffic, Watch
 from hfg_transports.zenoh import binding
 from hfg_transports.zenoh.asking import Answerer, Question

@@ -11,9 +11,11 @@ import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final, TypeAlias, TypeVar
 
-from hfg.description import EventSpec, InputSpec, NodeType, OutputSpec, Result, SlotSpec
 from hfg.errors import DeclarationError, UsageError
-from hfg.hints import MISSING, hints_of, kind_of, split_token
+from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, Result, SlotSpec
+from hfg.nodetypes.hints import MISSING, hints_of, kind_of, split_token
+from hfg.nodetypes.signature import Signature, read_signature
+from hfg.nodetypes.vectors import list_of, size_parameters, vector_specs
 from hfg.ports.automatic import AUTOMATIC_EVENTS, AUTOMATIC_SLOTS
 from hfg.ports.base import Relaying
 from hfg.ports.events import Event
@@ -24,9 +26,7 @@ from hfg.ports.slots import UNSET, Slot
 from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.ports.states import State
 from hfg.ports.vectors import Events, Inputs, Outputs, Slots, Vector, VectorSpec
-from hfg.signature import Signature, read_signature
 from hfg.types import describe, is_hint
-from hfg.vectors import list_of, size_parameters, vector_specs
 
 __all__ = [
     "HOOKS",

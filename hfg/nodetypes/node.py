@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar
 
 import msgspec
 
-from hfg.declaration import declare
-from hfg.description import NodeType, parameter_values, read_only_refusal, unknown_parameter
+from hfg.base.logs import Log, Logger, node_log
+from hfg.base.token import Token
+from hfg.base.values import own_copy
 from hfg.errors import DeclarationError, EngineInternalError, Failure, NotRunning, UsageError, shown
-from hfg.logs import Log, Logger, node_log
+from hfg.nodetypes.declaration import declare
+from hfg.nodetypes.description import NodeType, parameter_values, read_only_refusal, unknown_parameter
+from hfg.nodetypes.vectors import Vectors
 from hfg.ports.automatic import (
     AUTOMATIC_EVENTS,
     AUTOMATIC_SLOTS,
@@ -34,9 +37,6 @@ from hfg.ports.outputs import OutputPort
 from hfg.ports.parameters import ParameterPort
 from hfg.ports.slots import SlotPort
 from hfg.ports.views import Ports
-from hfg.token import Token
-from hfg.values import own_copy
-from hfg.vectors import Vectors
 
 __all__ = ["Node", "NodeType", "Place"]
 

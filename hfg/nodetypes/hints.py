@@ -12,9 +12,9 @@ import typing
 from collections import abc
 from typing import Any, Final, NoReturn
 
-from hfg.description import ProcessKind
+from hfg.base.token import Token
 from hfg.errors import DeclarationError
-from hfg.token import Token
+from hfg.nodetypes.description import ProcessKind
 
 __all__ = [
     "MISSING",

@@ -15,10 +15,10 @@ from typing import Any, Literal
 
 import msgspec
 
+from hfg.base.values import own_copy
 from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.ports.states import State
 from hfg.ports.vectors import VectorSpec, element
-from hfg.values import own_copy
 
 __all__ = [
     "EventSpec",

@@ -13,8 +13,8 @@ from typing import Any, Final
 
 import msgspec
 
-from hfg.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
 from hfg.errors import DeclarationError
+from hfg.nodetypes.description import EventSpec, InputSpec, NodeType, OutputSpec, SlotSpec
 from hfg.ports.slots import Slot
 from hfg.ports.specs import REQUIRED, ParameterSpec
 from hfg.ports.vectors import Slots, Vector, VectorSpec, element

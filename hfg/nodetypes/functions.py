@@ -18,18 +18,18 @@ import msgspec
 import numpy as np
 from typing_extensions import TypeForm
 
-from hfg.declaration import RESERVED, check_names, install_ports, shared_names, snake_case
-from hfg.description import InputSpec, NodeType, OutputSpec, Result
 from hfg.errors import DeclarationError
-from hfg.hints import MISSING, function_name, hints_of_class, output_type
-from hfg.nodetype import Node
+from hfg.nodetypes.declaration import RESERVED, check_names, install_ports, shared_names, snake_case
+from hfg.nodetypes.description import InputSpec, NodeType, OutputSpec, Result
+from hfg.nodetypes.hints import MISSING, function_name, hints_of_class, output_type
+from hfg.nodetypes.node import Node
+from hfg.nodetypes.signature import CallPlan, Signature, read_signature
+from hfg.nodetypes.vectors import list_of, size_parameters, vector_specs
 from hfg.ports.outputs import OutputPort
 from hfg.ports.parameters import Parameter
 from hfg.ports.specs import ParameterSpec
 from hfg.ports.vectors import Inputs, Outputs, Vector
-from hfg.signature import CallPlan, Signature, read_signature
 from hfg.types import describe
-from hfg.vectors import list_of, size_parameters, vector_specs
 
 __all__ = ["FunctionNode", "NodeFunction", "make_type", "node"]
 

@@ -13,9 +13,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from hfg.description import InputSpec, ProcessKind
 from hfg.errors import DeclarationError
-from hfg.hints import MISSING, function_name, hints_of, is_iterator, kind_of, result_of, split_token
+from hfg.nodetypes.description import InputSpec, ProcessKind
+from hfg.nodetypes.hints import MISSING, function_name, hints_of, is_iterator, kind_of, result_of, split_token
 from hfg.ports.kinds import type_of_default
 from hfg.ports.parameters import spec_of
 from hfg.ports.specs import REQUIRED, ParameterSpec
