@@ -20,7 +20,7 @@ help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
 	@echo "make photographs   search, measure and report on real photographs, watched and steered"
 	@echo "make test    run all tests (without the long ones)"
-	@echo "make lint    ruff and mypy"
+	@echo "make lint    ruff, mypy and the check of our English"
 	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md;"
 	@echo "             bench-goals: what is to be reached, and whether it is; bench-links: from process to process)"
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
@@ -43,6 +43,7 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python tools/prose.py --ratchet
 
 bench: $(READY)
 	$(BIN)/python -m benchmarks --json $(RESULTS)
