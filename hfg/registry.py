@@ -1,6 +1,6 @@
 """Finds node types by reference, "module:qualname", and gives the reference of a type.
 
-Stands on `nodetype` and `functions`.
+Stands on `node` and `functions`.
 """
 
 from __future__ import annotations

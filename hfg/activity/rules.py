@@ -2,7 +2,7 @@
 
 And what leaves it.
 
-Nothing here knows nodes, edges or time. Stands on `token`.
+Nothing here knows nodes, edges or time. Depends on nothing.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The live table of a run's nodes: glances in, lines of text out. Stands on `glance` of the engine; draws nothing.
+"""The live table of a run's nodes: glances in, lines of text out. Depends on the `Glance` of the engine; draws nothing.
 
 fetch  running  12.3 s  5 nodes  3 errors
 active  search

@@ -1,7 +1,7 @@
 """Node types as functions: `hfg.node` turns any function into something that makes nodes.
 
 Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output "out"; what a library
-does not say is said in the call. Stands on `nodetype` and `signature`.
+does not say is said in the call. Stands on `node` and `signature`.
 """
 
 from __future__ import annotations

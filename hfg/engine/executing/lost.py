@@ -3,7 +3,7 @@
 A task that is awaited where it was started is nobody's affair: gathered, in a group, behind a time limit. One that
 still runs at the end of the run, or has failed with nobody there to hear of it, is told of as a warning that names the
 node and the remedy. While a run is on, the loop makes its tasks by a factory that notes whose code asks for one; that
-costs what makes tasks, and nothing else. Stands on `code`.
+costs what makes tasks, and nothing else. Stands on `virtual`.
 """
 
 from __future__ import annotations

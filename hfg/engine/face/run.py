@@ -1,4 +1,4 @@
-"""What one can do with a run from outside (ARCHITECTURE §1, rules R1, R7, P10).
+"""What one can do with a run from outside (rules R1, R7, P10).
 
 A thin face: what is asked for is done by the parts of `composition`.
 """

@@ -199,9 +199,25 @@ async def run_async(
     allow_idle: bool = False,
     **options: Unpack[RunOptions],
 ) -> Report:
-    """Run a graph to its end in the running event loop; see `run` for the arguments.
+    """Run a graph to its end in the running event loop.
 
-    Cancelling it tears the run down.
+    Cancelling the call tears the run down.
+
+    Args:
+      graph: the graph; it is checked first.
+      clock: "real" or "virtual"; "virtual" needs a loop in virtual time, `VirtualTimeLoop`.
+      begin: called with the run before nodes are set up; see `run`.
+      allow_idle: keep a quiet graph running; see `run`.
+      **options: `until_s`, `debug`, `policy`, `seed`, `trace`, `block_warning_s`, `fast`, `watch` and `settings`, as in
+        `run`.
+
+    Returns:
+      A report; its `outcome` is "done", "stopped" or "until".
+
+    Raises:
+      CheckFailed: the graph has errors; nothing was started.
+      RunError: a node failed (`NodeError`), the graph stalled (`Stalled`), or it aborted itself (`Aborted`).
+      UsageError: the graph is already running, or the loop does not fit the clock.
     """
     settings = _settings(options, allow_idle=allow_idle)
     return await _run_to_end(graph, clock or "real", settings, begin)
@@ -215,31 +231,33 @@ def run(
     allow_idle: bool = False,
     **options: Unpack[RunOptions],
 ) -> Report:
-    """Run a graph to its end; blocks until then.
+    """Run a graph to its end. Blocks until the run is over.
 
     Args:
-      graph: it is checked first; a graph has one run at a time, and each run starts fresh.
-      clock: "real", or "virtual": as fast as the machine can, with the same values and stamps each time (R6).
-      until_s: end the run after so many seconds on its clock.
-      debug: check every value against the type of its port, and that nobody changes a value that is shared (T1).
-      policy: for all groups, in place of their own: "fifo", "priority", "random" (R2).
-      seed: of the policy "random".
-      trace: receives every event of the run (R7); one that raises is removed.
-      begin: called with the run on its loop, before its nodes are set up: the place for `run.tap` and `run.trace`.
-      allow_idle: a quiet graph does not end; it waits for subscribers, `stop` or Ctrl-C.
-      block_warning_s: after how long a firing on the loop group is warned about; 0 for never.
-      fast: fuse plain nodes and take fast paths; outcomes do not differ.
-      watch: let `hfg top` and `hfg tap` in other processes of the same user look at it, on the real clock; a text is
-        what they show as the program. By default if the environment has HFG_WATCH=1.
-      settings: the file that says in which realm agents are found, and who else there hears of the run.
+      graph: the graph. It is checked first. A graph can have one run at a time; each run starts from scratch.
+      clock: "real" or "virtual". Virtual time runs as fast as the machine can and gives the same values and stamps
+        every time (R6).
+      until_s: end the run after this many seconds on its clock.
+      debug: check every value against its port's type, and detect nodes that modify a shared value (T1).
+      policy: scheduling policy of all groups, instead of their own: "fifo", "priority", "deadline", "fair" or "random"
+        (R2).
+      seed: seed of the policy "random", and of the jitter of retries.
+      trace: receives every event of the run (R7): a list, a function, or another consumer. It is removed if it raises.
+      begin: called with the run, on its loop, before nodes are set up. Use it for `run.tap` and `run.trace`.
+      allow_idle: keep a quiet graph running. It then waits for subscribers, `stop` or Ctrl-C.
+      block_warning_s: warn about a firing that blocks the event loop for longer than this; 0 never warns.
+      fast: fuse plain nodes and use fast paths. Results are the same without it.
+      watch: let `hfg top` and `hfg tap` in other processes of the same user watch the run, on the real clock. A string
+        is the name that they show for the program. Default: whether the environment has HFG_WATCH=1.
+      settings: file with the settings of the network: where agents are found, and who else may watch the run.
 
     Returns:
-      How it went; `outcome` is "done", "stopped" or "until".
+      A report; its `outcome` is "done", "stopped" or "until".
 
     Raises:
       CheckFailed: the graph has errors; nothing was started.
-      RunError: a node failed (`NodeError`), the graph stalled (`Stalled`) or aborted itself (`Aborted`).
-      UsageError: called inside a running event loop, or the graph runs already.
+      RunError: a node failed (`NodeError`), the graph stalled (`Stalled`), or it aborted itself (`Aborted`).
+      UsageError: called inside a running event loop, or the graph is already running.
     """
     _need_no_loop()
     settings = _settings(options, allow_idle=allow_idle)
@@ -303,10 +321,25 @@ def running(
     clock: Clock | None = None,
     **options: Unpack[RunOptions],
 ) -> AbstractAsyncContextManager[Run]:
-    """Run a graph as long as the block lasts; the block holds the run open until it calls `wait_finished`.
+    """Run a graph for as long as an `async with` block lasts.
 
-    Leaving the block stops the run and tears it down. A failure of the run cancels what the block waits for and
-    comes out here.
+    The block holds the run open: a quiet graph keeps running until the block calls `run.wait_finished` or is left.
+    Leaving the block stops the run and tears it down. If the run fails, whatever the block awaits is cancelled, and the
+    block raises the run's error.
+
+    Args:
+      graph: the graph; it is checked first.
+      clock: "real" or "virtual"; "virtual" needs a loop in virtual time, `VirtualTimeLoop`.
+      **options: `until_s`, `debug`, `policy`, `seed`, `trace`, `block_warning_s`, `fast`, `watch` and `settings`, as in
+        `run`.
+
+    Returns:
+      A context manager whose value is the `Run`.
+
+    Raises:
+      CheckFailed: the graph has errors; nothing was started.
+      RunError: the run failed, when the block is left.
+      UsageError: the graph is already running, or the loop does not fit the clock.
     """
     return _Block(_running(graph, clock, options), getattr(graph, "name", "graph"))
 

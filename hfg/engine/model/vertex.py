@@ -41,7 +41,7 @@ def slots_first(edge: Edge) -> tuple[bool, float]:
 
 
 class RunningEvent:
-    """An event of a running node and the edges it feeds, slots first (D10 of docs/semantics.md, F9)."""
+    """An event of a running node and the edges it feeds, slots first (F9)."""
 
     __slots__ = ("edges", "name", "pipelines", "port", "tap", "worker")
 
@@ -259,10 +259,6 @@ class Vertex:
         self.group = group
         self.push: Callable[[Worker], None] = group.push
         self.push_next: Callable[[Worker], None] = group.push_next
-
-    def queue_by(self, push: Callable[[Worker], None], push_next: Callable[[Worker], None]) -> None:
-        """By these it gets into the queue of its group, in place of the group's own."""
-        self.push, self.push_next = push, push_next
 
     def rename(self, path: str) -> None:
         """It is called otherwise from now on."""

@@ -364,7 +364,7 @@ class Worker(Vertex):
             self.queued = False
 
     def take_place(self) -> None:
-        """The next firing is enabled: it comes behind the calls that wait already (F9, D1)."""
+        """The next firing is enabled: it comes behind the calls that wait already (F9)."""
         self.placed = True
         self.ahead = len(self.calls) if self.calls else 0
 
@@ -385,7 +385,7 @@ class Worker(Vertex):
     # --- what keeps it from moving (F1) ------------------------------------------------------------------------------
 
     def block(self, reason: int) -> None:
-        """Let no firing start; its place in the agenda is lost (D1), and it does not rest: no wave may take that so."""
+        """Let no firing start; its place in the agenda is lost (F9), and it does not rest: no wave may take that so."""
         self.blocked |= reason
         if self.region is not None:
             self.region.disturb(self)

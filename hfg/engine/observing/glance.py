@@ -1,7 +1,7 @@
 """A glance at a run: the few counts that a live table shows, cheap enough to take many times a second.
 
 `Statistics` says more and costs ten times as much. Everything that grows is a count since the run began, so whoever
-looks twice knows rates and shares. Stands on `statistics`.
+looks twice knows rates and shares. Stands on `measuring`.
 """
 
 from __future__ import annotations

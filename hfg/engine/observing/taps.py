@@ -1,7 +1,7 @@
 """Taps: looking at what passes a port or an edge while the graph runs.
 
 A tap keeps the newest tokens in a buffer of its own. The graph never waits for it; what it is too slow for is skipped
-and counted. Only the node in front of what is tapped leaves its shortest way. Stands on `ports`, `relays` and `steps`.
+and counted. Only the node in front of what is tapped leaves its shortest way. Stands on `ports` and `relays`.
 """
 
 from __future__ import annotations

@@ -109,7 +109,7 @@ def rest(worker: Worker) -> None:
             worker.block(RESTING)
         return
     worker.allow(RESTING)
-    if worker.placed and must_wait(worker):  # throttled from now on (D7)
+    if worker.placed and must_wait(worker):  # throttled from now on (A11)
         worker.lose_place()
     else:
         consider(worker)

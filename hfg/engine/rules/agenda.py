@@ -24,7 +24,7 @@ __all__ = [
 
 
 def place(worker: Worker) -> bool:
-    """Give the next firing its place if all that F1 asks for holds now (F9, D1); it is still to be queued."""
+    """Give the next firing its place if all that a firing needs holds now (F1, F9); it is still to be queued."""
     if worker.blocked or worker.placed or worker.inputs.missing or worker.outputs.missing:
         return False
     if worker.paced and must_wait(worker):
@@ -56,7 +56,7 @@ def let_follow(core: Core, since: int) -> None:
 
 
 def must_wait(worker: Worker) -> bool:
-    """F11 and D7: nothing starts before the rate allows it; the timer is set only when something would."""
+    """F11 and A11: nothing starts before the rate allows it; the timer is set only when something would."""
     when = worker.next_start
     if worker.is_source:
         for gate in worker.gates_over:

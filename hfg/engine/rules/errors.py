@@ -218,7 +218,7 @@ def time_out(worker: Worker) -> None:
 
 
 def operator_failed(edge: EventEdge, error: BaseException) -> None:
-    """An operator on the edge raised: the consumer's `on_error` decides (ARCHITECTURE §3)."""
+    """An operator on the edge raised: the consumer's `on_error` decides (P9, X1)."""
     target: Worker = edge.target
     problem = NodeError(target.path, f'an operator on edge "{edge.label}"{amid_element(target)}', error)
     problem.__cause__ = error

@@ -208,7 +208,7 @@ def _receive(worker: Worker, modifiers: Sequence[int]) -> None:
 
 
 def _place_next(worker: Worker) -> None:
-    """What the next firing asks for may hold already: then it has its place before the calls that come now (F9, D1).
+    """What the next firing asks for may hold already: then it has its place before the calls that come now (F9).
 
     Those are the calls that come of what was taken, too: of the activity that it brings to subgraphs around (A6, G2).
     """

@@ -467,7 +467,7 @@ def telling_behind(core: Core) -> Iterator[None]:
 
 
 def flush_automatic(worker: Worker) -> None:
-    """A9: the automatic events follow as sendings of their own, in the order they arose (D3)."""
+    """A9: the automatic events follow as sendings of their own, in the order they arose."""
     while worker.events_due:
         for name, value in worker.take_events():
             event = worker.events.get(name)

@@ -609,7 +609,7 @@ class Engine:
         self.kick()
 
     def adopt_event(self, port: EventPort[Any]) -> None:
-        """Give an event the run's scheduler and thread (ARCHITECTURE §3)."""
+        """Give an event the run's scheduler and thread (P9)."""
         port._scheduler = self.scheduler
         port._thread = self._thread
 

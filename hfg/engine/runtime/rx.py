@@ -1,6 +1,4 @@
-"""reactivex in a run: a scheduler on the run's clock, operators on edges, and observables that feed slots.
-
-(rule P9, ARCHITECTURE §3).
+"""reactivex in a run: a scheduler on the run's clock, operators on edges, and observables that feed slots (rule P9).
 
 `AsyncIOScheduler.now` is wall time, so in virtual time `delay` would never emit; and without a scheduler `debounce`
 runs on a thread. So the run brings its own. What operators on an edge want done now is done now, for a chain that is

@@ -1,6 +1,6 @@
 """Checks of what the parts of an edge through subgraphs make together, and of the borders of what iterates (P2-P7, G).
 
-Stands on `flat` and `edges`.
+Stands on `flat`.
 """
 
 from __future__ import annotations

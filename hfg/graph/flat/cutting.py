@@ -50,10 +50,6 @@ class CutEdge(msgspec.Struct, frozen=True, eq=False):
     within_host: bool = True
     number: int = 0
 
-    def far_from(self, part: str) -> str:
-        """Give the part at the other end, seen from one of the two."""
-        return self.source if self.target == part else self.target
-
 
 class Cutting(msgspec.Struct, frozen=True, eq=False):
     """A graph in parts.

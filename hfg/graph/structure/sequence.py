@@ -63,10 +63,6 @@ class Sequence(Generic[T]):
         else:
             labels[item] = label
 
-    def insert_behind(self, other: T | None, item: T) -> None:
-        """Put it directly behind another; behind None is in front of all."""
-        self.insert(0 if other is None else self.position(other) + 1, item)
-
     def remove(self, item: T) -> int:
         """Take it out; gives the place that it had."""
         position = self.position(item)

@@ -1,6 +1,6 @@
 """Subgraphs: nodes that hold a graph; their ports are relays between outside and inside (rules G1-G4).
 
-Stands on `nodetype`; knows graphs and levels by name alone.
+Stands on `node`; knows graphs and levels by name alone.
 """
 
 from __future__ import annotations

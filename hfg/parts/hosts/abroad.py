@@ -2,7 +2,7 @@
 
 Parts without a host begin here, as processes that meet in the same realm. When a connection is away nothing follows
 for a while; the links wait. When the agent is gone so are its parts; they begin anew as soon as it is there again, and
-until then everybody waits for them as for a part that is slow. Stands on `realm` and `launching`.
+until then everybody waits for them as for a part that is slow. Stands on `realm` and `other`.
 """
 
 from __future__ import annotations
