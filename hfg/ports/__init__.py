@@ -1,14 +1,14 @@
 """The ends of edges: declarations for class bodies, and the bound ports of one node.
 
-inputs  outputs  events  slots  parameters  states     one file for each kind: declaration and bound port
-specs  kinds  conditions                                what is known of a parameter: files and editors read it
-automatic                                               the ports of rule A9
-vectors                                                 several of one kind, as many as a node is made with
+inputs  outputs  events  slots  parameters  states     one file per kind: declaration and bound port
+specs  kinds  conditions                                the description of a parameter, which files and editors read
+automatic                                               the ports that every node has (rule A9)
+vectors                                                 several ports of one kind; the node is made with their number
 relays                                                  the inner sides of a subgraph's ports
 observable                                              events as reactivex observables
 base                                                    Port, and the directions Source and Target
 
-barrier, edges                                          what a run keeps of them: state machines, for the engine only
+barrier, edges                                          their state during a run: state machines, for the engine only
 """
 
 from hfg.ports.base import Port, Relaying, Source, Target

@@ -1,7 +1,7 @@
 """The ports that every node has without declaring them (rule A9).
 
-Their names, and their declarations on `Node`; the event `sent` that stands beside each output has the output's name in
-its own, "out.sent". Stands on events and slots.
+This module has their names and their declarations on `Node`. The event `sent` of an output is named after the output:
+"out.sent". Depends on events and slots.
 """
 
 from __future__ import annotations
@@ -32,33 +32,33 @@ AUTOMATIC_EVENTS: Final[dict[str, Any]] = {
     "timeout": None,
     "completed": Any,
 }
-"""Name and type of the events that the runner triggers; `completed` only where there is a do-activity (A15)."""
+"""Name and type of the events that the runner triggers; `completed` exists only with a do-activity (A15)."""
 
 AUTOMATIC_SLOTS: Final = ("enable", "disable", "activate", "deactivate", "reset")
-"""Slots that the runner itself answers, whatever their signals carry."""
+"""Slots that the runner itself handles, whatever their signals carry."""
 
 SUBGRAPH_EVENTS: Final = ("activated", "deactivated", "timeout")
 """A subgraph does not fire itself, so it has only these (rule G2)."""
 
 SUBGRAPH_SLOTS: Final = ("enable", "disable", "deactivate", "reset")
-"""There is no telling which inner node `activate` would mean (rule G2)."""
+"""`activate` is missing because it would not say which inner node it means (rule G2)."""
 
 
 _SENT: Final = ".sent"  # no declared name has a dot
 
 
 def sent_name(output: str) -> str:
-    """Name the event that tells what left by an output."""
+    """Return the name of the event that repeats the tokens of an output."""
     return output + _SENT
 
 
 def sent_of(event: str) -> str | None:
-    """Give the output beside which an event stands, or None if it is no `sent`."""
+    """Return the output that a `sent` event belongs to, or None if the event is not a `sent` event."""
     return event.removesuffix(_SENT) if event.endswith(_SENT) else None
 
 
 def is_automatic_event(name: str) -> bool:
-    """Whether the runner triggers it, not the node's code."""
+    """Return whether the runner triggers the event, rather than the node's code."""
     return name in AUTOMATIC_EVENTS or name.endswith(_SENT)
 
 

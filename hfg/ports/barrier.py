@@ -1,10 +1,11 @@
-"""What a node waits for: its inputs until every live one holds a token.
+"""Barriers: counters that are complete when a node may fire or continue (rules F1, F5).
 
-Its outputs until every consumer has processed (rules F1, F5).
+The input barrier of a node waits until every live input holds a token; its output barrier waits until every consumer
+has processed.
 
-A barrier is a counter with people waiting at it. The engine says what is expected and what arrives, and nothing else
-happens as long as nobody waits; whoever wants to wait asks the run (`run.wait_inputs(node)`, `run.wait_outputs(node)`),
-which brings the futures. Stands on `errors`; never waits itself.
+The engine sets the expected count and reports arrivals. Nothing else happens as long as there are no waiters. To wait,
+use the run (`run.wait_inputs(node)`, `run.wait_outputs(node)`), which provides the futures. Depends on `errors`; never
+waits itself.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ __all__ = ["Barrier"]
 
 
 class Barrier:
-    """Complete while nothing is missing.
+    """A counter of missing tokens; complete at 0.
 
     Attributes:
       missing: input barrier: live inputs that hold no token. Output barrier: tokens sent that are not yet processed.
-      waiters: called once, in order, when it completes; None while nobody waits.
+      waiters: called once, in order, when the barrier completes; None without waiters.
     """
 
     __slots__ = ("missing", "waiters")
@@ -32,24 +33,27 @@ class Barrier:
 
     @property
     def complete(self) -> bool:
-        """Whether there is nothing to wait for."""
+        """Whether nothing is missing."""
         return self.missing == 0
 
     def expect(self) -> None:
-        """One more is missing from now on."""
+        """Count one more missing token."""
         self.missing += 1
 
     def arrive(self) -> bool:
-        """One less is missing; whether it is complete by that. Who waits is told by `notify`, when the caller can."""
+        """Count one arrival. Return whether the barrier is now complete.
+
+        Waiters are not called from here; call `notify` when it is safe to do so.
+        """
         self.missing -= 1
         return not self.missing
 
     def count(self, missing: int) -> None:
-        """What it waits for is another set now, of which so many are missing."""
+        """Replace the set that the barrier waits for by another, of which `missing` are missing."""
         self.missing = missing
 
     def when_complete(self, callback: Callable[[], None]) -> None:
-        """Call `callback` once: now if complete, else at completion."""
+        """Call `callback` once: now if the barrier is complete, otherwise at completion."""
         if self.missing == 0:
             callback()
         elif self.waiters is None:
@@ -58,16 +62,18 @@ class Barrier:
             self.waiters.append(callback)
 
     def notify(self) -> None:
-        """Tell those who wait, if anybody does; for the caller of `arrive`, as soon as it is in order."""
+        """Call and forget the waiters. The caller of `arrive` calls this as soon as it is safe."""
         waiters, self.waiters = self.waiters, None
         for callback in waiters or ():
             callback()
 
     def check_invariants(self, missing: int, of_whom: str) -> None:
-        """Compare with what the caller has counted on the edges.
+        """Compare the count with the one that the caller has taken on the edges.
 
         Raises:
           EngineInternalError: they differ.
         """
         if self.missing != missing:
-            raise EngineInternalError(f"{of_whom}: its barrier says that {self.missing} are missing, not {missing}")
+            raise EngineInternalError(
+                f"{of_whom}: its barrier counts {self.missing} missing tokens, but there are {missing}"
+            )

@@ -1,9 +1,9 @@
-"""What every port has in common: whose it is, its name, type, direction and path, and how it is connected.
+"""The common part of all ports: owner, name, type, direction, path and connections.
 
-A port is *declared* in a class body (`Input`, `Output`, `Event`, `slot`, `Parameter`); the *bound* port of one node is
-another class (`InputPort`, ...), made when it is first asked for. `Source[T]` and `Target[T]` are what type checkers
-see of a direction: an edge goes from a `Source[T]` to a `Target[T]`. Stands on errors; knows nodes and graphs only by
-what they must offer.
+A port is *declared* in a class body (`Input`, `Output`, `Event`, `slot`, `Parameter`). The *bound* port of one node
+belongs to another class (`InputPort`, ...) and is made when it is first used. Type checkers see the direction of a port
+as `Source[T]` or `Target[T]`: an edge goes from a `Source[T]` to a `Target[T]`. Depends on errors, and on nodes and
+graphs only through protocols.
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ Kind = Literal["input", "output", "event", "slot", "parameter"]
 
 
 class Owner(Protocol):
-    """What a port needs of the node (or graph) it belongs to."""
+    """The part of a node (or graph) that its ports need."""
 
     @property
     def _place(self) -> Any:
-        """Where the node is: has `graph`, `name` and `path`; None before it is added."""
+        """The place of the node, with `graph`, `name` and `path`; None before the node is added."""
 
 
 class Relaying:
-    """Base of subgraphs: their ports are relays (rule G1), which `.inner` sees from inside the box."""
+    """Base of subgraphs. Their ports are relays (rule G1), which `.inner` shows from inside the subgraph."""
 
     __slots__ = ()
 
 
 class Source(Generic[T_co]):
-    """Where an edge may begin: an output, an event, a parameter, or the inner side of a subgraph's input or slot."""
+    """Start of an edge: an output, an event, a parameter, or the inner side of a subgraph's input or slot."""
 
     __slots__ = ()
 
     def activates(self, target: Target[T_co]) -> Any:
-        """Connect with an active edge, the double line of the paper.
+        """Connect with an active edge, the double line of the paper. Return `target`.
 
-        The same as `graph.connect(self, target, active=True)`.
+        Same as `graph.connect(self, target, active=True)`.
         """
         return _graph_of(self, target).connect(self, target, active=True)
 
     def __rshift__(self, other: Other) -> Other:
-        """Connect to a target, or to the only free one of a node.
+        """Connect to a target, or to the only free target of a node.
 
-        Gives back `other`, so that chains read from left to right.
+        Returns `other`, so that chains read from left to right.
         """
         if isinstance(other, str):
             raise UsageError(
@@ -65,7 +65,7 @@ class Source(Generic[T_co]):
 
 
 class Target(Generic[T_contra]):
-    """Where an edge may end: an input, a slot, a parameter, or the inner side of a subgraph's output or event."""
+    """End of an edge: an input, a slot, a parameter, or the inner side of a subgraph's output or event."""
 
     __slots__ = ()
 
@@ -84,49 +84,55 @@ class Port:
 
     @property
     def path(self) -> str:
-        """Its address, "subgraph/node.port"; before the node is added, its type's name stands for the node."""
+        """Its address, "subgraph/node.port".
+
+        Before the node is added, the name of its type takes the place of its own.
+        """
         return path_of(self.node, self.name)
 
     @property
     def graph(self) -> Any:
-        """The graph in which its edges are drawn."""
+        """The graph that holds its edges."""
         place = self.node._place
         return None if place is None else place.graph
 
     def __repr__(self) -> str:
         return f"<{self.kind} {self.path}>"
 
-    if not TYPE_CHECKING:  # type checkers say of themselves what there is not
+    if not TYPE_CHECKING:  # type checkers report missing attributes themselves
 
         @property
         def value(self) -> Any:
-            """Refused: what passes is not kept."""
+            """Not available: ports do not keep values."""
             raise AttributeError(self._without("value"))
 
         @property
         def connect(self) -> Any:
-            """Refused: graphs connect."""
+            """Not available: use `graph.connect`."""
             raise AttributeError(self._without("connect"))
 
     def _without(self, name: str) -> str:
-        """Say that there is nothing of this name, and what to do."""
+        """Return the message for a missing attribute, with a remedy."""
         if name == "value":
-            what, remedy = "a port holds no value", "look at what passes with run.tap(port), or connect it to a node"
+            what, remedy = (
+                "a port does not hold a value",
+                "watch its tokens with run.tap(port), or connect it to a node",
+            )
         elif name == "connect":
-            what, remedy = "it is an end of edges", "write graph.connect(source, target)"
+            what, remedy = "it is only an end of edges", "write graph.connect(source, target)"
         else:
-            what, remedy = "it is an end of edges", "ask for its name, type, node or path"
+            what, remedy = "it is only an end of edges", "its attributes are name, type, node and path"
         return f'{self.kind} "{self.path}" has no "{name}": {what}; {remedy}'
 
     def _not_running(self, call: str) -> NotRunning:
         return NotRunning(
-            f'"{self.path}" cannot {call} outside a run: run the graph with hfg.run(graph), or try the node alone '
-            "with hfg.testing.fire"
+            f'"{self.path}" cannot {call} outside a run: run the graph with hfg.run(graph), or test the node '
+            "by itself with hfg.testing.fire"
         )
 
 
 def path_of(node: Any, name: str) -> str:
-    """Give the path of a port called `name` of `node`; the ports of a root graph stand without a dot."""
+    """Return the path of a port called `name` of `node`. Paths of a root graph's own ports have no dot."""
     place = node._place
     if place is not None:
         return f"{place.path}.{name}" if place.path else name
@@ -146,6 +152,6 @@ def _graph_of(source: object, target: object) -> Any:
             return graph
     first, second = cast(Any, source), cast(Any, target)
     raise UsageError(
-        f'"{first.path}" and "{second.path}" belong to no graph yet: add their nodes with graph.add(...) before '
-        "connecting them"
+        f'"{first.path}" and "{second.path}" do not belong to a graph yet: add their nodes with '
+        "graph.add(...) before connecting them"
     )

@@ -1,6 +1,6 @@
-"""When a parameter is shown: by the values of other parameters of its node, said so that files can hold it.
+"""Conditions for showing a parameter: values of other parameters of the same node, in a form that files can hold.
 
-Stands on limits and values.
+Depends on limits and values.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from hfg.errors import DeclarationError
 __all__ = ["Condition", "ShownIf", "conditions_of"]
 
 ShownIf: TypeAlias = str | Mapping[str, Any]
-"""The name of a parameter that must be on; or for each what it must be: a value, one of a list or set, or a limit."""
+"""The name of a parameter that must be on; or a mapping from names to a value, a list or set of values, or a limit."""
 
 
 class Condition(msgspec.Struct, frozen=True):
-    """One parameter has one of some values, and keeps some limits.
+    """A condition on one parameter: it has one of some values and keeps some limits.
 
     Attributes:
       parameter: its name.
-      values: what it may be; without any, what the limits say.
-      limits: those of annotated-types but `Predicate`, which is code.
-      on: it is neither False, 0, empty nor None.
+      values: the values that it may have; if empty, only the limits count.
+      limits: annotated-types limits other than `Predicate`, which is code.
+      on: the parameter must be on: neither False, 0, empty nor None.
     """
 
     parameter: str
@@ -37,7 +37,7 @@ class Condition(msgspec.Struct, frozen=True):
     on: bool = False
 
     def holds(self, value: Any) -> bool:
-        """Say whether it does, where the parameter has this value."""
+        """Return whether the condition holds if the parameter has this value."""
         if self.on:
             return bool(value.any()) if hasattr(value, "any") else bool(value)
         if self.values and not any(_equal(value, one) for one in self.values):
@@ -45,7 +45,7 @@ class Condition(msgspec.Struct, frozen=True):
         return all(breaks(limit, value) is None for limit in self.limits)
 
     def in_words(self) -> str:
-        """Say it for people: `mode is "custom"`."""
+        """Return the condition in words: `mode is "custom"`."""
         if self.on:
             return f"{self.parameter} is on"
         said = [f"is {' or '.join(map(repr, self.values))}"] if self.values else []
@@ -53,13 +53,13 @@ class Condition(msgspec.Struct, frozen=True):
 
 
 def _equal(value: Any, wanted: Any) -> bool:
-    """Whether a value is what is wanted; 1 and 1.0 are one number here."""
+    """Return whether two values are equal; 1 and 1.0 are the same number here."""
     numbers = isinstance(value, int | float) and isinstance(wanted, int | float)
     return bool(value == wanted) if numbers else same(value, wanted)
 
 
 def _in_words(limit: Any) -> str:
-    """Say a limit in words, as its refusal does: "> 3"."""
+    """Return a limit in words, as its error message shows it: "> 3"."""
     match limit:
         case at.Gt(bound):
             return f"> {bound!r}"
@@ -79,10 +79,10 @@ def _in_words(limit: Any) -> str:
 
 
 def conditions_of(said: ShownIf | None, where: str) -> tuple[Condition, ...]:
-    """Read what a declaration says.
+    """Return the conditions of a declaration.
 
     Raises:
-      DeclarationError: it is none, or nothing that a file could hold.
+      DeclarationError: it is not a condition, or a file could not hold it.
     """
     if said is None:
         return ()
@@ -101,8 +101,8 @@ def _condition(name: str, wanted: Any, where: str) -> Condition:
     is_code = any(isinstance(limit, at.Predicate | Inside) for limit in limits)
     if is_code or (callable(wanted) and not limits):
         raise DeclarationError(
-            f'{where}: shown_if asks of "{name}" what only code can tell, {wanted!r:.80}, and files hold no code; '
-            "give the values, as a list, or a limit such as annotated_types.Gt(3)"
+            f'{where}: shown_if has a condition on "{name}" that only code can decide, {wanted!r:.80}, and '
+            "files hold no code; use the values, as a list, or a limit such as annotated_types.Gt(3)"
         )
     if limits:
         return Condition(name, limits=limits)

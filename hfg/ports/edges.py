@@ -1,8 +1,8 @@
-"""The edges of a running graph: what lies on them and who may put more (rules P4, P5, P7).
+"""The edges of a running graph: the tokens on them, and when another may be added (rules P4, P5, P7).
 
-Three state machines: a synchronous edge with one place, one with room for more (a buffer, a delay), and an event edge
-with a queue. They hold tokens and count; the engine moves them. `source` and `target` are the engine's workers, opaque
-here. Stands on `token`; never waits.
+Three state machines: a synchronous edge with one place, a synchronous edge with room for more (a buffer, a delay), and
+an event edge with a queue. They hold tokens and count them; the engine moves the tokens. `source` and `target` are the
+engine's workers, opaque here. Depends on `token`; never waits.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["ACTIVITY", "NUMBER", "VALUE", "AnyEdge", "BufferEdge", "Edge", "Even
 Overflow = Literal["wait", "drop_oldest", "drop_newest", "latest", "error"]
 
 Lying: TypeAlias = tuple[Any, int, float, int]
-"""What a queue holds for each token: value, activity, stamp and number; the token is made when somebody takes it."""
+"""Entry of a queue for each token: value, activity, stamp and number; the token is made when a consumer takes it."""
 
 VALUE: Final = 0
 ACTIVITY: Final = 1
@@ -27,30 +27,31 @@ NUMBER: Final = 3
 
 
 class Edge:
-    """What all edges of a run have.
+    """State and counts that all edges of a run have.
 
     Attributes:
-      index: grows along the order of drawing; an edit puts numbers in between.
-      label: "source -> target", as traces and reports name it.
+      index: position in the order of drawing; edges that an edit adds get numbers in between.
+      label: "source -> target", as traces and reports show it.
       active: whether it carries activity, A(e) (rule A1).
-      target_kind: what it leads into: "input", "slot", or "parameter".
+      target_kind: the kind of its target: "input", "slot", or "parameter".
       position: which input of the target's node type; inputs first, then parameters.
       mandatory: whether it feeds a mandatory input (F4's m).
       sent, dropped, drained: counts for the report; `sent` is also the number of the newest token.
-      lost: tokens of it that are gone with a process (L2).
+      lost: number of its tokens that were lost with a process (L2).
       live: whether both ends are enabled (SEMANTICS, "live edge").
-      sequential: what lies on it is processed when the consumer's outputs are, not when it is taken (F5).
-      follows: what it enables goes before all else of the group (R2): sequential, within one group, first in first out.
-      while_active: the slot it leads into listens only while its node is active (T4).
-      ended: the consumer has taken END from it and waits for it no more (F4).
-      handler: of the slot it leads into, taking the value, where that is all there is to a call; None:
-        the interpreted way.
-      waits: at whose output barrier an unprocessed token of it counts: the source, or the head of the region of the
-        source; of no meaning for event edges.
-      tap: sees every token that is put on it; None: nobody looks.
+      sequential: its tokens are processed when the consumer's outputs are, not when they are taken (F5).
+      follows: work that it enables runs before all other work of the group (R2): the edge is sequential, within one
+        group, and the group works first in, first out.
+      while_active: the slot at its end accepts signals only while its node is active (T4).
+      ended: the consumer has taken END from it and no longer waits for it (F4).
+      handler: the handler of the slot at its end, which takes the value, if a call needs nothing else; None: the
+        interpreter makes the call.
+      waits: the worker whose output barrier counts an unprocessed token of this edge: the source, or the head of the
+        source's region. Without meaning for event edges.
+      tap: called with every token that is put on the edge; None without observers.
       via: the scopes (subgraphs) whose relays it passes; all must be enabled.
-      segments: the drawn edges that it consists of, from source to target; none if it comes from outside the graph.
-      source_port, target_port: the bound ports at its ends; for an observable itself.
+      segments: the drawn edges that it consists of, from source to target; empty if it comes from outside the graph.
+      source_port, target_port: the bound ports at its ends; an observable is its own port.
     """
 
     __slots__ = (
@@ -109,103 +110,106 @@ class Edge:
         self.tap: Callable[[Token[Any]], None] | None = None
 
     def join(self, source: Any, target: Any) -> None:
-        """It leads from here to there."""
+        """Set both ends."""
         self.source = self.waits = source
         self.target = target
 
     def enter(self, kind: str, name: str, position: int, mandatory: bool) -> None:
-        """It leads into this input or parameter of its target."""
+        """Make an input or parameter of the target the edge's end."""
         self.target_kind = kind
         self.port_name = name
         self.position = position
         self.mandatory = mandatory
 
     def enter_slot(self, name: str, handler: Callable[[Any], Any] | None, while_active: bool) -> None:
-        """It leads into this slot of its target."""
+        """Make a slot of the target the edge's end."""
         self.target_kind = "slot"
         self.port_name = name
         self.handler = handler
         self.while_active = while_active
 
     def stand_for(self, segments: tuple[Any, ...], source_port: Any, target_port: Any, via: tuple[Any, ...]) -> None:
-        """This is what it is in the drawn graph."""
+        """Set what the edge represents in the drawn graph."""
         self.segments = segments
         self.source_port = source_port
         self.target_port = target_port
         self.via = via
 
     def be_released(self, *, sequential: bool, follows: bool) -> None:
-        """So the consumer's mode has it, and where both of them run (F5, R2)."""
+        """Set when its tokens are processed: it depends on the consumer's mode and the groups of both ends (F5, R2)."""
         self.sequential = sequential
         self.follows = follows
 
     def go_on(self, sent: int, *, ended: bool) -> None:
-        """It takes the place of one over which so many tokens went, END last of all or not."""
+        """Take the place of an edge that has transported `sent` tokens; `ended` if the last of them was END."""
         self.sent = sent
         self.ended = ended
 
     def rename(self, label: str) -> None:
-        """Traces and reports call it so from now on."""
+        """Set the name that traces and reports use from now on."""
         self.label = label
 
     def renumber(self, index: float) -> None:
-        """It comes here in the order of all."""
+        """Set its position in the order of all edges."""
         self.index = index
 
     def carry(self, active: bool) -> None:
-        """Whether it carries activity from now on (A1)."""
+        """Set whether it carries activity from now on (A1)."""
         self.active = active
 
     def number(self) -> int:
-        """One more token is put on it: this is its number (T5)."""
+        """Count one more token on the edge. Return its number (T5)."""
         self.sent += 1
         return self.sent
 
     def count_dropped(self, count: int = 1) -> None:
-        """So many tokens of it went nowhere."""
+        """Count `count` tokens of this edge as dropped."""
         self.dropped += count
 
     def count_drained(self) -> None:
-        """A token of it was processed without a firing (F12)."""
+        """Count a token that was processed without a firing (F12)."""
         self.drained += 1
 
     def end(self, ended: bool) -> None:
-        """Whether END is what the consumer has taken from it last (F4)."""
+        """Set whether the token that the consumer took last is END (F4)."""
         self.ended = ended
 
     def begin_afresh(self) -> None:
-        """The consumer begins afresh; who has said END to an optional input has said it (F4)."""
+        """Reset for a consumer that starts over. An END that an optional input already received stays valid (F4)."""
         self.ended = self.ended and not self.mandatory
 
     def joins(self) -> bool:
-        """Whether a firing takes from it (F3, P8); else slot calls do, or what sets a parameter between firings."""
+        """Return whether firings take from this edge (F3, P8).
+
+        From other edges, tokens are taken by slot calls, or by whatever sets a parameter between firings.
+        """
         return self.target_kind != "slot"
 
     def enliven(self, live: bool) -> None:
-        """Whether both its ends are enabled."""
+        """Set whether both its ends are enabled."""
         self.live = live
 
     def check_invariants(self) -> None:
-        """Between two steps of the run certain things hold of every edge.
+        """Check what must hold for every edge between two steps of the run.
 
         Raises:
-          EngineInternalError: one of them does not.
+          EngineInternalError: an invariant is violated.
         """
         for holds, relation in self._relations():
             if not holds:
                 raise EngineInternalError(f'edge "{self.label}": {relation}')
 
     def _relations(self) -> Iterator[tuple[bool, str]]:
-        """What holds of it between two steps."""
+        """Yield its invariants, each with its text."""
         raise NotImplementedError
 
 
 class SyncEdge(Edge):
-    """From an output, one place (P4).
+    """A synchronous edge with one place, from an output (P4).
 
     Attributes:
       token: the untaken token, or None.
-      held: from the sending until it counts as processed (F5): the producer's place is occupied.
+      held: the producer's place is occupied: from sending until the token counts as processed (F5).
     """
 
     __slots__ = ("held", "token")
@@ -217,10 +221,10 @@ class SyncEdge(Edge):
         self.sequential = True
 
     def put(self, token: Token[Any]) -> bool:
-        """Lay the one token on it that there is a place for: the producer has to wait (P4).
+        """Put the one token on the edge that it has a place for. Return True: the producer has to wait (P4).
 
         Raises:
-          EngineInternalError: the place is taken.
+          EngineInternalError: the place is occupied.
         """
         if self.token is not None or self.held:
             raise EngineInternalError(f'a second token on synchronous edge "{self.label}"')
@@ -229,49 +233,49 @@ class SyncEdge(Edge):
         return True
 
     def take(self) -> Token[Any]:
-        """Take the token from it; its place stays occupied until `release` (F5)."""
+        """Take the token. Its place stays occupied until `release` (F5)."""
         token, self.token = self.token, None
         assert token is not None
         return token
 
     def release(self) -> bool:
-        """The token is processed; whether its producer has waited for that."""
+        """Mark the token as processed. Return whether its producer was waiting for it."""
         held, self.held = self.held, False
         return held
 
     def strip(self, changed: Callable[[Token[Any]], Token[Any]]) -> None:
-        """Give what lies on it another modifier."""
+        """Replace the modifier of the token on the edge."""
         if self.token is not None:
             self.token = changed(self.token)
 
     @property
     def untaken(self) -> int:
-        """1 if a token lies on it, else 0."""
+        """1 if a token is on the edge, otherwise 0."""
         return 0 if self.token is None else 1
 
     @property
     def deepest(self) -> int:
-        """1 if a token ever lay on it, else 0."""
+        """1 if a token was ever on the edge, otherwise 0."""
         return 1 if self.sent > self.drained else 0
 
     def clear(self) -> list[Token[Any]]:
-        """Take away what lies on it."""
+        """Remove and return the token on the edge."""
         token, self.token = self.token, None
         return [] if token is None else [token]
 
     def contents(self) -> list[Token[Any]]:
-        """What lies on it, without taking it."""
+        """Return the token on the edge without taking it."""
         return [] if self.token is None else [self.token]
 
     def _relations(self) -> Iterator[tuple[bool, str]]:
-        yield self.token is None or self.held, "a token lies on it that counts as processed (F5)"
+        yield self.token is None or self.held, "a token on it counts as processed (F5)"
 
 
 class _QueueEdge(Edge):
-    """What both edges with a queue share: initial tokens first, then what was sent.
+    """Common part of both edges with a queue: initial tokens come first, then those that were sent.
 
     Attributes:
-      deepest: the most tokens that ever lay on it.
+      deepest: the largest number of tokens that were ever on it.
     """
 
     __slots__ = ("deepest", "initial", "queue")
@@ -283,14 +287,14 @@ class _QueueEdge(Edge):
         self.deepest = len(initial)
 
     def lay(self, lying: Lying) -> None:
-        """Put a token behind all others."""
+        """Put a token at the end of the queue."""
         queue = self.queue
         queue.append(lying)
         if len(queue) > self.deepest:
             self.deepest = len(queue)
 
     def begin(self, stamp: float) -> None:
-        """The run, or the edge, begins: its initial tokens lie on it (P7)."""
+        """Put the initial tokens on the edge, at the start of the run or of the edge (P7)."""
         self.queue.extend((value, 0, stamp, 0) for value in self.initial)
 
     def take(self) -> Token[Any]:
@@ -298,37 +302,37 @@ class _QueueEdge(Edge):
         return Token(*self.queue.popleft())
 
     def strip(self, changed: Callable[[Token[Any]], Token[Any]]) -> None:
-        """Give what lies on it other modifiers."""
+        """Replace the modifiers of the tokens on the edge."""
         tokens = [changed(token) for token in self.clear()]
         self.queue.extend((token.value, token.activity, token.stamp, token.sequence) for token in tokens)
 
     @property
     def untaken(self) -> int:
-        """How many tokens lie on it."""
+        """Number of tokens on the edge."""
         return len(self.queue)
 
     def clear(self) -> list[Token[Any]]:
-        """Take away what lies on it, oldest first."""
+        """Remove and return the tokens on the edge, oldest first."""
         tokens = self.contents()
         self.queue.clear()
         return tokens
 
     def contents(self) -> list[Token[Any]]:
-        """What lies on it, oldest first, without taking it."""
+        """Return the tokens on the edge, oldest first, without taking them."""
         return [Token(*lying) for lying in self.queue]
 
 
 class BufferEdge(_QueueEdge):
-    """From an output into an input, with room for more than one token: a buffer (P4), initial tokens (P7), or both.
+    """An edge from an output to an input with room for several tokens: a buffer (P4), initial tokens (P7), or both.
 
-    It is a row of relays with pipelined release, the last of them the one edge that the consumer takes from; what lies
-    on all of them lies here in one queue.
+    In the model it is a chain of relays with pipelined release, and the consumer takes from the edge of the last one.
+    Here the tokens on all of these edges are in one queue.
 
     Attributes:
       queue: untaken tokens.
-      room: how many may lie here while the producer goes on: the places of the buffer and the initial tokens.
-      working: of a sequential one: the consumer has taken a token that is not processed yet.
-      held: the producer's newest token counts as unprocessed, for there is no room for it.
+      room: how many tokens may be here while the producer continues: the places of the buffer plus the initial tokens.
+      working: only for a sequential edge: the consumer has taken a token that is not processed yet.
+      held: the producer's newest token counts as unprocessed because there is no room for it.
     """
 
     __slots__ = ("held", "room", "working")
@@ -340,10 +344,10 @@ class BufferEdge(_QueueEdge):
         self.held = False
 
     def put(self, token: Token[Any]) -> bool:
-        """Put a token behind all others; whether the producer has to wait (P4, P7).
+        """Put a token at the end of the queue. Return whether the producer has to wait (P4, P7).
 
         Raises:
-          EngineInternalError: the producer waits already.
+          EngineInternalError: the producer is already waiting.
         """
         if self.held:
             raise EngineInternalError(f'one token too many on synchronous edge "{self.label}"')
@@ -352,12 +356,12 @@ class BufferEdge(_QueueEdge):
         return self.held
 
     def take(self) -> Token[Any]:
-        """Take the oldest token; a sequential one keeps its place until `release` (F5)."""
+        """Take the oldest token. On a sequential edge, its place stays occupied until `release` (F5)."""
         self.working = self.sequential
         return super().take()
 
     def release(self) -> bool:
-        """What was taken is processed; whether its producer has waited for that and goes on."""
+        """Mark the taken token as processed. Return whether its producer was waiting for it and continues now."""
         self.working = False
         if not self.held or self.crowded:
             return False
@@ -365,40 +369,43 @@ class BufferEdge(_QueueEdge):
         return True
 
     def go_on_working(self, working: bool) -> None:
-        """The consumer finishes what it has taken, though its edge is empty now (F10)."""
+        """Set whether the consumer still processes a token that it took, although its edge is empty now (F10)."""
         self.working = working
 
     @property
     def capacity(self) -> int:
-        """How many tokens it holds at most."""
+        """The largest number of tokens that it holds."""
         return self.room + 1
 
     @property
     def crowded(self) -> bool:
-        """Whether it holds more than there is room for, so that its producer waits."""
+        """Whether it holds more tokens than it has room for, so that its producer waits."""
         return len(self.queue) + self.working > self.room
 
     def _relations(self) -> Iterator[tuple[bool, str]]:
         yield len(self.queue) + self.working <= self.capacity, f"it holds more than {self.capacity} tokens (P4, P7)"
-        yield self.held == self.crowded or not self.live, "its producer waits though there is room, or not though none"
-        yield self.sequential or not self.working, "what is pipelined is processed when it is taken (F5)"
+        yield (
+            self.held == self.crowded or not self.live,
+            "its producer waits although there is room, or does not wait although there is none",
+        )
+        yield self.sequential or not self.working, "tokens of a pipelined edge are processed when they are taken (F5)"
 
 
 class EventEdge(_QueueEdge):
-    """From an event: a first-in first-out queue with a capacity and an overflow policy (P5).
+    """An edge from an event: a first-in first-out queue with a capacity and an overflow policy (P5).
 
     Attributes:
       queue: untaken tokens.
-      capacity: places; grows only by rule F8.
-      capacity_limit: the most it may grow to, or None.
-      overflow: what happens to a token too many.
-      full: a `wait` edge that holds `capacity` or more: its source starts nothing new (F8).
-      grown: how often F8 made it longer.
-      ripening: how much its operators hold back until its time has come (P9).
+      capacity: number of places; grows only by rule F8.
+      capacity_limit: the largest capacity that it may grow to, or None.
+      overflow: what to do with a token when the queue is full.
+      full: a `wait` edge that holds `capacity` tokens or more: its source starts nothing new (F8).
+      grown: how often F8 has enlarged it.
+      ripening: how many tokens its operators hold back until they are due (P9).
       pipeline: feeds a token to the operators on the edge (P9), or None.
-      complete: tells the operators that no more comes; None: there are none, or they know.
-      renew: connects the operators afresh, for a node that starts afresh; or None.
-      end_sent: END has been put on it (F13, once an edge); what comes later is dropped.
+      complete: tells the operators that the stream is over; None: there are no operators, or they already know.
+      renew: reconnects the operators for a node that starts over; or None.
+      end_sent: END was put on it (F13, once per edge); later tokens are dropped.
     """
 
     __slots__ = (
@@ -437,52 +444,52 @@ class EventEdge(_QueueEdge):
         self.renew: Callable[[], None] | None = None
 
     def pipe(self, feed: Callable[[Token[Any]], None], complete: Callable[[], None] | None) -> None:
-        """P9: tokens go through operators before they lie on it, or to what stands for those at first."""
+        """P9: send tokens through operators (at first, placeholders for them) before they are put on the edge."""
         self.pipeline = feed
         self.complete = complete
 
     def pipe_afresh_by(self, renew: Callable[[], None]) -> None:
-        """P9: so its operators are connected again, for a node that starts afresh."""
+        """P9: set the function that reconnects its operators for a node that starts over."""
         self.renew = renew
 
     def joins(self) -> bool:
-        """See `Edge`: of the signals only those into inputs take part in a firing (F6, P8)."""
+        """See `Edge`: among signals, only those into inputs take part in a firing (F6, P8)."""
         return self.target_kind == "input"
 
     def fill(self) -> bool:
-        """F8: whether it has just become full, so that its source starts nothing new."""
+        """F8: return whether the edge has just become full, so that its source starts nothing new."""
         if self.overflow == "wait" and not self.full and len(self.queue) >= self.capacity and self.live:
             self.full = True
             return True
         return False
 
     def free(self) -> bool:
-        """F8: whether it was full and is not any more."""
+        """F8: return whether the edge was full and no longer is."""
         if self.full and len(self.queue) < self.capacity:
             self.full = False
             return True
         return False
 
     def grow(self) -> None:
-        """F8: one more place."""
+        """F8: add one place."""
         self.capacity += 1
         self.grown += 1
 
     def ripen(self, how_much: int) -> None:
-        """P9: its operators hold back so much more until its time has come."""
+        """P9: count `how_much` more tokens that its operators hold back until they are due."""
         self.ripening += how_much
 
     def say_end(self) -> None:
-        """F13: END is put on it, once; what comes later is dropped."""
+        """F13: record that END is on the edge, which happens once; later tokens are dropped."""
         self.end_sent = True
 
     def take_complete(self) -> Callable[[], None] | None:
-        """What tells the operators that no more comes, to be called once (P9)."""
+        """Return, once, the function that tells the operators that the stream is over (P9)."""
         complete, self.complete = self.complete, None
         return complete
 
     def overflows(self) -> bool:
-        """Whether one more token is one too many for a policy that drops or refuses (P5)."""
+        """Return whether the queue is full and its policy drops or refuses the next token (P5)."""
         return self.overflow != "wait" and len(self.queue) >= self.capacity and not self.end_sent
 
     def _relations(self) -> Iterator[tuple[bool, str]]:
@@ -494,4 +501,4 @@ class EventEdge(_QueueEdge):
 
 
 AnyEdge: TypeAlias = SyncEdge | BufferEdge | EventEdge
-"""An edge that something lies on."""
+"""An edge that can hold tokens."""

@@ -1,7 +1,7 @@
-"""Events: asynchronous sending, triggered at any moment of a firing or call (rules F3, F8).
+"""Events: asynchronous sending, at any moment of a firing or call (rules F3, F8).
 
-Each is a reactivex Observable of its tokens. A plain edge does not pass through reactivex: the runner puts signals into
-queues itself and tells subscribers only when there are any. Stands on `base` and `observable`.
+Each event is a reactivex Observable of its tokens. A plain edge does not pass through reactivex: the runner puts
+signals into queues itself and calls subscribers only if there are any. Depends on `base` and `observable`.
 """
 
 from __future__ import annotations
@@ -31,31 +31,31 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
 
     kind: ClassVar[Kind] = "event"
 
-    # Subscribers in order of subscription; None if nobody ever looked, which is all that a fast path asks.
+    # Subscribers in order of subscription. None if nothing has ever subscribed; a fast path checks only that.
     _observers: list[abc.ObserverBase[Token[T]]] | None = None
-    _look: Callable[[], None] | None = None  # tells the fast path that somebody observes now
+    _look: Callable[[], None] | None = None  # tells the fast path that the event has an observer now
     _inner: InnerTarget[T] | None = None
 
     def __init__(self, node: Owner, name: str, type: Any = None) -> None:  # noqa: A002
         Port.__init__(self, node, name, type)
-        # Whoever runs the node puts its own functions here.
+        # The runner of the node puts its own functions here.
         self._emit: Callable[[Any, int | None, float | None], None] = self._refuse
         self._emit_wait: Callable[[Any, int | None, float | None], Awaitable[None]] = self._refuse_wait
 
     def trigger(
         self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None
     ) -> None:
-        """Send a signal at once to everything connected; never waits (rule F8).
+        """Send a signal to everything connected, at once and without waiting (rule F8).
 
         Args:
-          value: an event may be triggered without a value (rule T2); a received token passed on keeps its modifier and
-            its stamp.
+          value: an event may be triggered without a value (rule T2); a received token that is passed on keeps its
+            modifier and its stamp.
           activity: an explicit modifier (-1, 0, +1) for active edges (rule A4): 0 holds the activity back, +1 takes
-            that of an active sender; without one, rule A3 decides.
-          stamp: in seconds; without one, rule T5 decides.
+            that of an active sender; by default, rule A3 decides.
+          stamp: in seconds; by default, rule T5 decides.
 
         Raises:
-          NotRunning: nobody runs the node.
+          NotRunning: the node is not part of a run.
           QueueOverflow: an edge with policy "error" is full; nothing was sent (rule P5).
         """
         self._emit(value, activity, stamp)
@@ -63,15 +63,15 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
     async def trigger_wait(
         self, value: T | Token[T] | None = None, *, activity: int | None = None, stamp: float | None = None
     ) -> None:
-        """Send a signal and wait until every queue behind the events of its node has room again.
+        """Send a signal, then wait until every queue fed by this node's events has room again.
 
-        For async code that triggers without end (rule F8).
+        Use it in async code that triggers in an endless loop (rule F8).
         """
         await self._emit_wait(value, activity, stamp)
 
     @property
     def inner(self) -> InnerTarget[T]:
-        """Its side that looks into a subgraph."""
+        """Its side inside a subgraph."""
         if self._inner is None:
             self._inner = inner_target(self)
         return self._inner
@@ -87,7 +87,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
     ) -> abc.DisposableBase:
         self._observe([*(self._observers or ()), observer])
         if self._thread is None and self.graph is not None and self.graph._run is not None:
-            self.graph._run._adopt(self)  # an automatic event that nobody was interested in until now
+            self.graph._run._adopt(self)  # an automatic event that had no subscribers until now
         return Disposable(lambda: self._drop(observer))
 
     def _observe(self, observers: list[abc.ObserverBase[Token[T]]]) -> None:
@@ -99,7 +99,7 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
         self._observers = [one for one in self._observers or () if one is not observer]
 
     def _notify(self, token: Token[T]) -> None:
-        """Hand a signal to every subscriber; for the runner."""
+        """Call every subscriber with a signal; for the runner."""
         for observer in self._observers or ():
             try:
                 observer.on_next(token)
@@ -108,19 +108,19 @@ class EventPort(Port, Source[T], RunObservable[Token[T]]):
                 self._drop(observer)
 
     def _complete(self) -> None:
-        """Tell every subscriber that no signal will follow; for the runner."""
+        """Complete the stream of every subscriber; for the runner."""
         observers, self._observers = self._observers, None
         for observer in observers or ():
             try:
                 observer.on_completed()
             except Exception:
                 _LOGGER.exception(
-                    'a subscriber of "%s" failed as the event completed', self.path, extra={"path": self.path}
+                    'a subscriber of "%s" failed when the event completed', self.path, extra={"path": self.path}
                 )
 
 
 class Event(Generic[T]):
-    """Declare an event in a class body; without a type its signals carry no value."""
+    """Declare an event in a class body. Without a type, its signals carry no value."""
 
     kind: ClassVar[Kind] = "event"
 

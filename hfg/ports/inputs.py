@@ -1,4 +1,4 @@
-"""Inputs: synchronous reception, one token for each firing (rules P2, F1). Stands on `base`."""
+"""Inputs: synchronous reception, one token per firing (rules P2, F1). Depends on `base`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class InputPort(Port, Target[T]):
 
     @property
     def inner(self) -> InnerSource[T]:
-        """Its side that looks into a subgraph."""
+        """Its side inside a subgraph."""
         try:
             return self._inner
         except AttributeError:
@@ -37,10 +37,10 @@ class Input(Generic[T]):
     """Declare an input in a class body.
 
     Args:
-      type: what may arrive, any type hint.
+      type: type of the values, any type hint.
       optional: the node also fires when the input is not connected or holds nothing; `process` then gets `default`
         (rule P6).
-      default: what `process` gets when an optional input is absent.
+      default: passed to `process` when an optional input is absent.
     """
 
     kind: ClassVar[Kind] = "input"
@@ -52,7 +52,7 @@ class Input(Generic[T]):
                 f"default={default!r})"
             )
         self.type: Any = type
-        self.inferred = False  # read from a function, not written in a class body
+        self.inferred = False  # read from a function instead of a class body
         self.optional = optional
         self.default = default
         self.name = ""

@@ -1,6 +1,6 @@
-"""What kind a parameter is of, read from its type: what an editor shows for it.
+"""The kind of a parameter, derived from its type: it determines what an editor shows.
 
-Stands on types and values; knows no parameter.
+Depends on types and values, not on parameters.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _NUMBERS: Final = (int, float)
 
 
 def without_none(hint: Any) -> Any:
-    """Take None out of a union."""
+    """Return a union without None."""
     bare = bare_type(hint)
     if typing.get_origin(bare) in (typing.Union, types.UnionType):
         members = [one for one in typing.get_args(bare) if one is not type(None)]
@@ -62,7 +62,7 @@ def without_none(hint: Any) -> Any:
 
 
 def choices_of(hint: Any) -> dict[str, Any] | None:
-    """Give what a type itself allows, by label: of a Literal, an enum, or a set of such; None of other types."""
+    """Return the values that a type allows, by label, for a Literal, an enum, or a set of these; None for others."""
     hint = bare_type(without_none(hint))
     if typing.get_origin(hint) in _SETS and typing.get_args(hint):
         hint = bare_type(typing.get_args(hint)[0])
@@ -74,7 +74,7 @@ def choices_of(hint: Any) -> dict[str, Any] | None:
 
 
 def type_of_choices(hint: Any) -> Any:
-    """Give the type of what a parameter of this type chooses from: of a set or list, that of its members."""
+    """Return the type of one choice of a parameter of this type: for a set or list, the type of its members."""
     bare = bare_type(without_none(hint))
     members = typing.get_args(bare) if typing.get_origin(bare) in (*_SETS, list) else ()
     return members[0] if members else hint
@@ -85,11 +85,11 @@ def _label(value: Any) -> str:
 
 
 def kind_of_type(hint: Any, has_choices: bool = False) -> ParameterKind:
-    """Say what kind values of a type are.
+    """Return the kind of values of a type.
 
     Args:
       hint: the type.
-      has_choices: the declaration lists what is allowed.
+      has_choices: the declaration lists the allowed values.
     """
     hint = without_none(hint)
     bare = bare_type(hint)
@@ -130,7 +130,10 @@ def _kind_of_class(bare: Any) -> ParameterKind:
 
 
 def shape_of(hint: Any) -> tuple[int | None, ...] | None:
-    """Give the shape that a type of arrays or numbers asks for, None for an axis of any length; None if it does not."""
+    """Return the shape that a type of arrays or numbers requires, with None for an axis of any length.
+
+    Returns None if the type does not require a shape.
+    """
     hint = without_none(hint)
     bare = bare_type(hint)
     if typing.get_origin(bare) is tuple:
@@ -142,7 +145,7 @@ def shape_of(hint: Any) -> tuple[int | None, ...] | None:
 
 
 def type_of_default(default: Any) -> Any:
-    """Give the type that a default speaks of: of a path every path, of an array its dtype and shape."""
+    """Return the type that a default implies: a path implies any path, an array its dtype and shape."""
     if default is None:
         return Any
     if isinstance(default, os.PathLike):

@@ -1,8 +1,8 @@
-"""Observables that belong to a run: what is derived from an event keeps the run's scheduler and its guards.
+"""Observables that belong to a run: those derived from an event keep the run's scheduler and its guards.
 
-Without a scheduler an operator such as `debounce` of reactivex waits on a thread of its own, and in virtual time for
-ever. So `pipe`, and every operator method, which all go through `pipe`, give an observable that passes the scheduler of
-the run on when somebody subscribes. Stands on reactivex; knows no port.
+Without a scheduler, a reactivex operator such as `debounce` waits on a thread of its own, and in virtual time forever.
+So `pipe`, and every operator method (all of them call `pipe`), return an observable that passes the run's scheduler on
+when it is subscribed to. Depends on reactivex, not on ports.
 """
 
 from __future__ import annotations
@@ -22,22 +22,21 @@ T_co = TypeVar("T_co", covariant=True)
 
 
 class RunObservable(Observable[T_co]):
-    """An observable whose subscribers get the scheduler of the run that its origin takes part in."""
+    """An observable whose subscribers get the scheduler of the run that its origin belongs to."""
 
-    # `super().__init__()` is left out on purpose: its lock costs 105 bytes for each event and is needed by few
-    # operators.
+    # `super().__init__()` is not called on purpose: its lock costs 105 bytes per event, and few operators need it.
 
     @functools.cached_property
     def lock(self) -> threading.RLock:  # type: ignore[override]
-        """Made when an operator asks for it."""
+        """The lock that operators use; made on first use."""
         return threading.RLock()
 
     @property
     def _origin(self) -> RunObservable[Any]:
         return self
 
-    # Both are set by the runner on the event; None outside a run. `_thread` is the identity of the thread on which the
-    # run decides.
+    # The runner sets both on the event; they are None outside a run. `_thread` is the identity of the thread that makes
+    # the run's decisions.
     _scheduler: abc.SchedulerBase | None = None
     _thread: int | None = None
     path: Any
@@ -50,23 +49,24 @@ class RunObservable(Observable[T_co]):
         *,
         scheduler: abc.SchedulerBase | None = None,
     ) -> abc.DisposableBase:
-        """Subscribe an observer or callbacks; each gets the tokens of the event from now on.
+        """Subscribe an observer or callbacks; each gets the event's tokens from now on.
 
-        A subscriber that raises is logged with the event's path and dropped; it never disturbs the node.
+        If a subscriber raises, its error is logged with the event's path and the subscriber is dropped. The node is not
+        affected.
 
         Raises:
-          UsageError: called from another thread than the run's.
+          UsageError: called from a thread that is not the run's.
         """
         origin = self._origin
         if origin._thread is not None and origin._thread != threading.get_ident():
             raise UsageError(
-                f'"{origin.path}" was subscribed to from another thread than its run\'s: '
-                f"subscribe before the run, or hand the call over with loop.call_soon_threadsafe"
+                f'"{origin.path}" was subscribed to from a thread that is not its run\'s: subscribe before '
+                "the run, or schedule the call with loop.call_soon_threadsafe"
             )
         return super().subscribe(on_next, on_error, on_completed, scheduler=scheduler or origin._scheduler)
 
     def pipe(self, *operators: Any) -> Any:
-        """Chain reactivex operators; what comes out belongs to the same run."""
+        """Chain reactivex operators. Return an observable that belongs to the same run."""
         return _keep(super().pipe(*operators), self._origin) if operators else self
 
     def __await__(self) -> Generator[Any, None, NoReturn]:
@@ -77,10 +77,10 @@ class RunObservable(Observable[T_co]):
 
 
 def _keep(result: Any, origin: RunObservable[Any]) -> Any:
-    """Bind what an operator gave to the run of `origin`; connectable observables keep their own class."""
+    """Bind the result of an operator to the run of `origin`. Connectable observables keep their own class."""
     if type(result) is Observable:
         return _Derived(result, origin)
-    if isinstance(result, list | tuple) and any(type(item) is Observable for item in result):  # partition
+    if isinstance(result, list | tuple) and any(type(item) is Observable for item in result):  # for partition
         return type(result)(_keep(item, origin) for item in result)
     return result
 

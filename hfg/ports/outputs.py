@@ -1,6 +1,6 @@
-"""Outputs: synchronous sending, exactly one token on every edge for each firing (rule F3).
+"""Outputs: synchronous sending, exactly one token on every edge per firing (rule F3).
 
-Beside each stands an event, `sent`, where asynchronous and lossy edges begin (rule A9). Stands on `base`, `events`
+Each output has an event, `sent`, from which asynchronous and lossy edges start (rule A9). Depends on `base`, `events`
 and `automatic`.
 """
 
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 
 Loaner: TypeAlias = "Callable[[tuple[int, ...], np.dtype[Any]], np.ndarray[Any, Any] | None]"
-"""Gives an array that lies where it can be sent without being copied, or None if it has none."""
+"""Returns an array in memory that can be sent without a copy, or None if there is none."""
 
 
 class OutputPort(Port, Source[T]):
@@ -38,53 +38,54 @@ class OutputPort(Port, Source[T]):
 
     def __init__(self, node: Owner, name: str, type: Any) -> None:  # noqa: A002
         super().__init__(node, name, type)
-        # Whoever runs the node puts its own function here: (value, activity, stamp) -> None.
+        # The runner of the node puts its own function here: (value, activity, stamp) -> None.
         self._emit: Callable[[Any, int | None, float | None], None] = self._refuse
         self._loaner: Loaner | None = None
 
     def send(self, value: T | Token[T] | None, *, activity: int | None = None, stamp: float | None = None) -> None:
-        """Write what leaves when the firing is over, with all outputs together (rule F3).
+        """Write the value to send. It leaves together with all other outputs when the firing is over (rule F3).
 
         Args:
-          value: None is silence (rule T2); a received token passed on keeps its modifier and its stamp.
+          value: None is silence (rule T2); a received token that is passed on keeps its modifier and its stamp.
           activity: an explicit modifier (-1, 0, +1) for active edges (rule A4): 0 holds the activity back, +1 takes
-            that of an active sender; without one, rule A3 decides.
-          stamp: in seconds; without one, rule T5 decides.
+            that of an active sender; by default, rule A3 decides.
+          stamp: in seconds; by default, rule T5 decides.
 
         Raises:
-          NotRunning: nobody runs the node.
-          UsageError: the output was already written in this firing, or this is no firing.
+          NotRunning: the node is not part of a run.
+          UsageError: the output was already written in this firing, or no firing is in progress.
         """
         self._emit(value, activity, stamp)
 
     def loan(self, shape: int | tuple[int, ...], dtype: npt.DTypeLike = np.float64) -> np.ndarray[Any, Any]:
-        """Give an array to fill and to send here; what is in it at first is nobody's.
+        """Return an array to fill and to send here; its initial contents are undefined.
 
-        Where the output leads to another process of this host and the array is large, it lies in the memory that both
-        share, and so is not copied; else it is an ordinary one, as from `numpy.empty`. Once it was sent it cannot be
-        written to any more.
+        If the output leads to another process of this host and the array is large, the array is in memory that both
+        processes share, and is not copied. Otherwise it is an ordinary array, as from `numpy.empty`. Once sent, it is
+        read-only.
         """
         size, kind = (shape,) if isinstance(shape, int) else tuple(shape), np.dtype(dtype)
         loaned = None if self._loaner is None else self._loaner(size, kind)
         return np.empty(size, kind) if loaned is None else loaned
 
     def _loan_from(self, loaner: Loaner) -> None:
-        """Be given what `loan` asks; where an output leads to several processes, the first edge's."""
+        """Set the source of `loan`'s arrays. If an output leads to several processes, the first edge's is used."""
         if self._loaner is None:
             self._loaner = loaner
 
     @property
     def sent(self) -> EventPort[T]:
-        """The event that tells what a firing has sent here: not when it was silent, and never END (rule A9).
+        """The event that repeats each value that firings send here, but neither silence nor END (rule A9).
 
-        For consumers at a pace of their own: nobody waits for them, and the edge says what becomes of what they miss.
+        Use it for consumers that work at their own pace: the node does not wait for them, and the edge sets what
+        happens to tokens they miss.
         """
         event: EventPort[T] = self.node._port("event", sent_name(self.name))
         return event
 
     @property
     def inner(self) -> InnerTarget[T]:
-        """Its side that looks into a subgraph."""
+        """Its side inside a subgraph."""
         try:
             return self._inner
         except AttributeError:
@@ -96,13 +97,13 @@ class OutputPort(Port, Source[T]):
 
 
 class Output(Generic[T]):
-    """Declare an output in a class body; `type` is what it sends, any type hint."""
+    """Declare an output in a class body; `type` is the type of its values, any type hint."""
 
     kind: ClassVar[Kind] = "output"
 
     def __init__(self, type: TypeForm[T]) -> None:  # noqa: A002
         self.type: Any = type
-        self.inferred = False  # read from a function, not written in a class body
+        self.inferred = False  # read from a function instead of a class body
         self.name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:

@@ -1,6 +1,6 @@
-"""Parameters: values set when a node is made and by tokens (rule P8), within limits.
+"""Parameters: values with limits, set when a node is made and by tokens (rule P8).
 
-Stands on `base`, `specs`, `kinds` and `conditions`, and on limits and types.
+Depends on `base`, `specs`, `kinds` and `conditions`, and on limits and types.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ class ParameterPort(Port, Source[T], Target[T]):
     def __init__(self, node: Owner, name: str, spec: ParameterSpec) -> None:
         super().__init__(node, name, spec.type)
         self.spec = spec
-        self._tell: Callable[[Any], None] | None = None  # what a run does when the node sets what is read-only
+        self._tell: Callable[[Any], None] | None = None  # how a run reports that the node has set a read-only parameter
 
     @property
     def value(self) -> T:
-        """What the node works with now, a list as a copy; setting it checks the limits.
+        """The current value, a list as a copy. Setting it checks the limits.
 
         Raises:
-          ValueError: on setting, a limit is broken, or only the node sets it; the value stays.
+          ValueError: on setting: the value violates a limit, or only the node may set it. The old value stays.
         """
         value: T = own_copy(self.node._parameters[self.name])
         return value
@@ -56,27 +56,27 @@ class ParameterPort(Port, Source[T], Target[T]):
 class Parameter(Generic[T]):
     """Declare a parameter in a class body; `self.tolerance` is then its value (on a subgraph, its port).
 
-    In the annotation of a keyword-only argument, `Annotated[float, Ge(0), hfg.Parameter(unit="m")]`, it says the same
-    of a function's parameter; the default stands behind the `=`.
+    For a parameter of a function, use it in the annotation of a keyword-only argument: `Annotated[float, Ge(0),
+    hfg.Parameter(unit="m")]`. The default is then written after the `=`.
 
     Args:
-      default: its value unless the node is made with another; without one it must be given.
-      limits: annotated-types constraints: `Interval(ge=0, le=1)`, `Len(1, 9)`, `Predicate(str.isidentifier)` ...; those
+      default: its value unless the node is made with another. Without a default, a value must be given.
+      limits: annotated-types constraints: `Interval(ge=0, le=1)`, `Len(1, 9)`, `Predicate(str.isidentifier)` ... Limits
         on numbers hold for every element of a list, pair, vector or matrix.
-      unit: for people.
-      choices: the only allowed values, or a mapping from what to call them to the values; where the type is a set or a
-        list, what it may hold. A `Literal` or an enum says that by itself.
-      step: by how much an editor moves the value; no limit (`MultipleOf` is one).
-      group: what editors show it with: "filter", or "filter/details".
-      help: what it means; without it, what the docstring of the node type says of it.
+      unit: shown to users.
+      choices: the only allowed values, or a mapping from labels to the values; if the type is a set or a list, its
+        allowed members. A `Literal` or an enum implies its choices.
+      step: how much an editor changes the value per step; not a limit (`MultipleOf` is one).
+      group: editors show the parameter in this group: "filter", or "filter/details".
+      help: its meaning; by default, the docstring of the node type provides it.
       shown_if: editors show it only if another parameter of the node is on, `shown_if="masked"`, or has a value, one of
         a list, or keeps a limit: `shown_if={"mode": ["a", "b"], "count": Gt(3)}`.
-      read_only: the node's own code sets it, `self.done = 0.5`, and users see it; an output and no input. A number with
-        both limits is shown as progress. Every run begins with the default.
-      pattern: which names of files fit: "*.png *.jpg".
-      directory: the path is that of a directory.
-      save: the path is one to write to, not to read.
-      type: any type hint; without it the default's type.
+      read_only: only the node's own code sets it, `self.done = 0.5`, and users see it; it has an output and no input. A
+        number with both limits is shown as progress. Every run starts with the default.
+      pattern: the file names that it accepts: "*.png *.jpg".
+      directory: the path must be a directory.
+      save: the path is written to, not read from.
+      type: any type hint; by default, the type of the default.
       trigger: no value, but a slot and an event of this name: a call of the slot triggers the event.
     """
 
@@ -175,17 +175,18 @@ class Parameter(Generic[T]):
         unknown = [limit for limit in (default, *limits)[1:] if not limits_of([limit])]
         if unknown:
             raise DeclarationError(
-                f"{unknown[0]!r} is no limit for a parameter: use those of annotated_types, such as Interval(ge=0, "
-                "le=1)"
+                f"{unknown[0]!r} is not a limit for a parameter: use those of annotated_types, such as "
+                "Interval(ge=0, le=1)"
             )
         if not isinstance(default, Required) and limits_of([default]) and not isinstance(default, slice):
             raise DeclarationError(
-                f"{default!r} is a limit, where the default of a parameter should be; write hfg.Parameter(0.5, "
-                f"{default!r}), or beside hfg.Parameter in Annotated[float, {default!r}, hfg.Parameter(...)]"
+                f"{default!r} is a limit, but the first argument of a parameter is its default; write "
+                f"hfg.Parameter(0.5, {default!r}), or put it next to hfg.Parameter in Annotated[float, "
+                f"{default!r}, hfg.Parameter(...)]"
             )
         if trigger and default is REQUIRED:
             default = None
-        self.inferred: ParameterSpec | None = None  # of one read from a function, not written in a class body
+        self.inferred: ParameterSpec | None = None  # of a parameter that was read from a function
         self.default = default
         self.limits = limits
         self.unit = unit
@@ -220,13 +221,13 @@ class Parameter(Generic[T]):
         default: Any = REQUIRED,
         type: Any = None,  # noqa: A002
     ) -> ParameterSpec:
-        """Give the declaration as plain data.
+        """Return the declaration as plain data.
 
         Args:
-          where: names the node type in messages.
-          name: that of the parameter, where the declaration has none.
-          default: for one that stands in an annotation, what stands behind the `=`.
-          type: the same, the annotated type.
+          where: the node type, for error messages.
+          name: the parameter's name, if the declaration has none.
+          default: for a declaration in an annotation, the default after the `=`.
+          type: for a declaration in an annotation, the annotated type.
 
         Raises:
           DeclarationError: it contradicts itself.
@@ -291,7 +292,7 @@ class Parameter(Generic[T]):
 
 
 def spec_of(name: str, default: Any, hint: Any, where: str) -> ParameterSpec:
-    """Describe the parameter that a keyword-only argument is.
+    """Return the description of the parameter that a keyword-only argument declares.
 
     Raises:
       DeclarationError: its annotation contradicts itself.
@@ -301,9 +302,9 @@ def spec_of(name: str, default: Any, hint: Any, where: str) -> ParameterSpec:
     said = [item for item in metadata if isinstance(item, Parameter)]
     wrong = None
     if len(said) > 1:
-        wrong = "has two of hfg.Parameter in its annotation; say all in one"
+        wrong = "has two hfg.Parameter in its annotation; combine them in one"
     elif said and (said[0].default is not REQUIRED or said[0].type is not None):
-        wrong = "says its default or type in hfg.Parameter; write Annotated[float, hfg.Parameter(...)] = 0.5"
+        wrong = "has its default or type in hfg.Parameter; write Annotated[float, hfg.Parameter(...)] = 0.5"
     elif said and said[0].read_only:
         wrong = "is read-only, but a function cannot set it; make the node type a class"
     if wrong is not None:
@@ -314,18 +315,18 @@ def spec_of(name: str, default: Any, hint: Any, where: str) -> ParameterSpec:
 
 
 def _opened(hint: Any) -> Any:
-    """Let what `Annotated[float, Ge(0)] | None` says hold for the whole; None keeps every limit."""
+    """Make the limits of `Annotated[float, Ge(0)] | None` hold for the whole union; None satisfies every limit."""
     bare = without_none(hint)
     if bare is hint or typing.get_origin(bare) is not Annotated or not accepts(None, hint):
         return hint
     opened: Any = typing.Union[typing.get_args(bare)[0], None]  # noqa: UP007 - some hints know no |
-    for item in (*bare.__metadata__, *getattr(hint, "__metadata__", ())):  # inside of the union, and around it
+    for item in (*bare.__metadata__, *getattr(hint, "__metadata__", ())):  # inside and outside the union
         opened = Annotated[opened, item]
     return opened
 
 
 def _or_none(hint: Any) -> Any:
-    """Let None be a value, too; what is said of the type stays."""
+    """Allow None as a value; the annotations of the type stay."""
     if accepts(None, hint):
         return hint
     bare = typing.get_args(hint)[0] if typing.get_origin(hint) is Annotated else hint
@@ -336,7 +337,7 @@ def _or_none(hint: Any) -> Any:
 
 
 def _choices(said: Any, hint: Any, where: str) -> tuple[tuple[Any, ...] | None, tuple[str, ...]]:
-    """Give what may be chosen, and how it is called."""
+    """Return the allowed choices and their labels."""
     if said is None:
         known = None if hint is None else choices_of(hint)
         return (None, ()) if known is None else (tuple(known.values()), tuple(known))
@@ -351,32 +352,32 @@ def _choices(said: Any, hint: Any, where: str) -> tuple[tuple[Any, ...] | None, 
 
 
 def _refuse_contradictions(spec: ParameterSpec, step: Any, where: str) -> None:
-    """Refuse what a parameter of its kind cannot be.
+    """Refuse options that a parameter of its kind cannot have.
 
     Raises:
-      DeclarationError: with the remedy.
+      DeclarationError: an option contradicts the kind; the message has the remedy.
     """
     wrong = None
     if spec.trigger and (spec.read_only or spec.choices or spec.limits or step is not None):
-        wrong = "is a trigger and has no value, so nothing can be said of that; leave it out"
+        wrong = "is a trigger and has no value, so nothing else can be said about it; omit the other options"
     elif spec.read_only and spec.default is REQUIRED:
-        wrong = "is read-only and has no default to begin with; write hfg.Parameter(0.0, read_only=True)"
+        wrong = "is read-only and has no default to start with; write hfg.Parameter(0.0, read_only=True)"
     elif step is not None and (not isinstance(step, int | float) or isinstance(step, bool) or not step > 0):
-        wrong = f"has a step of {step!r}; a step is a number above 0"
+        wrong = f"has a step of {step!r}; a step must be a number above 0"
     elif step is not None and spec.kind not in ("int", "float", "interval", "vector", "matrix", "list", "progress"):
-        wrong = f"has a step, but is of the kind {spec.kind}; leave step= out"
+        wrong = f"has a step, but its kind is {spec.kind}; omit step="
     elif spec.says_path and spec.kind != "path":
-        wrong = f"is of the kind {spec.kind}, but pattern=, directory= and save= are for paths; give it type=Path"
+        wrong = f"has the kind {spec.kind}, but pattern=, directory= and save= are for paths; give it type=Path"
     elif spec.pattern is not None and (
         spec.directory or not isinstance(cast(object, spec.pattern), str) or not spec.pattern.split()
     ):
-        wrong = f'has the pattern {spec.pattern!r}; names of files have one, as in pattern="*.png *.jpg"'
+        wrong = f'has the pattern {spec.pattern!r}; a pattern matches file names, as in pattern="*.png *.jpg"'
     elif any(condition.parameter == spec.name for condition in spec.shown_if):
-        wrong = "is shown by its own value, so that it could hide for ever; name another parameter"
+        wrong = "depends on its own value to be shown, so it could be hidden forever; name another parameter"
     else:
         said: dict[str, Any] = {"unit": spec.unit, "group": spec.group, "help": spec.help}
         odd = next((word for word, one in said.items() if one is not None and not isinstance(one, str)), None)
         if odd is not None:
-            wrong = f'has {odd}={said[odd]!r}; write a text, as in {odd}="..."'
+            wrong = f'has {odd}={said[odd]!r}; write a string, as in {odd}="..."'
     if wrong is not None:
         raise DeclarationError(f"{where} {wrong}")

@@ -1,7 +1,7 @@
 """The inner sides of a subgraph's ports (rule G1).
 
-Seen from inside the box an input or slot is a source, and an output or event is a target. `subgraph.person.inner` is
-made when it is first asked for. Stands on `base`.
+Inside a subgraph, its inputs and slots are sources, and its outputs and events are targets. `subgraph.person.inner` is
+made when it is first used. Depends on `base`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ T_contra = TypeVar("T_contra", contravariant=True)
 
 
 class _Inner:
-    """One side of a relay; `outer` is the port as the world outside sees it."""
+    """One side of a relay; `outer` is the port as seen from outside."""
 
     __slots__ = ("outer",)
 
@@ -42,17 +42,17 @@ class _Inner:
 
     @property
     def kind(self) -> Kind:
-        """What the port is outside."""
+        """The port's kind, as seen from outside."""
         return self.outer.kind
 
     @property
     def path(self) -> str:
-        """The port's path with ".inner" behind it, for messages."""
+        """The port's path followed by ".inner", for messages."""
         return f"{self.outer.path}.inner"
 
     @property
     def graph(self) -> Any:
-        """The graph in the box."""
+        """The inner graph."""
         return getattr(self.outer.node, "graph", None)
 
     def __repr__(self) -> str:
@@ -60,40 +60,40 @@ class _Inner:
 
 
 class InnerSource(_Inner, Source[T_co]):
-    """A subgraph's input or slot, seen from inside."""
+    """A subgraph's input or slot as seen from inside."""
 
     __slots__ = ()
 
 
 class InnerTarget(_Inner, Target[T_contra]):
-    """A subgraph's output or event, seen from inside."""
+    """A subgraph's output or event as seen from inside."""
 
     __slots__ = ()
 
 
 def inner_source(port: Port) -> InnerSource[Any]:
-    """Make the inner side of an input or slot.
+    """Return the inner side of an input or slot.
 
     Raises:
-      UsageError: the port's node is no subgraph.
+      UsageError: the port's node is not a subgraph.
     """
     _need_box(port)
     return InnerSource(port)
 
 
 def inner_target(port: Port) -> InnerTarget[Any]:
-    """Make the inner side of an output or event.
+    """Return the inner side of an output or event.
 
     Raises:
-      UsageError: the port's node is no subgraph.
+      UsageError: the port's node is not a subgraph.
     """
     _need_box(port)
     return InnerTarget(port)
 
 
 def _need_box(port: Port) -> None:
-    # The owner may also be a root graph, whose boundary has two sides as well; only plain nodes have no inside.
+    # The owner may also be a root graph, whose boundary has two sides, too; only plain nodes have no inside.
     if hasattr(port.node, "_type") and not isinstance(port.node, Relaying):
         raise UsageError(
-            f'"{port.path}" has no inner side: only ports of an hfg.Subgraph look into a box; connect the port itself'
+            f'"{port.path}" has no inner side: only ports of an hfg.Subgraph have one; connect the port itself'
         )

@@ -1,4 +1,4 @@
-"""Slots: asynchronous reception, one call of a handler for each signal (rules F6, F9). Stands on `base`."""
+"""Slots: asynchronous reception, one handler call per signal (rules F6, F9). Depends on `base`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Self_ = TypeVar("Self_")
 
 
 class _Unset:
-    """Stands for "not given" where None means something."""
+    """Means "not given" where None has a meaning of its own."""
 
     def __repr__(self) -> str:
         return "UNSET"
@@ -31,7 +31,7 @@ UNSET: Any = _Unset()
 class SlotPort(Port, Target[T]):
     """The slot of one node.
 
-    Calling it runs the handler, without a run and without its rules, for tests and for `super()`.
+    Calling it runs the handler outside a run and without the run's rules, for tests and for `super()`.
     """
 
     __slots__ = ("_inner",)
@@ -40,7 +40,7 @@ class SlotPort(Port, Target[T]):
     _inner: InnerSource[T]
 
     def __call__(self, *value: Any) -> Any:
-        """Run the handler with what is given; an async handler's coroutine is handed back.
+        """Run the handler with the arguments. Return its result, which is a coroutine if the handler is async.
 
         Raises:
           UsageError: the slot has no handler of its own: an automatic one (rule A9), a trigger's or a subgraph's.
@@ -52,7 +52,7 @@ class SlotPort(Port, Target[T]):
 
     @property
     def inner(self) -> InnerSource[T]:
-        """Its side that looks into a subgraph."""
+        """Its side inside a subgraph."""
         try:
             return self._inner
         except AttributeError:
@@ -105,7 +105,7 @@ class Slot(Generic[T]):
 
 
 class _WhileActive(Protocol):
-    """What `@hfg.slot(while_active=True)` does to a method."""
+    """Effect of `@hfg.slot(while_active=True)` on a method."""
 
     @overload
     def __call__(self, handler: Callable[[Self_], Any], /) -> Slot[object]: ...
@@ -117,7 +117,7 @@ class _WhileActive(Protocol):
 
 @overload
 def slot(handler: Callable[[Self_], Any], /) -> Slot[object]: ...
-@overload  # a T that may be anything cannot be solved for, so it is said
+@overload  # a T that may be anything cannot be solved for, so it is spelled out
 def slot(handler: Callable[[Self_, Token[object]], Any], /) -> Slot[object]: ...
 @overload
 def slot(handler: Callable[[Self_, Token[T]], Any], /) -> Slot[T]: ...
@@ -136,14 +136,15 @@ def slot(
 ) -> Any:
     """Make a method the handler of a slot of the same name.
 
-    The annotation of its argument is the slot's type; annotated `hfg.Token[int]` it gets the token; without an argument
-    it takes any signal. `@hfg.slot(type=...)` says the type itself.
+    The annotation of the method's argument is the slot's type. An argument annotated `hfg.Token[int]` receives the
+    token; a method without an argument accepts any signal. `@hfg.slot(type=...)` sets the type explicitly.
 
     Args:
       handler: the method.
-      type: of the values.
-      while_active: it listens only while its node is active, or about to be: what comes else is processed at once,
-        and the handler is not called (rule T4). So a signal to many nodes costs what those cost that are active.
+      type: type of the values.
+      while_active: the slot accepts signals only while its node is active, or about to become active. Other signals are
+        processed at once, without calling the handler (rule T4). So a signal to many nodes costs only as much as its
+        active receivers.
     """
     if handler is not None and not callable(handler):
         raise DeclarationError(f"hfg.slot is for a method, got {handler!r:.80}; write @hfg.slot or hfg.slot(type=int)")

@@ -1,6 +1,6 @@
-"""What is known of a parameter, as data, and what it says to a value.
+"""The description of a parameter, as data, and its checks of values.
 
-Stands on `kinds`, `conditions`, and on limits, types and values; knows no port.
+Depends on `kinds`, `conditions`, limits, types and values, not on ports.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["REQUIRED", "ParameterSpec", "Required"]
 
 
 class Required:
-    """Stands in for the default of a parameter that has none."""
+    """Takes the place of the default of a parameter that has none."""
 
     def __repr__(self) -> str:
         return "REQUIRED"
@@ -36,23 +36,24 @@ REQUIRED: Final = Required()
 
 
 class ParameterSpec(msgspec.Struct, frozen=True):
-    """What is known of a parameter: files, the studio, the command line and the runner read it.
+    """The description of a parameter, read by files, the studio, the command line and the runner.
 
     Attributes:
-      limits: annotated-types constraints, opened: `Interval` as `Ge`, `Le` ...; those on numbers for each element.
-      unit: for people, "m/s".
-      choices: the only allowed values, or None; of the kind "choices", the only allowed members.
+      limits: annotated-types constraints, opened: `Interval` as `Ge`, `Le` ... Limits on numbers hold for each element.
+      unit: shown to users, "m/s".
+      choices: the only allowed values, or None; for the kind "choices", the only allowed members.
       trigger: no value, but a slot and an event of this name (§3.1 of the paper).
-      size: how many ports a vector of this name has: said when a node is made, and no port itself.
-      labels: what to call the choices, one each, or none.
-      step: by how much an editor moves the value; no limit.
-      group: what it is shown with, "filter" or "filter/details".
-      help: what it means, where the declaration says so; else the docstring may (`NodeType.help_of`).
-      shown_if: it is shown where all of these hold (`NodeType.is_shown`); hidden or not, it has its value.
-      read_only: set by the node's own code and shown to users: progress, a text; an output and no input (rule P8).
-      pattern: which names of files fit, "*.png *.jpg".
-      directory: the path is that of a directory.
-      save: the path is one to write to.
+      size: the number of ports of a vector of this name; set when a node is made, and not a port itself.
+      labels: the labels of the choices, one each, or empty.
+      step: how much an editor changes the value per step; not a limit.
+      group: the group in which it is shown, "filter" or "filter/details".
+      help: its meaning, if the declaration has one; otherwise the docstring may have it (`NodeType.help_of`).
+      shown_if: it is shown if all of these hold (`NodeType.is_shown`). It has its value even while hidden.
+      read_only: set by the node's own code and shown to users: progress, a text. It has an output and no input (rule
+        P8).
+      pattern: the file names that it accepts, "*.png *.jpg".
+      directory: the path must be a directory.
+      save: the path is written to.
     """
 
     name: str
@@ -85,17 +86,17 @@ class ParameterSpec(msgspec.Struct, frozen=True):
 
     @property
     def says_path(self) -> bool:
-        """Whether its declaration speaks of a path, whatever its type."""
+        """Whether its declaration has options for paths, whatever its type."""
         return self.pattern is not None or self.directory or self.save
 
     @property
     def minimum(self) -> Any:
-        """The smallest number, allowed or just not (`limits` tell); None for no end."""
+        """The smallest number; `limits` tell whether it is itself allowed. None without a minimum."""
         return numbers_within(self.limits)[0]
 
     @property
     def maximum(self) -> Any:
-        """The largest number, allowed or just not (`limits` tell); None for no end."""
+        """The largest number; `limits` tell whether it is itself allowed. None without a maximum."""
         return numbers_within(self.limits)[1]
 
     @property
@@ -105,26 +106,26 @@ class ParameterSpec(msgspec.Struct, frozen=True):
 
     @property
     def is_port(self) -> bool:
-        """Whether it has a value that can be seen while a node lives, and set unless it is read-only (rule P8)."""
+        """Whether its value can be read while a node exists and, unless it is read-only, set (rule P8)."""
         return not (self.trigger or self.size)
 
     @property
     def is_given(self) -> bool:
-        """Whether users give it a value, and files keep that."""
+        """Whether users set its value, so that files keep it."""
         return not (self.trigger or self.read_only)
 
     def label(self, value: Any) -> str:
-        """Give what to call a value among the choices."""
+        """Return the label of a choice."""
         for number, one in enumerate(self.choices or ()):
             if number < len(self.labels) and same(one, value):
                 return self.labels[number]
         return value if isinstance(value, str) else repr(value)
 
     def encode(self, value: Any) -> Any:
-        """Give a value as plain data, as files and commands hold it: a choice by what it is called, if it is.
+        """Return a value as plain data, as files and commands hold it. A choice that has a label becomes its label.
 
         Raises:
-          EncodingError: it is no data.
+          EncodingError: the value cannot be represented as data.
         """
         if self.labels and self.kind == "choice":
             label = self.label(value)
@@ -133,14 +134,14 @@ class ParameterSpec(msgspec.Struct, frozen=True):
         return encoding.encode(value, self.type)
 
     def decode(self, data: Any, find: encoding.Find | None = None) -> Any:
-        """Give the value that plain data stands for; limits are not looked at, `check` does that.
+        """Return the value that plain data represents. Limits are not checked; use `check`.
 
         Args:
-          data: as `encode` gave it, or a person wrote it.
-          find: as `hfg.encoding.decode` has it.
+          data: the result of `encode`, or data that a person wrote.
+          find: as for `hfg.encoding.decode`.
 
         Raises:
-          EncodingError: it stands for none of the parameter's type.
+          EncodingError: it does not represent a value of the parameter's type.
         """
         chosen = self._labelled(data)
         if chosen:
@@ -148,10 +149,10 @@ class ParameterSpec(msgspec.Struct, frozen=True):
         return encoding.decode(data, self.type, where=f'parameter "{self.name}"', find=find)
 
     def read_text(self, text: str, find: encoding.Find | None = None) -> Any:
-        """Give the value that somebody means who writes a text for it, as on the command line.
+        """Return the value that a string represents, as typed on the command line.
 
         Raises:
-          EncodingError: it is none of the parameter's type.
+          EncodingError: it does not represent a value of the parameter's type.
         """
         chosen = self._labelled(text)
         if chosen:
@@ -159,13 +160,13 @@ class ParameterSpec(msgspec.Struct, frozen=True):
         return encoding.read_text(text, self.type, where=f'parameter "{self.name}"', find=find)
 
     def _labelled(self, data: Any) -> tuple[Any, ...]:
-        """Give the choice that is called so; nothing for what is a choice itself, or none."""
+        """Return the choice with this label; nothing if the data is a choice itself, or there is no such label."""
         if type(data) is not str or self.kind != "choice" or any(same(data, one) for one in self.choices or ()):
             return ()
         return next(((one,) for label, one in zip(self.labels, self.choices or (), strict=False) if label == data), ())
 
     def check(self, value: Any) -> str | None:
-        """Say what is wrong with a value ("must be <= 1, got 3"), or None."""
+        """Return what is wrong with a value ("must be <= 1, got 3"), or None."""
         if not accepts(value, self.type):
             return f"must be {self._asked()}, got {_shown(value)}"
         if value is None:
@@ -202,7 +203,7 @@ class ParameterSpec(msgspec.Struct, frozen=True):
         return None
 
     def _allowed(self) -> str:
-        """The choices, with what they are called where that is more than themselves."""
+        """Return the choices, each with its label if it differs from the choice."""
         named = zip(self.choices or (), self.labels or self.choices or (), strict=True)
         return ", ".join(repr(one) if _speaks(one, label) else f"{one!r} ({label})" for one, label in named)
 
@@ -211,7 +212,7 @@ class ParameterSpec(msgspec.Struct, frozen=True):
         patterns = str(self.pattern).split()
         if any(fnmatch(name.lower(), one.lower()) for one in patterns):
             return None
-        return f"must be the name of a file like {' or '.join(patterns)}, got {str(value)!r}"
+        return f"must be a file name like {' or '.join(patterns)}, got {str(value)!r}"
 
 
 def _is_choice(value: Any, known: Any) -> bool:
@@ -220,12 +221,12 @@ def _is_choice(value: Any, known: Any) -> bool:
 
 
 def _speaks(value: Any, label: Any) -> bool:
-    """Whether a value needs no label, for it is called so, or has a name itself."""
+    """Return whether a value needs no label because it equals its label, or has a name itself."""
     return str(label) == str(value) or not isinstance(value, bool | int | float | str) or hasattr(value, "name")
 
 
 def _shown(value: Any) -> str:
-    """A value on one line, not longer than a message may be."""
+    """Return a value on one line, short enough for a message."""
     if issubclass(type(value), np.ndarray):
         return describe_value(value)
     told = " ".join(shown(value, 1000).split())

@@ -1,4 +1,4 @@
-"""State: attributes of a node that belong to one run, set afresh before `setup()`. Stands on errors."""
+"""State: attributes of a node that belong to one run and are reset before `setup()`. Depends on errors."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class State(Generic[T]):
     """Declare a field of a node's state; on the node it is a plain attribute.
 
     Args:
-      default: its value at the start of every run; a copy each time, so that a list is no trap.
-      factory: makes that value instead. Written with what it holds, `hfg.State(factory=list[int])`, the field needs no
-        annotation; a bare `list` does not tell a type checker that.
+      default: its value at the start of every run, copied each time, so that lists are safe.
+      factory: makes that value instead. With its item type, `hfg.State(factory=list[int])`, the field needs no
+        annotation; a plain `list` does not tell type checkers the item type.
 
     Example:
       >>> import hfg
@@ -46,7 +46,7 @@ class State(Generic[T]):
         self.name = ""
 
     def fresh(self) -> T:
-        """Make the value that a run begins with."""
+        """Return the value for the start of a run."""
         made: T = copy.deepcopy(self.default[0]) if self.factory is None else self.factory()
         return made
 
@@ -63,6 +63,6 @@ class State(Generic[T]):
         value = node.__dict__[self.name] = self.fresh()
         return value
 
-    if TYPE_CHECKING:  # at run time the field lies in the instance, where it is read and written without a call
+    if TYPE_CHECKING:  # at run time the field is in the instance dict, where reading and writing need no call
 
         def __set__(self, node: object, value: T) -> None: ...

@@ -1,7 +1,7 @@
-"""Vectors of ports: as many of one kind as a node is made with, for mergers, barriers and pools.
+"""Vectors of ports: any number of ports of one kind, for mergers, barriers and pools.
 
-Declared once, each is a port of its own when the node is made, "values[0]", "values[1]" ..., with its own edges and its
-own place in every rule. Stands on the ports of each kind.
+A vector is declared once. When a node is made, each of its ports is a port of its own, "values[0]", "values[1]" ...,
+with its own edges and its own place in every rule. Depends on the ports of each kind.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ P_co = TypeVar("P_co", covariant=True)
 
 
 def element(name: str, number: int) -> str:
-    """Give the name of one port of a vector."""
+    """Return the name of one port of a vector."""
     return f"{name}[{number}]"
 
 
 class VectorSpec(msgspec.Struct, frozen=True):
-    """What is known of a vector of ports.
+    """The description of a vector of ports.
 
     Attributes:
-      kind: of each of its ports.
-      type: of each of its ports.
-      size: how many there are; of a type, how many there are by default, or None: the node is made with it.
-      like: the vector that it always has the size of, or "".
+      kind: kind of each of its ports.
+      type: type of each of its ports.
+      size: the number of ports; for a type, the default number, or None: the node is made with it.
+      like: the vector whose size this one always has, or "".
     """
 
     name: str
@@ -84,16 +84,16 @@ class PortVector(Sequence[P_co], Generic[P_co]):
 
     @property
     def path(self) -> str:
-        """The address of the vector; that of a port has its number behind it."""
+        """The address of the vector; the address of one of its ports is followed by the port's number."""
         return path_of(self._node, self._spec.name)
 
 
 class VectorIndexError(UsageError, IndexError):
-    """A vector has no port of this number; an IndexError, because ports are asked for as in a list."""
+    """A vector has no port with this number. It is an IndexError because ports are indexed like a list."""
 
 
 class Vector(Generic[T]):
-    """What the declarations of vectors have in common; `size` is a number, another vector's name or None."""
+    """Common part of declarations of vectors; `size` is a number, another vector's name or None."""
 
     kind: ClassVar[Kind]
 
@@ -102,7 +102,7 @@ class Vector(Generic[T]):
         if size is not None and not isinstance(size, str) and not is_number:
             raise DeclarationError(
                 f"hfg.{self.__class__.__name__} needs its size, 1 or more, got {size!r}; write "
-                f"hfg.{self.__class__.__name__}(int, 3), or leave it out and make the node with it"
+                f"hfg.{self.__class__.__name__}(int, 3), or omit it and make the node with it"
             )
         self.type: Any = type
         self.size = size
@@ -114,7 +114,7 @@ class Vector(Generic[T]):
         self.name = self.name or name
 
     def spec(self) -> VectorSpec:
-        """Give the declaration as plain data."""
+        """Return the declaration as plain data."""
         like = self.size if isinstance(self.size, str) else ""
         size = self.size if isinstance(self.size, int) else None
         return VectorSpec(self.name, self.kind, self.type, size, like, self.optional, self.default)
@@ -130,11 +130,11 @@ class Inputs(Vector[T]):
     """Declare a vector of inputs; `process` gets a list with one value for each, or takes them as `*values`.
 
     Args:
-      type: what may arrive at each.
-      size: how many there are unless the node is made with another number, `Merge(values=5)`; without it the node must
-        be. The name of another vector stands for its size.
+      type: type of the values at each input.
+      size: how many there are unless the node is made with another number, `Merge(values=5)`; without a size, the
+        number must be given when the node is made. The name of another vector means its size.
       optional: the node also fires when some are not connected or hold nothing; the list then holds `default` there.
-      default: see `optional`.
+      default: value for absent inputs; see `optional`.
 
     Example:
       >>> import hfg
@@ -173,11 +173,11 @@ class Inputs(Vector[T]):
 
 
 class Outputs(Vector[T]):
-    """Declare a vector of outputs; write to one with `self.parts[0].send(value)`, or give back a list for all.
+    """Declare a vector of outputs; write to one with `self.parts[0].send(value)`, or return a list for all.
 
     Args:
-      type: what each sends.
-      size: as that of `Inputs`.
+      type: type of the values that each sends.
+      size: as for `Inputs`.
     """
 
     kind: ClassVar[Kind] = "output"
@@ -197,8 +197,8 @@ class Events(Vector[T]):
     """Declare a vector of events; trigger one with `self.done[0].trigger(value)`.
 
     Args:
-      type: what the signals of each carry; None is no value.
-      size: as that of `Inputs`.
+      type: type of the signals' values; None: signals without a value.
+      size: as for `Inputs`.
     """
 
     kind: ClassVar[Kind] = "event"
@@ -215,13 +215,13 @@ class Events(Vector[T]):
 
 
 class Slots(Vector[T]):
-    """Declare a vector of slots, whose handler is told the number of the slot, and then the value if it takes one.
+    """Declare a vector of slots. The handler gets the number of the slot, then the value if it takes one.
 
     In a subgraph it needs no handler: `asks = hfg.Slots(int, 3)` is a vector of relays.
 
     Args:
-      type: of the values that each takes.
-      size: as that of `Inputs`.
+      type: type of the values at each slot.
+      size: as for `Inputs`.
 
     Example:
       >>> import hfg

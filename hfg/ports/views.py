@@ -1,6 +1,6 @@
 """`node.ports`: the ports of one node as mappings from name to bound port, in order of declaration.
 
-Stands on `base`.
+Depends on `base`.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ P_co = TypeVar("P_co", covariant=True)
 
 
 class NoSuchPort(UsageError, KeyError):
-    """A node has no port of this name; a KeyError, because ports are asked for as in a mapping."""
+    """A node has no port of this name. It is a KeyError because ports are looked up like keys of a mapping."""
 
     def __str__(self) -> str:
-        return str(self.args[0])  # KeyError would quote the sentence
+        return str(self.args[0])  # KeyError would quote the message
 
 
 class PortView(Mapping[str, P_co], Generic[P_co]):
-    """The ports of one kind; ports are made when they are asked for.
+    """The ports of one kind; ports are made when they are first used.
 
-    Iterating gives the declared ones; `[]` finds the automatic ports of rule A9 too.
+    Iteration yields the declared ports; `[]` also finds the automatic ports of rule A9.
     """
 
     __slots__ = ("_kind", "_node", "_specs")
@@ -107,7 +107,7 @@ class Ports:
 
     @property
     def parameters(self) -> PortView[ParameterPort[Any]]:
-        """Parameters by name, but a trigger, which is a slot and an event instead, and the size of a vector."""
+        """Parameters by name, except triggers, which are a slot and an event instead, and the sizes of vectors."""
         specs = {name: spec for name, spec in self._node._type.parameters.items() if spec.is_port}
         return PortView(self._node, "parameter", specs)
 

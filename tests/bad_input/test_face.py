@@ -159,7 +159,9 @@ def test_a_port_holds_no_value() -> None:
         node.value.connect(3)
     with pytest.raises(AttributeError) as refused:
         _ = node.value.shape
-    assert 'input "forward.value" has no "shape": it is an end of edges; ask for its name' in in_words(refused.value)
+    assert 'input "forward.value" has no "shape": it is only an end of edges; ask for its name' in in_words(
+        refused.value
+    )
 
 
 def test_a_path_behind_an_arrow_is_connected() -> None:

@@ -436,15 +436,18 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "read no colour": (lambda: hfg.Colour.of("red"), '\'red\' is no colour; write "#rrggbb", as in "#ff8000"'),
     "give another kind of file": (
         lambda: Draws(store=Path("a.gif")),
-        "must be the name of a file like *.png, got 'a.gi",
+        "must be a file name like *.png, got 'a.gi",
     ),
     "give another shape": (
         lambda: Draws(offset=np.zeros(2)),
         "must be of type Array[float64] and shape 3, got an array",
     ),
     "choose what is not there": (lambda: Draws(method=1), "must be one of 8 (Otsu), 0 (Plain), got 1"),
-    "declare a step of nothing": (lambda: _declares(step=0), "has a step of 0; a step is a number above 0"),
-    "declare by a limit": (lambda: hfg.Parameter(Ge(0)), "is a limit, where the default of a parameter should be; wri"),
+    "declare a step of nothing": (lambda: _declares(step=0), "has a step of 0; a step must be a number above 0"),
+    "declare by a limit": (
+        lambda: hfg.Parameter(Ge(0)),
+        "is a limit, but the first argument of a parameter is its default; wri",
+    ),
     "declare a pattern of a number": (
         lambda: _declares(pattern="*.png"),
         "but pattern=, directory= and save= are for p",
@@ -459,11 +462,11 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "declare shown by code": (
         lambda: _declares(shown_if={"other": bool}),
-        "what only code can tell, <class 'bool'>, an",
+        "that only code can decide, <class 'bool'>, an",
     ),
     "declare shown by itself": (
         lambda: _declares(shown_if="a"),
-        "is shown by its own value, so that it could hide for",
+        "depends on its own value to be shown, so it could be hidden forever;",
     ),
     "store a lambda": (
         lambda: encode(lambda: 1),

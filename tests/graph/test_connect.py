@@ -230,7 +230,7 @@ def test_same_edge_twice_is_refused(graph: Graph, camera: Camera, robot: Robot) 
 def test_nodes_of_no_graph_are_refused(graph: Graph, camera: Camera, robot: Robot) -> None:
     refused(graph, '"robot.look" belongs to no graph', "graph.add", source=camera.seen, target=Robot().look)
     refused(graph, '"camera.seen" belongs to no graph', source=Camera().seen, target=robot.look)
-    with pytest.raises(errors.UsageError, match="belong to no graph yet"):
+    with pytest.raises(errors.UsageError, match="do not belong to a graph yet"):
         Camera().seen.activates(Robot().look)
 
 

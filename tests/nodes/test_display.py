@@ -156,7 +156,7 @@ def test_the_newest_image_is_in_the_file_and_the_last_one_at_the_end() -> None:
 
 
 def test_a_display_that_cannot_write_its_format_says_so() -> None:
-    with pytest.raises(ValueError, match=r'parameter "image_display.path" must be the name of a file like \*.png'):
+    with pytest.raises(ValueError, match=r'parameter "image_display.path" must be a file name like \*.png'):
         display.ImageDisplay(path="see")
     with pytest.raises(ValueError, match="end the path"):
         fire(display.ImageDisplay(path="see.png"), image=np.zeros((2, 2, 2), np.uint8))

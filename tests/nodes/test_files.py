@@ -244,7 +244,7 @@ def test_one_array_and_several_are_told_apart() -> None:
 
 @pytest.mark.parametrize("path", ["a", "a.xyz", ""])
 def test_a_name_that_no_picture_has_is_refused_where_it_is_set(path: str) -> None:
-    with pytest.raises(ValueError, match=r'parameter "write_image.path" must be the name of a file like \*.png'):
+    with pytest.raises(ValueError, match=r'parameter "write_image.path" must be a file name like \*.png'):
         files.WriteImage(path=path)
 
 

@@ -111,7 +111,7 @@ def test_completing_tells_subscribers_even_when_one_fails(
     event._notify(hfg.Token(1))
     event._complete()
     assert ended == ["1 tokens"]
-    assert "failed as the event completed" in caplog.text
+    assert "failed when the event completed" in caplog.text
 
 
 def test_a_subscriber_may_leave_while_it_is_told(event: EventPort[int]) -> None:
@@ -159,7 +159,7 @@ def test_a_scheduler_of_ones_own_wins(event: EventPort[int]) -> None:
 def test_subscribing_from_another_thread_than_the_runs_is_refused(event: EventPort[int]) -> None:
     event._thread = -1
     for observable in (event, event.map(str)):
-        with pytest.raises(UsageError, match=r'"seen\.seen" was subscribed to from another thread'):
+        with pytest.raises(UsageError, match=r'"seen\.seen" was subscribed to from a thread that is not its run'):
             observable.subscribe(print)
 
 

@@ -135,7 +135,7 @@ def test_help_comes_from_the_declaration_or_the_docstring() -> None:
         ("band", (0.5, 0.6), "must be hfg.Span(low, high) of float, got (0.5, 0.6)"),
         ("colour", (1, 2, 3), "must be a colour, as in hfg.Colour(255, 128, 0)"),
         ("colour", hfg.Colour(1, 2, 256), "must have red, green and blue from 0 to 255"),
-        ("file", Path("pictures/a.gif"), "must be the name of a file like *.png or *.jpg, got 'pictures/a.gif'"),
+        ("file", Path("pictures/a.gif"), "must be a file name like *.png or *.jpg, got 'pictures/a.gif'"),
         ("file", "a.png", "must be of type Path, got 'a.png'"),
         ("names", ["a", ""], "[1] must have at least 1 items, got ['a', '']"),
         ("gains", (0.0, 1.0), "must be of type tuple[float, float, float], got (0.0, 1.0)"),
@@ -287,19 +287,28 @@ def declared(**body: Any) -> type:
     ("declare", "wrong"),
     [
         (lambda: declared(a=hfg.Parameter(7, at.Le(1))), 'the default of parameter "a" must be <= 1, got 7'),
-        (lambda: declared(a=hfg.Parameter(at.Le(1))), r"Le\(le=1\) is a limit, where the default of a parameter"),
-        (lambda: declared(a=hfg.Parameter("x", step=1)), r'parameter "a" has a step, but is of the kind text; leave'),
-        (lambda: declared(a=hfg.Parameter(1, step=0)), r'parameter "a" has a step of 0; a step is a number above 0'),
+        (lambda: declared(a=hfg.Parameter(at.Le(1))), r"Le\(le=1\) is a limit, but the first argument of a parameter"),
+        (lambda: declared(a=hfg.Parameter("x", step=1)), r'parameter "a" has a step, but its kind is text; omit step='),
+        (
+            lambda: declared(a=hfg.Parameter(1, step=0)),
+            r'parameter "a" has a step of 0; a step must be a number above 0',
+        ),
         (lambda: declared(a=hfg.Parameter("x", choices="xy")), r"choices are several values, got 'xy'; write choices="),
-        (lambda: declared(a=hfg.Parameter(1, pattern="*.png")), r"is of the kind int, but pattern=, directory= and"),
-        (lambda: declared(a=hfg.Parameter(Path("x"), pattern=" ")), r"has the pattern ' '; names of files have one"),
-        (lambda: declared(a=hfg.Parameter(1, unit=3)), r'has unit=3; write a text, as in unit="\.\.\."'),  # type: ignore[call-overload]
+        (lambda: declared(a=hfg.Parameter(1, pattern="*.png")), r"has the kind int, but pattern=, directory= and"),
+        (
+            lambda: declared(a=hfg.Parameter(Path("x"), pattern=" ")),
+            r"has the pattern ' '; a pattern matches file names,",
+        ),
+        (lambda: declared(a=hfg.Parameter(1, unit=3)), r'has unit=3; write a string, as in unit="\.\.\."'),  # type: ignore[call-overload]
         (lambda: declared(a=hfg.Parameter(1, shown_if="b")), r'"a" is shown by "b", which is no parameter with a val'),
-        (lambda: declared(a=hfg.Parameter(1, shown_if="a")), r"is shown by its own value, so that it could hide for"),
+        (
+            lambda: declared(a=hfg.Parameter(1, shown_if="a")),
+            r"depends on its own value to be shown, so it could be hidden forever;",
+        ),
         (lambda: declared(a=hfg.Parameter(1, shown_if=3)), r"shown_if names parameters of the same node and what th"),  # type: ignore[call-overload]
         (
             lambda: declared(a=hfg.Parameter(1, shown_if={"b": at.Predicate(bool)}), b=hfg.Parameter(1)),
-            r'shown_if asks of "b" what only code can tell, .*, and files hold no code; give the values',
+            r'shown_if has a condition on "b" that only code can decide, .*, and files hold no code; use the values',
         ),
         (
             lambda: declared(a=hfg.Parameter(1, shown_if={"b": "z"}), b=hfg.Parameter("x", choices=("x", "y"))),
@@ -312,7 +321,7 @@ def declared(**body: Any) -> type:
             'parameters are shown by each other, "a" by "b" by "c" by "a", so that all could hide for ever; let one of',
         ),
         (lambda: declared(a=hfg.Parameter(trigger=True, choices=(1, 2))), "is a trigger and has no value"),  # type: ignore[call-overload]
-        (lambda: declared(a=hfg.Parameter(read_only=True)), "is read-only and has no default to begin with"),  # type: ignore[call-overload]
+        (lambda: declared(a=hfg.Parameter(read_only=True)), "is read-only and has no default to start with"),  # type: ignore[call-overload]
         (
             lambda: type("Box", (hfg.Subgraph,), {"a": hfg.Parameter(0.0, read_only=True)}),
             'parameter "a" is read-only, but a subgraph has no code of its own to set it',
@@ -339,9 +348,9 @@ def scale_3(value: float, *, a: Annotated[float, hfg.Parameter(unit="m"), hfg.Pa
 @pytest.mark.parametrize(
     ("function", "wrong"),
     [
-        (scale_1, r'parameter "a" says its default or type in hfg\.Parameter; write Annotated\[float, hfg'),
-        (scale_2, r'parameter "a" says its default or type in hfg\.Parameter'),
-        (scale_3, r'parameter "a" has two of hfg\.Parameter in its annotation; say all in one'),
+        (scale_1, r'parameter "a" has its default or type in hfg\.Parameter; write Annotated\[float, hfg'),
+        (scale_2, r'parameter "a" has its default or type in hfg\.Parameter'),
+        (scale_3, r'parameter "a" has two hfg\.Parameter in its annotation; combine them in one'),
     ],
 )
 def test_an_annotation_that_contradicts_itself_is_refused(function: Any, wrong: str) -> None:

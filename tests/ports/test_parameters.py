@@ -96,7 +96,7 @@ def test_a_default_that_breaks_its_limits_is_refused_at_once() -> None:
 
 
 def test_what_is_no_limit_is_refused() -> None:
-    with pytest.raises(DeclarationError, match="'m' is no limit for a parameter"):
+    with pytest.raises(DeclarationError, match="'m' is not a limit for a parameter"):
         hfg.Parameter(1.0, "m")
 
 

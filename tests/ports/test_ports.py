@@ -211,7 +211,7 @@ def test_activates_draws_an_active_edge() -> None:
 
 
 def test_connecting_what_is_in_no_graph_says_so() -> None:
-    with pytest.raises(UsageError, match=r'"camera\.image" and "detector\.image" belong to no graph yet'):
+    with pytest.raises(UsageError, match=r'"camera\.image" and "detector\.image" do not belong to a graph yet'):
         _ = Camera().image >> Detector().image
 
 
