@@ -13,7 +13,6 @@
     nodes          small deterministic node types
     reference      the oracle: the rules as a machine of permitted moves
     conformance    replay the trace of a run on the oracle
-    waves          the same, and that waves go depth first (R2)
     transports     the tests that any transport passes
     pytest_plugin  fixtures and the `rule` mark
 

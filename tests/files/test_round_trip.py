@@ -17,9 +17,9 @@ import hfg
 from hfg.base.values import same
 from hfg.files import build, describe, text_of
 from hfg.testing.plans import GraphPlan
-from hfg.testing.shrinking import shrink
 from hfg.types import Shape
 from tests.files.programs import Ear, Merged, Mode, Pose, Scaling, difference, double, numbers, plan_of, shown
+from tests.support.shrinking import shrink
 
 Turn = Annotated[NDArray[np.float64], Shape(3, 3)]
 

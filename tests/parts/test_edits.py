@@ -13,10 +13,10 @@ import hfg
 from hfg import commands as c
 from hfg.errors import GraphError, HfgError, RunError, UsageError
 from hfg.parts.steering.serving import Serving
-from hfg.testing.edits import drawn
 from hfg.trace import TokenSent
 from tests.parts.mortal import mortal_parts
 from tests.parts.test_from_outside import Scaler, through, with_run
+from tests.support.edits import drawn
 
 HERE = "tests.parts.test_edits"
 

@@ -12,7 +12,6 @@ import hfg
 from hfg import commands as c
 from hfg.errors import GraphError, NodeError, NotRunning, UsageError
 from hfg.testing import Recorder, recorder, replay
-from hfg.testing.edits import drawn
 from hfg.testing.nodes import Waiting, add, double, script, sink
 from hfg.trace import (
     ActivityLost,
@@ -24,6 +23,7 @@ from hfg.trace import (
     TokenDropped,
 )
 from tests.semantics.nodes import Last
+from tests.support.edits import drawn
 
 LOG: list[str] = []
 

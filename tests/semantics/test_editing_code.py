@@ -12,10 +12,10 @@ import hfg
 from hfg import commands as c
 from hfg.errors import NodeError, UsageError
 from hfg.testing import Recorder, recorder
-from hfg.testing.edits import drawn
 from hfg.testing.nodes import Waiting, script, sink
 from hfg.trace import NodeEnabled, ParameterSet
 from tests.semantics.nodes import named
+from tests.support.edits import drawn
 
 LOG: list[str] = []
 REFUSES: set[str] = set()

@@ -14,7 +14,7 @@ import hfg
 from hfg import commands
 from hfg.errors import GraphError
 from hfg.testing.nodes import double
-from hfg.testing.planned import planned, planned_afresh
+from tests.support.planned import planned, planned_afresh
 
 TYPE = "hfg.testing.nodes:double"
 BETWEEN = (

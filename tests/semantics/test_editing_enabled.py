@@ -12,7 +12,6 @@ import hfg
 from hfg import commands as c
 from hfg.errors import NodeError
 from hfg.testing import Recorder, recorder, replay
-from hfg.testing.edits import drawn
 from hfg.testing.nodes import Failing, Latch, Scaled, Waiting, add, ascript, double, script, sink
 from hfg.trace import (
     CallStarted,
@@ -25,6 +24,7 @@ from hfg.trace import (
     TokenDropped,
 )
 from tests.semantics.nodes import Farewell, Last, named
+from tests.support.edits import drawn
 
 
 class Pair(hfg.Subgraph):

@@ -21,8 +21,8 @@ from hfg.testing.making import Allowed, random_plan
 from hfg.testing.plans import GraphPlan
 from hfg.testing.recording import Recorder
 from hfg.testing.reference.structure import dissolve
-from hfg.testing.shrinking import shrink
 from tests.semantics.calls import Calls, Ran, begun, by_node, note_calls, noted_run, passed_by_trace
+from tests.support.shrinking import shrink
 
 LEAST_SHARE = 0.25  # of all firings and calls are fused
 MOST_MOVES = 1500

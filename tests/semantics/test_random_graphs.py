@@ -19,8 +19,8 @@ from hfg.testing.conformance import Replay
 from hfg.testing.invariants import broken, of_graph
 from hfg.testing.making import SYNCHRONOUS, WIDE, Allowed, random_plan
 from hfg.testing.plans import GraphPlan
-from hfg.testing.shrinking import shrink
 from hfg.trace import TraceEvent
+from tests.support.shrinking import shrink
 
 MOST_MOVES = 1500
 MOST_EVENTS = 5_000  # what ends under one schedule may go round for ever under another: then a run is stopped

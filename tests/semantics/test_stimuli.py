@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, settings
 from hypothesis.stateful import run_state_machine_as_test
 
 import hfg
-from hfg.testing.machines import EngineAgainstOracle
 from tests.semantics.nodes import Keep, drive
+from tests.support.machines import EngineAgainstOracle
 
 
 @pytest.mark.rule("P10", "F10", "A4", "A7", "A9", "A14", "P8")

@@ -12,8 +12,8 @@ import hfg
 from hfg.testing import Divergence, Recorder, recorder, reference_run, replay
 from hfg.testing.making import Allowed, random_plan
 from hfg.testing.nodes import Scaled, double, script, sink
-from hfg.testing.waves import replay_depth_first
 from hfg.trace import FiringStarted
+from tests.support.waves import replay_depth_first
 
 
 def forked() -> hfg.Graph:
