@@ -238,7 +238,7 @@ class _Region:
         """Give every reason why this is no machine."""
         if not self.states:
             yield error(
-                self.flat.graph.name,
+                self.flat.level.name,
                 "no active edge leads to or from a node",
                 "the states of a graph are the nodes that activity moves between",
                 "connect them with active=True",

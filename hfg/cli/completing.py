@@ -15,8 +15,7 @@ from pathlib import Path
 import typer
 
 from hfg.cli.target import load_graph
-from hfg.graph import Graph
-from hfg.graph.structure.subgraph import is_box
+from hfg.graph import Graph, Subgraph
 from hfg.nodetypes.node import Node
 
 __all__ = ["parameters", "ports", "targets"]
@@ -73,7 +72,7 @@ def _nodes(ctx: typer.Context) -> list[tuple[str, Node]]:
 def _inside(graph: Graph, before: str) -> Iterator[tuple[str, Node]]:
     for name, node in graph.nodes.items():
         yield before + name, node
-        if is_box(node):
+        if isinstance(node, Subgraph):
             yield from _inside(node._graph, f"{before}{name}/")
 
 

@@ -18,10 +18,8 @@ from hfg.encoding import Find, encode
 from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.files.document import BoxDocument, Document
 from hfg.files.values import decoded
-from hfg.graph.editing.enclosing import Enclosed
 from hfg.graph.editing.type_texts import type_of_text
-from hfg.graph.graph import Graph
-from hfg.graph.structure.subgraph import Subgraph
+from hfg.graph.graph import Enclosed, Graph, Subgraph
 from hfg.ports import Event, Input, Output, Parameter, ParameterSpec, slot
 from hfg.ports.conditions import Condition
 from hfg.ports.kinds import type_of_choices
@@ -60,6 +58,8 @@ class FileBox(Subgraph):
     _parts: ClassVar[Mapping[str, type[FileBox]]]
     """The types of the files that it includes, by how it names them."""
     _fill: ClassVar[Fill]
+    _read: ClassVar[Callable[[Path], type[FileBox]]]
+    """Makes the type of a file that was not read yet; `building` gives it, which stands above."""
 
     def build(self, graph: Graph) -> None:
         """Make what the file says."""
@@ -251,8 +251,6 @@ def __getattr__(name: str) -> Any:
     if name.startswith("File[") and name.endswith("]"):
         file = Path(unquote(name.removeprefix("File[").removesuffix("]")))
         if file not in _MADE:
-            from hfg.files.building import box_of_file
-
-            return box_of_file(file)
+            return FileBox._read(file)
         return _MADE[file]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -37,16 +37,15 @@ from hfg.files.values import decoded, decoded_parameter
 from hfg.graph.editing.commands import Disconnect, Move, Remove
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.type_texts import type_of_text
-from hfg.graph.graph import Graph
+from hfg.graph.graph import Graph, Subgraph, graph_of
 from hfg.graph.structure.connecting import declare_edge
 from hfg.graph.structure.edge import type_of
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.membership import set_options
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.operators import find_operator
 from hfg.graph.structure.pointing import node_at, source_at, target_at
 from hfg.graph.structure.refusals import raise_refusals
-from hfg.graph.structure.subgraph import Subgraph, inside
 from hfg.nodetypes.node import Node
 
 __all__ = ["box_of_file", "build", "load", "modules_of"]
@@ -94,6 +93,9 @@ def box_of_file(path: Path) -> type[FileBox]:
     if found is None:
         raise EngineInternalError(f"{path} was not read, and nobody said why")
     return found
+
+
+FileBox._read = staticmethod(box_of_file)
 
 
 class _Loading:
@@ -500,7 +502,7 @@ class _Making:
         root = within.whole.root
         perform(root, [Disconnect(edge.source.path, edge.target.path) for edge in reversed(within.edges)])
         perform(root, [Remove(within.path_to(name)) for name in list(within.nodes)])
-        self.fill(within.face, box, made, (*key, "graph"))
+        self.fill(graph_of(within.face), box, made, (*key, "graph"))
 
     def note(self, graph: Graph, node: Node | None, position: list[Any] | None, notes: dict[str, Any]) -> None:
         """What editors noted."""

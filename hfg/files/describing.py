@@ -31,15 +31,14 @@ from hfg.files.document import (
 )
 from hfg.files.findings import Findings
 from hfg.files.missing import MissingNode
-from hfg.graph.editing.enclosing import Enclosed
 from hfg.graph.editing.type_texts import text_of_type
 from hfg.graph.graph import Graph
 from hfg.graph.structure.edge import Edge, is_feed, type_of
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.operators import NamedOperator
 from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
 from hfg.graph.structure.refusals import raise_refusals
-from hfg.graph.structure.subgraph import Subgraph, inside, is_box
+from hfg.graph.structure.subgraph import Box, is_box, is_unnamed
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, ParameterSpec, Port
 from hfg.ports.kinds import choices_of, type_of_choices
@@ -209,7 +208,7 @@ class _Telling:
 
     # --- subgraphs ---
 
-    def box(self, node: Subgraph, told: NodeDocument) -> None:
+    def box(self, node: Box, told: NodeDocument) -> None:
         """Say what a subgraph is: a file, a type, or a graph alone."""
         kind, within = node._type, inside(node)
         if within is None:
@@ -228,7 +227,7 @@ class _Telling:
             told.graph = BoxDocument()
             self.fill(told.graph, within)
             return
-        elif type(node).__bases__[0] not in (Subgraph, Enclosed) or kind.vectors:
+        elif not is_unnamed(node) or kind.vectors:
             told.type = self.reference(node)
             return
         told.graph = BoxDocument()
@@ -240,7 +239,7 @@ class _Telling:
             self.declare(node, name, told.graph)
         self.fill(told.graph, within)
 
-    def declare(self, node: Subgraph, name: str, graph: BoxDocument) -> None:
+    def declare(self, node: Box, name: str, graph: BoxDocument) -> None:
         spec, path = node._type.parameters[name], f"{node.place.path}.{name}"
         limits = limits_in_words(spec.limits)
         if limits is None or spec.trigger or spec.default is REQUIRED:
@@ -289,7 +288,7 @@ class _Telling:
             )
         return Path(os.path.relpath(file, self.beside.parent)).as_posix()
 
-    def as_built(self, node: Subgraph, within: Level) -> dict[str, InsideDocument] | None:
+    def as_built(self, node: Box, within: Level) -> dict[str, InsideDocument] | None:
         """Tell what is otherwise inside than the type builds it; None if more is than can be said so."""
         fresh = self.built_anew(node)
         made = None if fresh is None else inside(fresh)
@@ -316,14 +315,14 @@ class _Telling:
                 found[path] = told
         return found
 
-    def built_anew(self, node: Subgraph) -> Subgraph | None:
+    def built_anew(self, node: Box) -> Box | None:
         """The same subgraph as its type makes it."""
         graph = Graph("built anew")
         for spec in self.root.whole.groups.by_name.values():
             level_of(graph).whole.groups.change(spec)
         try:
             with raise_refusals():
-                made: Subgraph = graph.add(node._copy(), name="box", iterate_over=node._options.iterate_over)  # type: ignore[assignment]
+                made: Box = graph.add(node._copy(), name="box", iterate_over=node._options.iterate_over)  # type: ignore[assignment]
         except Exception as error:  # code of users raises what it likes
             self.wrong(
                 node.place.path,

@@ -11,13 +11,12 @@ Each wing has a map of its own, and imports only those below it; a test keeps th
 """
 
 from hfg.graph.editing import commands
-from hfg.graph.graph import Graph
+from hfg.graph.graph import Graph, Subgraph
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.operators import operator
 from hfg.graph.structure.options import EdgeOptions, GroupSpec, NodeOptions
-from hfg.graph.structure.subgraph import Subgraph
 
 __all__ = [
     "Edge",

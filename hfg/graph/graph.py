@@ -11,7 +11,7 @@ import copy
 import os
 from collections.abc import Callable, Iterable
 from types import ModuleType
-from typing import Any, Final, Literal, Never, TypeVar, overload
+from typing import Any, ClassVar, Final, Literal, Never, TypeVar, overload
 
 from reactivex import Observable
 from typing_extensions import TypeForm
@@ -31,16 +31,16 @@ from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.finding import find
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.gating import set_gate
-from hfg.graph.structure.level import Level
+from hfg.graph.structure.level import Level, Whole, inside
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import DEFAULT_CAPACITY, Errors, GroupSpec, OnError, Overflow, Policy, Release
 from hfg.graph.structure.pointing import node_at
 from hfg.graph.structure.promoting import promote
-from hfg.graph.structure.whole import Whole
+from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node, Place
 from hfg.ports import EventPort, ParameterPort, Port, SlotPort, Source, Target
 
-__all__ = ["Graph"]
+__all__ = ["Enclosed", "Graph", "Subgraph", "graph_of"]
 
 N = TypeVar("N", bound=Node)
 T = TypeVar("T")
@@ -71,7 +71,7 @@ class Graph:
 
     def __init__(self, name: str = "graph", *, _level: Level | None = None) -> None:
         if _level is None:
-            _level = Level(need_name("a graph", name), Whole(_face_of), face=self)
+            _level = Level(need_name("a graph", name), Whole(_face_of, Enclosed), face=self)
         self._level = _level
 
     # --- what it is made of ---
@@ -585,3 +585,72 @@ class Graph:
 
 def _face_of(level: Level) -> Graph:
     return Graph(level.name, _level=level)
+
+
+class Subgraph(Box):
+    """A node that holds a graph.
+
+    Ports are declared as on any node; `.inner` is the side of a port that looks into the box. A slot needs no handler:
+    `begin = hfg.slot(type=int)`. The graph inside is built when the subgraph is added.
+
+    Example:
+      >>> import hfg
+      >>> @hfg.node
+      ... def double(value: int) -> int:
+      ...     return 2 * value
+      >>> class Quadruple(Subgraph):
+      ...     value = hfg.Input(int)
+      ...     result = hfg.Output(int)
+      ...     def build(self, graph: Graph) -> None:
+      ...         first, second = graph.add(double()), graph.add(double())
+      ...         graph.connect(self.value.inner, first.value)
+      ...         first >> second
+      ...         graph.connect(second.out, self.result.inner)
+      >>> box = Graph().add(Quadruple())
+      >>> list(box.graph.nodes)
+      ['double', 'double_2']
+
+    Attributes:
+      iterate_over: names of inputs that take collections, whose elements the inside sees one by one; the declared types
+        are those inside (rule G4).
+    """
+
+    __slots__ = ()
+
+    _is_base: ClassVar[bool] = True
+
+    def build(self, graph: Graph) -> None:
+        """Add the nodes inside and connect them, also with the inner sides of the subgraph's own ports."""
+
+    @property
+    def graph(self) -> Graph:
+        """The graph inside.
+
+        Raises:
+          UsageError: the subgraph was not added to a graph yet.
+        """
+        if inside(self) is None:
+            raise UsageError(
+                f'subgraph "{self._type.name}" has no graph yet: build() runs when it is added with graph.add(...)'
+            )
+        return self._graph
+
+    @property
+    def _graph(self) -> Graph:
+        """The same for floors that ask `hasattr` first: before it is built, the attribute is not there."""
+        return graph_of(self._level.face)
+
+    def _build(self) -> None:
+        self.build(self._graph)
+
+
+class Enclosed(Subgraph):
+    """A subgraph without a type of its own, such as `Enclose` makes."""
+
+    _is_base: ClassVar[bool] = True
+
+
+def graph_of(face: object) -> Graph:
+    """Return the face of a level as what it is, which the wings below do not know."""
+    assert isinstance(face, Graph)
+    return face

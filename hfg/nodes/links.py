@@ -21,6 +21,7 @@ from hfg.encoding import type_fingerprint, wire_problem
 from hfg.errors import EndOfStream, HfgError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import flatten
+from hfg.graph.graph import graph_of
 from hfg.graph.structure.level import level_of
 from hfg.links.meeting import OutboxFile, Publication, Subscription
 from hfg.links.offers import need_link_name
@@ -188,7 +189,7 @@ class Subscribe(Node):
 
 
 def _whole(node: Node) -> Graph:
-    whole: Graph = level_of(node.place.graph).whole.root.face
+    whole: Graph = graph_of(level_of(node.place.graph).whole.root.face)
     return whole
 
 

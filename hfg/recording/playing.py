@@ -545,7 +545,7 @@ def _edges_into(node: Node) -> list[Any]:
     """The edges on whose tokens the firings of a node wait, for one that plays fires when it did."""
     return [
         edge
-        for edge in level_of(node.place.graph).face.edges
+        for edge in level_of(node.place.graph).edges
         if getattr(edge.target, "node", None) is node and edge.target.kind in ("input", "parameter")
     ]
 

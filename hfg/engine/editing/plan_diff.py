@@ -30,10 +30,10 @@ from hfg.graph.editing.changes import (
 )
 from hfg.graph.flat import ROOT, EdgeFollower, End, FlatEdge, FlatGraph
 from hfg.graph.structure.edge import Edge, is_feed, type_of
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import HasLevel, Level, inside, level_of
 from hfg.graph.structure.options import NodeOptions, in_group
 from hfg.graph.structure.places import edge_place, home_of, side_of
-from hfg.graph.structure.subgraph import inside, is_box, iterated
+from hfg.graph.structure.subgraph import is_box, iterated
 from hfg.ports import InnerSource, InnerTarget
 from hfg.ports.edges import BufferEdge
 from hfg.types import why_not
@@ -527,7 +527,7 @@ def _end_path(port: Any) -> str:
     return "observable" if is_feed(port) else str(port.path)
 
 
-def _side_of_port(port: Any, graph: Graph) -> Level:
+def _side_of_port(port: Any, graph: HasLevel) -> Level:
     """On which side of the borders of what iterates a port is; the inner side of such a border is inside."""
     if port.node is graph:
         return level_of(graph)

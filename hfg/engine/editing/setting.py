@@ -13,8 +13,8 @@ from hfg.base.values import own_copy
 from hfg.engine.model.worker import AMID_NOTHING, BACKOFF, DISABLED, Worker
 from hfg.engine.rules import lifecycle
 from hfg.errors import NotRunning, UsageError
+from hfg.graph.structure.level import inside
 from hfg.graph.structure.promoting import stands_for
-from hfg.graph.structure.subgraph import inside
 from hfg.nodetypes.description import read_only_refusal
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort

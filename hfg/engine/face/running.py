@@ -127,7 +127,7 @@ def _need_use_of_seed(flat: FlatGraph, settings: Settings) -> None:
         return
     if not any(node.options.retry_jitter for one in flat.walk() for node in one.nodes):
         raise UsageError(
-            f'seed={settings.seed} has no effect, for no group of graph "{flat.graph.name}" has the policy "random": '
+            f'seed={settings.seed} has no effect, for no group of graph "{flat.level.name}" has the policy "random": '
             f'write policy="random", seed={settings.seed}, or leave it out'
         )
 

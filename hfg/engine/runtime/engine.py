@@ -35,6 +35,7 @@ from hfg.engine.runtime.upstairs import Deciders
 from hfg.errors import EngineInternalError, HfgError, NodeError, RunError, UsageError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
+from hfg.graph.graph import graph_of
 from hfg.nodetypes.node import Node
 from hfg.ports import EventPort
 
@@ -126,7 +127,7 @@ class Engine:
         self.core.fast = settings.fast
         self.core.seed = settings.seed or 0
         self.core.fuse_after = settings.fuse_after
-        self.graph: Graph = flat.graph
+        self.graph: Graph = graph_of(flat.graph)
         self._slice_s = _SLICE_S
         self.holds = 0
         self.readers: list[Worker] = []

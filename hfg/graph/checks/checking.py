@@ -7,7 +7,7 @@ above add their own with `also`. Stands on `flat`, `edges`, `flow` and `nodes`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from hfg.errors import SEVERITIES, Problem
 from hfg.graph.checks.changing import changed_inputs
@@ -37,9 +37,7 @@ from hfg.graph.checks.nodes import (
 )
 from hfg.graph.checks.processes import process_borders
 from hfg.graph.flat.flattening import FlatGraph, flatten
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
+from hfg.graph.structure.level import HasLevel
 
 __all__ = ["Check", "also", "check", "check_flat"]
 
@@ -75,7 +73,7 @@ def also(check: Check) -> Check:
     return check
 
 
-def check(graph: Graph) -> list[Problem]:
+def check(graph: HasLevel) -> list[Problem]:
     """Check a whole graph; the worst first."""
     return check_flat(flatten(graph))
 

@@ -11,7 +11,7 @@ from typing import Any
 from hfg.errors import Problem
 from hfg.graph.flat.flattening import ROOT, FlatEdge, FlatGraph
 from hfg.graph.structure.edge import Edge, is_feed, type_of
-from hfg.graph.structure.subgraph import inside
+from hfg.graph.structure.level import inside
 from hfg.ports import ParameterPort
 from hfg.types import describe, why_not
 
@@ -123,7 +123,7 @@ def borders(flat: FlatGraph) -> Iterator[Problem]:
         iteration = None if target is None else target.iteration
         if iteration is None or edge.target.kind == "slot":
             continue
-        path = iteration.graph.path
+        path = iteration.level.path
         if edge.active:
             yield _refused(
                 edge.label,

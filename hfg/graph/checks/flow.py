@@ -80,7 +80,7 @@ def unconnected_graph(flat: FlatGraph) -> Iterator[Problem]:
         if _lonely_inputs(flat) or all(node.node._type.process_kind == "none" for node in flat.nodes):
             return  # told of already: what they wait for, or that nothing leads to their slots
         yield Problem(
-            path=flat.graph.name,
+            path=flat.level.name,
             severity="warning",
             what=f"it has {len(flat.nodes)} nodes and no edge",
             why="so nothing goes from one to another (rule P1)",

@@ -12,9 +12,9 @@ from typing import Any
 
 from hfg.errors import Problem
 from hfg.graph.flat.flattening import FlatGraph
+from hfg.graph.structure.level import inside
 from hfg.graph.structure.naming import suggest
 from hfg.graph.structure.options import NodeOptions
-from hfg.graph.structure.subgraph import Subgraph, inside
 from hfg.nodetypes.node import Node
 from hfg.ports import Port
 
@@ -181,7 +181,8 @@ def empty_subgraphs(flat: FlatGraph) -> Iterator[Problem]:
         if level is None or level.nodes or level.edges:
             continue
         if kind.inputs or kind.outputs or kind.events or kind.slots:
-            build = "build() adds nothing" if type(node).build is not Subgraph.build else "it has no build()"  # type: ignore[attr-defined]
+            builds = sum("build" in vars(kind) for kind in type(node).__mro__)  # that of `Subgraph` adds nothing
+            build = "build() adds nothing" if builds > 1 else "it has no build()"
             yield Problem(
                 path=path,
                 severity="warning",

@@ -10,26 +10,23 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from hfg.base.controls import escaped
 from hfg.base.whole import write_whole
 from hfg.errors import GraphError, UsageError
 from hfg.graph.drawing.picture import EVERYTHING, Arrow, Box, Look, Picture, Shape, View, picture
 from hfg.graph.drawing.svg import svg
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import HasLevel, Level, level_of
 from hfg.graph.structure.pointing import meant, node_at
 from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
 
 __all__ = ["FORMATS", "dot", "draw", "mermaid", "view_of"]
 
 
 def draw(
-    graph: Graph,
+    graph: HasLevel,
     path: str | os.PathLike[str] | None = None,
     *,
     format: str | None = None,  # noqa: A002 - the word users know
@@ -53,7 +50,7 @@ def draw(
     return text
 
 
-def _writer(title: str, ending: str, what: str) -> Callable[[Graph, View], str]:
+def _writer(title: str, ending: str, what: str) -> Callable[[HasLevel, View], str]:
     write = FORMATS.get(ending)
     if write is None:
         endings = " or ".join(FORMATS)
@@ -62,7 +59,7 @@ def _writer(title: str, ending: str, what: str) -> Callable[[Graph, View], str]:
 
 
 def view_of(
-    graph: Graph,
+    graph: HasLevel,
     depth: int | None,
     fold: Iterable[Node | str],
     active: Iterable[Node | str] | None,
@@ -125,7 +122,7 @@ _SHAPES: Final[Mapping[Look, tuple[str, str]]] = MappingProxyType(
 )
 
 
-def mermaid(graph: Graph, view: View = EVERYTHING) -> str:
+def mermaid(graph: HasLevel, view: View = EVERYTHING) -> str:
     """Draw a graph as the text of a Mermaid flowchart."""
     seen = picture(graph, view)
     lines = ["flowchart LR"]
@@ -190,7 +187,7 @@ _DOT_SHAPES: Final[Mapping[Look, str]] = MappingProxyType(
 )
 
 
-def dot(graph: Graph, view: View = EVERYTHING) -> str:
+def dot(graph: HasLevel, view: View = EVERYTHING) -> str:
     """Draw a graph as the text of a DOT file, for Graphviz."""
     seen = picture(graph, view)
     lines = [
@@ -236,6 +233,6 @@ def _dot_line(arrow: Arrow) -> str:
     return ", ".join(parts)
 
 
-FORMATS: Final[Mapping[str, Callable[[Graph, View], str]]] = MappingProxyType(
+FORMATS: Final[Mapping[str, Callable[[HasLevel, View], str]]] = MappingProxyType(
     {".svg": svg, ".mmd": mermaid, ".dot": dot}
 )

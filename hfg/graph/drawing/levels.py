@@ -110,7 +110,7 @@ class Level:
         height = self._top + max(self.plan.height, 6.0) + (26.0 if under else 16.0)
         texts = [Text(self._left, 17.0, name, NAME, bold=True)]
         texts += (Text(self._left, 30.0 + 12.0 * number, detail, DETAIL) for number, detail in enumerate(box.details))
-        part = Part(box, Block(round(width), round(height), []), *texts, inside=self)
+        part = Part(box, Block(round(width), round(height), []), *texts)
         _add_docks(part, over, width - right - sum(room for _, room in over))
         _add_docks(part, under, self._left)
         docks = {

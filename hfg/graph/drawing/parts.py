@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import msgspec
 
 from hfg.graph.drawing.layout.blocks import Block, Dock, Side
 from hfg.graph.drawing.picture import Box, Pin, Shape
 from hfg.graph.drawing.text import shortened, width_of
-
-if TYPE_CHECKING:
-    from hfg.graph.drawing.levels import Level
 
 __all__ = [
     "DETAIL",
@@ -99,15 +96,13 @@ class Part:
       block: what is laid out.
       texts: what is written on it, besides names of ports on top and bottom.
       docks: which dock of the block each port is.
-      inside: of a subgraph.
     """
 
-    def __init__(self, of: Shape | Box, block: Block, *texts: Text, inside: Level | None = None) -> None:
+    def __init__(self, of: Shape | Box, block: Block, *texts: Text) -> None:
         self.of = of
         self.block = block
         self.texts = texts
         self.docks: dict[Key, int] = {}
-        self.inside = inside
         self._named: list[tuple[int, str]] = []  # docks on top and bottom whose names are written where they come to be
         self._unmarked: set[int] = set()  # docks that are no port
 

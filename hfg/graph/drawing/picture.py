@@ -8,21 +8,18 @@ the subgraph. Nothing recurses: graphs may be as deep as they like. Stands on `s
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, TypeGuard
+from typing import Any, Final, Literal, TypeAlias, TypeGuard
 
 import msgspec
 
 from hfg.graph.structure.edge import Edge, PortEnd, SourceEnd, is_feed, is_port
 from hfg.graph.structure.gates import Gate
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import HasLevel, Level, inside, level_of
 from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.options import DEFAULT_CAPACITY, EdgeOptions, NodeOptions
-from hfg.graph.structure.subgraph import inside, is_box
+from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node, NodeType
 from hfg.ports import InnerSource, InnerTarget, Port
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
 
 __all__ = ["EVERYTHING", "Arrow", "Box", "Look", "Picture", "Pin", "Shape", "View", "picture"]
 
@@ -166,7 +163,7 @@ class Picture(msgspec.Struct):
     groups: list[str]
 
 
-def picture(graph: Graph, view: View = EVERYTHING) -> Picture:
+def picture(graph: HasLevel, view: View = EVERYTHING) -> Picture:
     """Look at a graph, or at the inside of a subgraph alone."""
     return _Look(level_of(graph), view).picture
 

@@ -183,7 +183,7 @@ class _Sheet:
         of = self.by_id[end]
         assert isinstance(of, Shape)
         key = key_on_box(of)
-        if self.inside.get(end) is not part.inside:
+        if self.inside.get(end) is not self.inside[part.of.id]:
             key = ("active" if is_tail else "gate", end, is_tail)
         if key not in part.docks:
             dock = Dock("bottom" if is_tail else "top", round(part.block.width / 2), is_fixed=True)
@@ -195,8 +195,8 @@ class _Sheet:
     def _draw(self, level: Level) -> None:
         left, top = level.at
         for part, (x, y) in zip(level.parts, level.plan.blocks, strict=True):
-            if part.inside is not None:
-                part.inside.place(left + x, top + y)
+            if isinstance(part.of, Box):
+                self.inside[part.of.id].place(left + x, top + y)
             if part.block.rank:
                 self._draw_name_of_port(part, left + x, top + y)
             else:

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence, Set
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from hfg.graph.drawing.layout.blocks import Point
 from hfg.graph.drawing.parts import DETAIL, LONGEST_NAME, Card, Mark, Text
 from hfg.graph.drawing.picture import EVERYTHING, Arrow, Box, Picture, Shape, View, picture
 from hfg.graph.drawing.sheet import Lead, Sheet, sheet
 from hfg.graph.drawing.text import FONTS, escaped, is_measured, shortened, width_of
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
+from hfg.graph.structure.level import HasLevel
 
 __all__ = ["svg"]
 
@@ -49,7 +47,7 @@ rect.hfg-port,path.hfg-port{stroke:#eef3f8}
 """
 
 
-def svg(graph: Graph, view: View = EVERYTHING) -> str:
+def svg(graph: HasLevel, view: View = EVERYTHING) -> str:
     """Draw a graph as the text of an SVG file."""
     seen = picture(graph, view)
     return "".join(_document(seen, sheet(seen)))

@@ -17,10 +17,9 @@ from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.edge import Edge
 from hfg.graph.structure.gates import Gate
 from hfg.graph.structure.groups import Groups, GroupsState
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.membership import close_box, leave, open_box, place, set_options, settle, write_parameter
 from hfg.graph.structure.options import NodeOptions
-from hfg.graph.structure.subgraph import inside
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 

@@ -17,43 +17,39 @@ from hfg.graph.editing.changes import Change, EdgeChange, GateChange, NodeChange
 from hfg.graph.editing.straight import refuse_other_queues
 from hfg.graph.structure.connecting import refuse
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, owner_of
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import Level, inside, level_of
 from hfg.graph.structure.naming import need_name
 from hfg.graph.structure.options import ACTIVE, PLAIN, EdgeOptions, NodeOptions, in_group
-from hfg.graph.structure.subgraph import Subgraph, inside
+from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, InnerSource, InnerTarget, Input, Output, ParameterPort, Port, slot
 
-__all__ = ["Enclosed", "declared_box", "dissolve", "enclose"]
+__all__ = ["declared_box", "dissolve", "enclose"]
 
 Do: TypeAlias = Callable[[Change], None]
 End: TypeAlias = SourceEnd | TargetEnd
 
 
-class Enclosed(Subgraph):
-    """A subgraph that was made by grouping nodes; its ports are those that its edges needed."""
-
-
 # --- making ---
 
 
-def declared_box(ports: Mapping[Any, tuple[str, Any]], path: str) -> Enclosed:
+def declared_box(kind: type[Box], ports: Mapping[Any, tuple[str, Any]], path: str) -> Box:
     """Make an empty subgraph with ports of these names, kinds and types.
 
     Raises:
       GraphError: a port cannot be called or typed so.
     """
     for name in ports:
-        if not (isinstance(name, str) and name.isidentifier() and _is_free(name)):
+        if not (isinstance(name, str) and name.isidentifier() and _is_free(name, kind)):
             raise GraphError(f'subgraph "{path}": a port cannot be called {name!r}; choose another name')
     try:
-        return _box_with({name: _declaration(kind, type_) for name, (kind, type_) in ports.items()})
+        return _box_with(kind, {name: _declaration(kind, type_) for name, (kind, type_) in ports.items()})
     except HfgError as error:
         raise GraphError(f'subgraph "{path}": {error}') from error
 
 
-def _box_with(body: dict[str, Any]) -> Enclosed:
-    box: Enclosed = types.new_class("Enclosed", (Enclosed,), exec_body=lambda names: names.update(body))()
+def _box_with(kind: type[Box], body: dict[str, Any]) -> Box:
+    box: Box = types.new_class(kind.__name__, (kind,), exec_body=lambda names: names.update(body))()
     return box
 
 
@@ -89,8 +85,9 @@ def enclose(do: Do, members: Sequence[Node], name: str) -> None:
     crossing = [edge for edge in edges if not {owner_of(edge.source), owner_of(edge.target)} <= inner]
     outwards = ((edge, edge.options) for edge in crossing if owner_of(edge.source) in inner)
     refuse_other_queues(around, outwards, crossing.__contains__, "grouping")
-    ports = _Names(crossing, inner)
-    box = _box_with({port: _declaration(kind, type_) for port, kind, type_ in ports.of.values()})
+    kind = around.whole.box_type
+    ports = _Names(crossing, inner, kind)
+    box = _box_with(kind, {port: _declaration(kind, type_) for port, kind, type_ in ports.of.values()})
     halves = [(edge, around.connections.position(edge), _outer_half(edge, box, ports, inner)) for edge in edges]
     for edge in reversed(edges):
         do(EdgeChange.of(around, edge, added=False, for_good=False))
@@ -105,7 +102,7 @@ def enclose(do: Do, members: Sequence[Node], name: str) -> None:
         do(EdgeChange(within, _inner_half(edge, box, ports, inner), len(within.edges), added=True, for_good=False))
 
 
-def _take_in(do: Do, around: Level, box: Enclosed, name: str, members: Sequence[Node]) -> Level:
+def _take_in(do: Do, around: Level, box: Box, name: str, members: Sequence[Node]) -> Level:
     """Let a new subgraph stand where the first of some nodes stood, and the nodes inside it."""
     position = around.members.position(members[0].place.name)
     places = [(node, node.place.name, node._options, inside(node)) for node in members]
@@ -144,7 +141,7 @@ def _refuse_promoted(around: Level, members: Sequence[Node]) -> None:
 class _Names:
     """One port of the new subgraph for each edge over its border."""
 
-    def __init__(self, crossing: Sequence[Edge], inner: set[Node]) -> None:
+    def __init__(self, crossing: Sequence[Edge], inner: set[Node], box_type: type[Box]) -> None:
         self.inner = inner
         self.of: dict[Edge, tuple[str, str, Any]] = {}  # name, kind, type
         taken: set[str] = set()
@@ -153,7 +150,7 @@ class _Names:
             end = edge.target if inwards else edge.source
             # of a vector each is a port of its own here, and so is the event beside an output
             plain = end.name.replace("[", "_").replace("]", "").replace(".", "_")
-            wanted = plain if _is_free(plain) else f"{plain}_port"
+            wanted = plain if _is_free(plain, box_type) else f"{plain}_port"
             name, number = wanted, 1
             while name in taken:
                 number += 1
@@ -165,17 +162,17 @@ class _Names:
                 kind = "event" if end.kind == "event" else "output"
             self.of[edge] = (name, kind, end.type)
 
-    def port(self, edge: Edge, box: Enclosed) -> Any:  # noqa: ANN401 - of the kind that the edge needs
+    def port(self, edge: Edge, box: Box) -> Any:  # noqa: ANN401 - of the kind that the edge needs
         """Give the bound port of an edge."""
         name, kind, _ = self.of[edge]
         return getattr(box.ports, f"{kind}s")[name]
 
 
-def _is_free(name: str) -> bool:
-    return not hasattr(Subgraph, name) and not name.startswith("_")
+def _is_free(name: str, box_type: type[Box]) -> bool:
+    return not hasattr(box_type, name) and not name.startswith("_")
 
 
-def _outer_half(edge: Edge, box: Enclosed, ports: _Names, inner: set[Node]) -> Edge | None:
+def _outer_half(edge: Edge, box: Box, ports: _Names, inner: set[Node]) -> Edge | None:
     """The part outside keeps what is said about the edge, for the outermost holds (rule G1)."""
     if edge not in ports.of:
         return None
@@ -185,7 +182,7 @@ def _outer_half(edge: Edge, box: Enclosed, ports: _Names, inner: set[Node]) -> E
     return Edge(port, edge.target, edge.options)
 
 
-def _inner_half(edge: Edge, box: Enclosed, ports: _Names, inner: set[Node]) -> Edge:
+def _inner_half(edge: Edge, box: Box, ports: _Names, inner: set[Node]) -> Edge:
     """Initial tokens go to the part at the target, so that what else is led there has none."""
     if edge not in ports.of:
         return edge

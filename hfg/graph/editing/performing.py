@@ -36,6 +36,7 @@ from hfg.graph.editing.copying import copy_of
 from hfg.graph.editing.enclosing import declared_box, dissolve, enclose
 from hfg.graph.editing.making import as_meant, fitting, kept, made
 from hfg.graph.editing.type_texts import type_of_text
+from hfg.graph.structure.adding import add
 from hfg.graph.structure.assigning import move
 from hfg.graph.structure.boundary import GraphInput, GraphOutput
 from hfg.graph.structure.connecting import declare_edge, refuse
@@ -129,10 +130,7 @@ class _Hand:
         around, name = level_and_name(self.root, path)
         groups = self.root.whole.groups
         before = groups.state()
-        try:
-            around.face.add(node, name=name, **options)
-        except TypeError as error:
-            raise GraphError(f'node "{path}": {error}; options are those of graph.add') from error
+        add(around, node, name, options)
         if groups.state() != before:  # by build() of a subgraph
             self.changes.append(GroupsChange(groups, before, groups.state()))
         self.changes.append(NodeChange.of(node, added=True))
@@ -146,7 +144,7 @@ class _Hand:
                         f'subgraph "{command.path}": it has two ports "{name}"; give each a name of its own'
                     )
                 declared[name] = kind, type_of_text(text, f'port "{command.path}.{name}"')
-        self._add_node(declared_box(declared, command.path), command.path, command.options)
+        self._add_node(declared_box(self.root.whole.box_type, declared, command.path), command.path, command.options)
 
     def _remove(self, command: c.Remove) -> None:
         self.take_out(node_at(self.root, command.path))
@@ -227,7 +225,7 @@ class _Hand:
         promoted = around.promotions.copied()
         notes = self.root.whole.notes.get(old, {})
         self.take_out(old)
-        around.face.add(new, name=name, **msgspec.structs.asdict(options))
+        add(around, new, name, msgspec.structs.asdict(options))
         added = NodeChange.of(new, added=True)
         self.changes.append(added)
         moved = NodeChange(around, name, new, added.options, position, added.inside, added=True)

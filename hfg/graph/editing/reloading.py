@@ -13,17 +13,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import CodeType, ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakKeyDictionary
 
 from hfg.errors import GraphError
 from hfg.graph.editing.commands import Replace
-from hfg.graph.structure.subgraph import inside
+from hfg.graph.structure.level import HasLevel, inside, level_of
 from hfg.nodetypes.functions import NodeFunction
 from hfg.nodetypes.node import Node
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
 
 __all__ = ["reloaded"]
 
@@ -32,7 +29,7 @@ _once_known_as: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 
 
 @contextmanager
-def reloaded(graph: Graph, module: str | ModuleType) -> Iterator[list[Replace]]:
+def reloaded(graph: HasLevel, module: str | ModuleType) -> Iterator[list[Replace]]:
     """Run a module's source again and give the commands that let its nodes follow; on an exception all is as before.
 
     Raises:
@@ -98,9 +95,9 @@ def _run(code: CodeType, module: ModuleType) -> None:
         ) from error
 
 
-def _nodes_of(graph: Graph, module: str) -> Iterator[tuple[Node, str]]:
+def _nodes_of(graph: HasLevel, module: str) -> Iterator[tuple[Node, str]]:
     """Give the nodes whose types are of a module, and by what references; not those inside such a subgraph."""
-    waiting = list(graph.nodes.values())
+    waiting = list(level_of(graph).nodes.values())
     while waiting:
         node = waiting.pop(0)
         reference = node._type.reference or _once_known_as.get(node._type.origin)

@@ -11,9 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 from hfg.errors import GraphError
 from hfg.graph.structure.edge import Edge
-from hfg.graph.structure.level import Level
+from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.options import EdgeOptions
-from hfg.graph.structure.subgraph import inside
 from hfg.ports import InnerSource, InnerTarget, Port
 
 __all__ = ["refuse_other_queues"]

@@ -16,17 +16,15 @@ from hfg.base.values import same
 from hfg.encoding import encode
 from hfg.errors import EncodingError, GraphError, HfgError
 from hfg.graph.editing import commands as c
-from hfg.graph.editing.enclosing import Enclosed
 from hfg.graph.editing.performing import perform
 from hfg.graph.editing.type_texts import text_of_type
 from hfg.graph.structure.edge import Edge, is_feed, type_of
-from hfg.graph.structure.level import Level
+from hfg.graph.structure.level import Level, Whole, inside
 from hfg.graph.structure.operators import NamedOperator
 from hfg.graph.structure.options import EdgeOptions, NodeOptions
 from hfg.graph.structure.pointing import parameter_at
 from hfg.graph.structure.promoting import stands_for
-from hfg.graph.structure.subgraph import Subgraph, inside, is_box
-from hfg.graph.structure.whole import Whole
+from hfg.graph.structure.subgraph import is_box, is_unnamed
 from hfg.nodetypes.node import Node
 
 __all__ = ["as_commands"]
@@ -56,7 +54,7 @@ class _Telling:
     def __init__(self, root: Level) -> None:
         self.root = root
         self.commands: list[c.Command] = []
-        self.made = Level(root.name, Whole(root.whole.make_face))
+        self.made = Level(root.name, Whole(root.whole.make_face, root.whole.box_type))
 
     def say(self, command: c.Command) -> None:
         """Say one more.
@@ -112,7 +110,7 @@ class _Telling:
         reference = node._type.reference
         if reference is not None:
             self.say(c.Add(reference, path, _parameters(node), options))
-        elif is_box(node) and type(node).__bases__[0] in (Subgraph, Enclosed) and not node._type.parameters:
+        elif is_box(node) and is_unnamed(node) and not node._type.parameters:
             self.say(_subgraph(node, options))
         else:
             raise GraphError(

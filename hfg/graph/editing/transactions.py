@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -33,10 +32,7 @@ from hfg.graph.editing.performing import perform
 from hfg.graph.editing.reloading import reloaded
 from hfg.graph.flat.flattening import flatten
 from hfg.graph.structure.history import History
-from hfg.graph.structure.level import level_of
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
+from hfg.graph.structure.level import HasLevel, level_of
 
 __all__ = [
     "Transaction",
@@ -61,19 +57,19 @@ class Transaction(msgspec.Struct, frozen=True, eq=False):
     changes: tuple[Change, ...]
 
 
-def history_of(graph: Graph) -> History[Transaction]:
+def history_of(graph: HasLevel) -> History[Transaction]:
     """Give the history of a whole graph."""
     return level_of(graph).whole.history
 
 
-def edit(graph: Graph, commands: Sequence[Command]) -> None:
+def edit(graph: HasLevel, commands: Sequence[Command]) -> None:
     """See `Graph.edit`."""
     _need_rest(graph, "edit")
     history = history_of(graph)
     history.note(prepare(graph, commands))
 
 
-def undo(graph: Graph) -> None:
+def undo(graph: HasLevel) -> None:
     """See `Graph.undo`."""
     _need_rest(graph, "undo")
     history = history_of(graph)
@@ -81,7 +77,7 @@ def undo(graph: Graph) -> None:
     history.undo_done()
 
 
-def redo(graph: Graph) -> None:
+def redo(graph: HasLevel) -> None:
     """See `Graph.redo`."""
     _need_rest(graph, "redo")
     history = history_of(graph)
@@ -90,14 +86,14 @@ def redo(graph: Graph) -> None:
     history.redo_done()
 
 
-def reload(graph: Graph, module: str | ModuleType) -> None:
+def reload(graph: HasLevel, module: str | ModuleType) -> None:
     """See `Graph.reload`."""
     _need_rest(graph, "reload")
     with reloaded(graph, module) as commands:
         edit(graph, commands)
 
 
-def prepare(graph: Graph, commands: Sequence[Command], *, check: bool = True) -> Transaction:
+def prepare(graph: HasLevel, commands: Sequence[Command], *, check: bool = True) -> Transaction:
     """Carry commands out on the graph and check the whole.
 
     Raises:
@@ -119,7 +115,7 @@ def may_break(commands: Sequence[Command]) -> bool:
     return any(isinstance(command, _MAY_BREAK) for command in commands)
 
 
-def _errors(graph: Graph) -> list[Problem]:
+def _errors(graph: HasLevel) -> list[Problem]:
     return [problem for problem in check_flat(flatten(graph)) if problem.severity == "error"]
 
 
@@ -137,7 +133,7 @@ def refuse_new_errors(before: Sequence[Problem], after: Sequence[Problem]) -> No
             raise GraphError(f"the edit is refused, for it would break the graph: {new}")
 
 
-def _need_rest(graph: Graph, what: str) -> None:
+def _need_rest(graph: HasLevel, what: str) -> None:
     level = level_of(graph)
     if level.owner is not None:
         raise UsageError(

@@ -6,18 +6,15 @@ Stands on `structure`, for the nodes, edges and levels it refers to.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 
 from hfg.errors import Problem
 from hfg.graph.structure.edge import Edge
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import HasLevel, Level, level_of
 from hfg.graph.structure.options import GroupSpec, NodeOptions, Overflow
 from hfg.nodetypes.node import Node
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
 
 __all__ = ["LINK", "ROOT", "End", "EndKind", "FlatEdge", "FlatGate", "FlatGraph", "FlatNode", "Scope", "scope_end"]
 
@@ -143,7 +140,7 @@ class FlatGraph(msgspec.Struct, eq=False):
     edges: list[FlatEdge]
     groups: dict[str, GroupSpec]
     gates: list[FlatGate]
-    graph: Graph
+    graph: HasLevel
     findings: list[Problem]
 
     @property

@@ -9,7 +9,7 @@ there.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from reactivex import Observable
 
@@ -17,14 +17,11 @@ from hfg.errors import Problem
 from hfg.graph.flat.flat_graph import ROOT, End, EndKind, FlatEdge, FlatGate, FlatGraph, FlatNode, Scope, scope_end
 from hfg.graph.structure.edge import Edge, SourceEnd, TargetEnd, is_port
 from hfg.graph.structure.gates import Gate
-from hfg.graph.structure.level import Level
+from hfg.graph.structure.level import HasLevel, Level, inside, level_of
 from hfg.graph.structure.options import NodeOptions, in_group
-from hfg.graph.structure.subgraph import inside, iterated
+from hfg.graph.structure.subgraph import iterated
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, ParameterPort, Port
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
 
 __all__ = [
     "ROOT",
@@ -41,9 +38,10 @@ __all__ = [
 ]
 
 
-def flatten(graph: Graph) -> FlatGraph:
+def flatten(graph: HasLevel) -> FlatGraph:
     """Dissolve all subgraphs of a whole graph; the graph stays as it is."""
-    whole = FlatGraph([], [], [], graph.groups, [], graph, [])
+    groups = level_of(graph).whole.groups.by_name
+    whole = FlatGraph([], [], [], groups, [], graph, [])
     waiting = [(whole, "", "loop")]
     while waiting:
         flat, prefix, group = waiting.pop()
@@ -51,7 +49,7 @@ def flatten(graph: Graph) -> FlatGraph:
         for node in reversed(flat.nodes):
             inner = inside(node.node)
             if inner is not None and iterated(node.node):
-                node.iteration = FlatGraph([], [], [], graph.groups, [], inner.face, flat.findings)
+                node.iteration = FlatGraph([], [], [], groups, [], inner.face, flat.findings)
                 waiting.append((node.iteration, f"{node.path}/", node.options.group or "loop"))
         EdgeFollower(flat, levels).collect()
     return whole
@@ -249,7 +247,7 @@ class EdgeFollower:
         if end.node >= 0:
             return f"{self.flat.nodes[end.node].path}.{end.name}"
         if end.node == ROOT:
-            around = self.flat.graph.path
+            around = self.flat.level.path
             return f"{around}.{end.name}" if around else end.name
         return f"{self.flat.scopes[scope_end(end.node)].path}.{end.name}"
 
@@ -292,7 +290,7 @@ class EdgeFollower:
     def _report_border(self, port: Port) -> None:
         self.flat.findings.append(
             Problem(
-                path=self.flat.graph.path or port.path,
+                path=self.flat.level.path or port.path,
                 severity="error",
                 what=f'an edge to or from "{port.path}" crosses the border of a subgraph that iterates',
                 why="only inputs, outputs and parameters do (rule G4)",

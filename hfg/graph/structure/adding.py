@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+
+import msgspec
 
 from hfg.errors import GraphError
 from hfg.graph.structure.fitting import need_fitting
-from hfg.graph.structure.level import Level, level_of, nodes_within
+from hfg.graph.structure.level import Level, inside, level_of, nodes_within
 from hfg.graph.structure.membership import close_box, leave, open_box, settle
 from hfg.graph.structure.naming import need_name, path_of, suggest
 from hfg.graph.structure.options import NodeOptions, node_options
 from hfg.graph.structure.refusals import Refusable
-from hfg.graph.structure.subgraph import Subgraph, inside, is_box
+from hfg.graph.structure.subgraph import Box, is_box
 from hfg.nodetypes.node import Node
 
 __all__ = ["add"]
 
 
-def add(level: Level, node: Node, name: str | None, said: dict[str, object]) -> None:
+def add(level: Level, node: Node, name: str | None, given: Mapping[str, object]) -> None:
     """Add a node; a subgraph builds its inside now.
 
     Args:
       level: where to.
       node: belongs to no graph yet.
       name: None for the next free one of its type.
-      said: its options by name, as in `Graph.add`.
+      given: its options by name, as in `Graph.add`.
 
     Raises:
       GraphError: something about it cannot be; nothing was changed.
@@ -39,6 +41,10 @@ def add(level: Level, node: Node, name: str | None, said: dict[str, object]) -> 
             f'{level.title} has a node "{name}" already; choose another name, or leave name out for the next free one'
         )
     path = level.path_to(name)
+    unknown = next((one for one in given if one not in NodeOptions.__struct_fields__), None)
+    if unknown is not None:
+        raise GraphError(f'node "{path}": there is no option {unknown!r}; options are those of graph.add')
+    said = msgspec.structs.asdict(NodeOptions()) | dict(given)
     said["iterate_over"] = _iterated_inputs(node, path, said["iterate_over"])
     options = NodeOptions()
     with Refusable(path):
@@ -53,14 +59,14 @@ def add(level: Level, node: Node, name: str | None, said: dict[str, object]) -> 
         level.members.count(base, number)
 
 
-def _build(level: Level, node: Subgraph, options: NodeOptions) -> None:
+def _build(level: Level, node: Box, options: NodeOptions) -> None:
     """Let a subgraph make its inside; if that fails, nothing of it remains."""
     groups = level.whole.groups.state()
     try:
         _need_subgraph_options(node, options)
         inner = level.make_inside(node)
         open_box(node, inner)
-        node.build(inner.face)
+        node._build()
     except BaseException:
         level.whole.groups.restore(groups)
         _take_back(level, node)

@@ -6,12 +6,10 @@ Inside the graph an input of the graph is a source and an output a target, so th
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from hfg.ports import EventPort, InputPort, OutputPort, Port, SlotPort
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
+from hfg.ports.base import Owner
 
 __all__ = ["Boundary", "GraphInput", "GraphOutput"]
 
@@ -43,7 +41,7 @@ class Boundary:
 
     __slots__ = ("abort", "inputs", "outputs", "start", "stop")
 
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: Owner) -> None:
         self.start: EventPort[None] = EventPort(graph, "start")
         self.stop: SlotPort[object] = SlotPort(graph, "stop", object)  # these two take any signal
         self.abort: SlotPort[object] = SlotPort(graph, "abort", object)

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from hfg.errors import GraphError
-from hfg.graph.structure.level import Level
+from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.naming import suggest
-from hfg.graph.structure.subgraph import inside, is_box
+from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node
 from hfg.ports import InnerSource, InnerTarget, Port
 

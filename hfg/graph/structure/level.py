@@ -6,31 +6,37 @@ who adds, connects or edits has done that. Stands on the tables of members, conn
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
 
 from hfg.errors import UsageError
 from hfg.graph.structure.boundary import Boundary
 from hfg.graph.structure.connections import Connections
 from hfg.graph.structure.gates import Gates
+from hfg.graph.structure.groups import Groups
+from hfg.graph.structure.history import History
 from hfg.graph.structure.members import Members
 from hfg.graph.structure.naming import path_of
 from hfg.graph.structure.promotions import Promotions
-from hfg.graph.structure.subgraph import Subgraph, inside
-from hfg.graph.structure.whole import Whole
+from hfg.graph.structure.subgraph import Box
 from hfg.nodetypes.node import Node
+from hfg.ports.base import Owner
 
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
-
-__all__ = ["HasLevel", "Level", "level_of", "nodes_within"]
+__all__ = ["HasLevel", "Level", "Whole", "inside", "level_of", "nodes_within"]
 
 
-class HasLevel(Protocol):
-    """A graph, seen from below its face."""
+class HasLevel(Owner, Protocol):
+    """A graph, seen from below its face: `Graph` stands above all that works on levels."""
 
     @property
     def _level(self) -> Level: ...
+
+
+def inside(node: object) -> Level | None:
+    """Give what lies inside a subgraph; None for other nodes, and before it is built."""
+    level = getattr(node, "_level", None) if isinstance(node, Box) else None
+    return level if isinstance(level, Level) else None
 
 
 def level_of(graph: HasLevel) -> Level:
@@ -66,7 +72,7 @@ class Level:
         "whole",
     )
 
-    def __init__(self, name: str, whole: Whole, *, face: Graph | None = None, owner: Subgraph | None = None) -> None:
+    def __init__(self, name: str, whole: Whole, *, face: HasLevel | None = None, owner: Box | None = None) -> None:
         """Begin empty: at the root behind a face that there is already, inside a subgraph with a new one."""
         self.name = name
         self.whole = whole
@@ -83,7 +89,7 @@ class Level:
         self.promotions = Promotions()
         self.nodes, self.edges = self.members.nodes, self.connections.edges
 
-    def make_inside(self, owner: Subgraph) -> Level:
+    def make_inside(self, owner: Box) -> Level:
         """Make the empty inside of a subgraph that is to lie at this level."""
         return Level(self.name, self.whole, owner=owner)
 
@@ -167,3 +173,49 @@ def nodes_within(node: Node) -> Iterator[Node]:
         level = inside(one)
         if level is not None:
             waiting += reversed(level.nodes.values())
+
+
+class Whole:
+    """The part of a graph that there is once, however many subgraphs it has.
+
+    Attributes:
+      root: the outermost level; it writes itself here.
+      make_face: gives the graph that users see of a new level; the face stands above, so it hands this down.
+      box_type: that of subgraphs without a type of their own; it comes from above for the same reason.
+      gated: nodes that have a gate, of which each has at most one (rule A11); written by the levels' `Gates`.
+      run: the run it has, if any; a graph has one at a time.
+      takes_commands: commands are being carried out, which a run follows and the history knows.
+      notes: of editors, by node; None: those about the whole. Nothing else reads them, and they go with their node.
+      history: of edits; what lies on it is the matter of who edits.
+    """
+
+    __slots__ = ("box_type", "gated", "groups", "history", "make_face", "notes", "root", "run", "takes_commands")
+
+    root: Level
+
+    def __init__(self, make_face: Callable[[Level], HasLevel], box_type: type[Box]) -> None:
+        self.make_face = make_face
+        self.box_type = box_type
+        self.groups = Groups()
+        self.gated: set[Node] = set()
+        self.run: object | None = None
+        self.takes_commands = False
+        self.notes: dict[Node | None, dict[str, Any]] = {}
+        self.history: History[Any] = History(lambda: self.root.title)
+
+    def begin_run(self, run: object) -> None:
+        """From now on the structure is changed by commands alone."""
+        self.run = run
+
+    def end_run(self) -> None:
+        """It may be changed by hand again."""
+        self.run = None
+
+    @contextmanager
+    def taking_commands(self) -> Iterator[None]:
+        """Let what is done inside count as done by commands."""
+        before, self.takes_commands = self.takes_commands, True
+        try:
+            yield
+        finally:
+            self.takes_commands = before

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hfg.graph.structure.sequence import Sequence
-from hfg.graph.structure.subgraph import Subgraph, is_box
+from hfg.graph.structure.subgraph import Box, is_box
 from hfg.nodetypes.node import Node
 
 __all__ = ["Members"]
@@ -23,7 +23,7 @@ class Members:
         # How many nodes have the default name of their type: else naming ten thousand of a type would try all names.
         self._counts: dict[str, int] = {}
         self._order: Sequence[Node] | None = None  # from the first edit on, which is to cost what it touches
-        self._boxes: dict[Subgraph, None] = {}  # those among them, once there is an order
+        self._boxes: dict[Box, None] = {}  # those among them, once there is an order
 
     def free_name(self, base: str) -> tuple[str, int]:
         """Give the type's name, or with _2, _3 in order of adding; and the number to `count` once the node is in."""
@@ -47,7 +47,7 @@ class Members:
         return self._order
 
     @property
-    def boxes(self) -> list[Subgraph]:
+    def boxes(self) -> list[Box]:
         """The subgraphs among the nodes."""
         return list(self._boxes) if self.order.items else []
 

@@ -7,9 +7,9 @@ because all other names are its author's. Stands on levels.
 from __future__ import annotations
 
 from hfg.base.values import own_copy
-from hfg.graph.structure.level import Level
+from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.options import NodeOptions
-from hfg.graph.structure.subgraph import inside, is_box
+from hfg.graph.structure.subgraph import is_box
 from hfg.nodetypes.node import Node, Place
 
 __all__ = ["close_box", "leave", "open_box", "place", "set_options", "settle", "write_parameter"]

@@ -5,15 +5,10 @@ Stands on `level`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from hfg.graph.structure.edge import Edge
-from hfg.graph.structure.level import Level, level_of
+from hfg.graph.structure.level import HasLevel, Level, level_of
 from hfg.graph.structure.subgraph import iterated
 from hfg.nodetypes.node import Node
-
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
 
 __all__ = ["edge_place", "home_of", "node_place", "side_of"]
 
@@ -35,7 +30,7 @@ def edge_place(level: Level, edge: Edge) -> tuple[tuple[float, ...], float]:
     return around, level.connections.order.label(edge)
 
 
-def home_of(edge: Edge, graph: Graph) -> Level:
+def home_of(edge: Edge, graph: HasLevel) -> Level:
     """Give the level at which an edge is declared; ports of the whole may be named anywhere."""
     for end in (edge.target, edge.source):
         level: Level | None = getattr(getattr(end, "graph", None), "_level", None)

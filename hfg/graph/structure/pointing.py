@@ -11,9 +11,8 @@ from typing import Any
 from hfg.errors import GraphError
 from hfg.graph.structure.edge import PortEnd
 from hfg.graph.structure.finding import candidates, find, inner_side, split_inner
-from hfg.graph.structure.level import Level
+from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.naming import need_name, suggest
-from hfg.graph.structure.subgraph import inside
 from hfg.nodetypes.node import Node
 from hfg.ports import ParameterPort
 

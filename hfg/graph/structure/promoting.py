@@ -7,9 +7,8 @@ from typing import Any
 
 from hfg.errors import GraphError
 from hfg.graph.structure.edge import end_path
-from hfg.graph.structure.level import Level
+from hfg.graph.structure.level import Level, inside
 from hfg.graph.structure.refusals import Refusable
-from hfg.graph.structure.subgraph import inside
 from hfg.ports import ParameterPort
 from hfg.types import describe, why_not
 

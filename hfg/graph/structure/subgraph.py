@@ -1,47 +1,33 @@
-"""Subgraphs: nodes that hold a graph; their ports are relays between outside and inside (rules G1-G4).
+"""Boxes: nodes that hold a graph; their ports are relays between outside and inside (rules G1-G4).
 
-Stands on `node`; knows graphs and levels by name alone.
+Users know them as `hfg.Subgraph`, which knows `hfg.Graph` and therefore is defined beside it. Stands on node types.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar, Protocol
 
 from typing_extensions import TypeIs
 
-from hfg.errors import UsageError
+from hfg.graph.structure.promotions import Promotions
 from hfg.nodetypes.node import Node
 from hfg.ports import Relaying
 
-if TYPE_CHECKING:
-    from hfg.graph.graph import Graph
-    from hfg.graph.structure.level import Level
-
-__all__ = ["Subgraph", "inside", "is_box", "iterated"]
+__all__ = ["Box", "Inside", "is_box", "is_unnamed", "iterated"]
 
 
-class Subgraph(Node, Relaying):
+class Inside(Protocol):
+    """The level inside a box, as far as the box needs it."""
+
+    promotions: Promotions
+
+    @property
+    def face(self) -> object:
+        """Return the graph that users see of it."""
+
+
+class Box(Node, Relaying):
     """A node that holds a graph.
-
-    Ports are declared as on any node; `.inner` is the side of a port that looks into the box. A slot needs no handler:
-    `begin = hfg.slot(type=int)`. The graph inside is built when the subgraph is added.
-
-    Example:
-      >>> import hfg
-      >>> @hfg.node
-      ... def double(value: int) -> int:
-      ...     return 2 * value
-      >>> class Quadruple(Subgraph):
-      ...     value = hfg.Input(int)
-      ...     result = hfg.Output(int)
-      ...     def build(self, graph: Graph) -> None:
-      ...         first, second = graph.add(double()), graph.add(double())
-      ...         graph.connect(self.value.inner, first.value)
-      ...         first >> second
-      ...         graph.connect(second.out, self.result.inner)
-      >>> box = Graph().add(Quadruple())
-      >>> list(box.graph.nodes)
-      ['double', 'double_2']
 
     Attributes:
       iterate_over: names of inputs that take collections, whose elements the inside sees one by one; the declared types
@@ -51,34 +37,17 @@ class Subgraph(Node, Relaying):
     __slots__ = ("_level",)
 
     iterate_over: ClassVar[tuple[str, ...]] = ()
+    _is_base: ClassVar[bool] = False
 
-    _level: Level  # what lies inside; written by the graph it is added to (`membership`), not there before
+    _level: Inside  # a `Level`; written by the graph it is added to (`membership`), not there before
 
-    def build(self, graph: Graph) -> None:
-        """Add the nodes inside and connect them, also with the inner sides of the subgraph's own ports."""
-
-    @property
-    def graph(self) -> Graph:
-        """The graph inside.
-
-        Raises:
-          UsageError: the subgraph was not added to a graph yet.
-        """
-        level = inside(self)
-        if level is None:
-            raise UsageError(
-                f'subgraph "{self._type.name}" has no graph yet: build() runs when it is added with graph.add(...)'
-            )
-        return level.face
-
-    @property
-    def _graph(self) -> Graph:
-        """The same for floors that ask `hasattr` first: before it is built, the attribute is not there."""
-        return self._level.face
+    def _build(self) -> None:
+        """Make the inside, which is empty."""
+        raise NotImplementedError
 
     def _set_parameter(self, name: str, value: object, *, own: bool = False) -> None:
         """Set it and every parameter inside that it stands for; all of them, or none if one refuses."""
-        level = inside(self)
+        level: Inside | None = getattr(self, "_level", None)
         standing_for = () if level is None else level.promotions.of(name)
         before = self._parameters.get(name)
         super()._set_parameter(name, value, own=own)
@@ -95,19 +64,19 @@ class Subgraph(Node, Relaying):
             raise
 
 
-def is_box(node: object) -> TypeIs[Subgraph]:
+def is_box(node: object) -> TypeIs[Box]:
     """Say whether a node is a subgraph."""
-    return isinstance(node, Subgraph)
+    return isinstance(node, Box)
 
 
-def inside(node: object) -> Level | None:
-    """Give what lies inside a subgraph; None for other nodes, and before it is built."""
-    return getattr(node, "_level", None) if isinstance(node, Subgraph) else None
+def is_unnamed(box: Box) -> bool:
+    """Say whether its class only holds the ports and the inside of this one subgraph."""
+    return "_is_base" in vars(type(box).__bases__[0])
 
 
 def iterated(node: object) -> tuple[str, ...]:
     """Give the names of the inputs that a subgraph iterates over (rule G4); none for other nodes."""
-    if not isinstance(node, Subgraph) or node._options is None:
+    if not isinstance(node, Box) or node._options is None:
         return ()
     names: tuple[str, ...] = node._options.iterate_over
     return names

@@ -12,6 +12,7 @@ from annotated_types import Ge, Gt, Interval
 from hfg.base.clock import elapsed
 from hfg.errors import EndOfStream
 from hfg.graph import Graph
+from hfg.graph.graph import graph_of
 from hfg.graph.structure.level import level_of
 from hfg.nodetypes.node import Node
 from hfg.ports import Event, Input, Output, Parameter, State, slot
@@ -243,7 +244,7 @@ class MemoryCell(Node):
 
     def setup(self) -> None:
         """Join the others."""
-        self.shared = _SHARED.setdefault(level_of(self.place.graph).whole.root.face, _Shared())
+        self.shared = _SHARED.setdefault(graph_of(level_of(self.place.graph).whole.root.face), _Shared())
         self.shared.join(self)
 
     def teardown(self) -> None:

@@ -23,6 +23,7 @@ from hfg.errors import EncodingError, HfgError, RunError
 from hfg.graph import Graph
 from hfg.graph.flat import MAIN, Cutting, FlatGraph
 from hfg.graph.flat.flat_graph import ROOT, FlatEdge
+from hfg.graph.graph import graph_of
 from hfg.graph.structure.edge import Edge as DrawnEdge
 from hfg.nodetypes.node import Node
 from hfg.parts.model.failing import as_error
@@ -112,7 +113,7 @@ class Homes:
         path = end.rpartition(".")[0]
         if path in self._of_path or not path:
             return self.of_path(path)
-        return self.of_node(self._flat.graph[path])
+        return self.of_node(graph_of(self._flat.graph)[path])
 
     def label_of(self, edge: DrawnEdge) -> str:
         """Give the label of what an edge as drawn is in the run; "" if that is not one."""
@@ -165,7 +166,7 @@ class Asking:
         self.cutting = cutting
         self.others = [name for name in cutting.parts if name != MAIN]
         self.composition: Composition
-        self.graph: Graph = flat.graph
+        self.graph: Graph = graph_of(flat.graph)
         self._say = say
         self._numbers = count(1)
         self._open: set[str] = set()

@@ -17,6 +17,7 @@ from hfg.engine.observing.encoding import text
 from hfg.errors import EncodingError, HfgError
 from hfg.graph import Graph
 from hfg.graph.flat import FlatGraph
+from hfg.graph.graph import graph_of
 from hfg.parts.model.failing import codec_of
 from hfg.parts.model.messages import Parcel, Passed, PlainEvent, Sight
 from hfg.ports import Port
@@ -51,7 +52,7 @@ class Crossing:
 
     def draw(self, flat: FlatGraph) -> None:
         """The graph is as it says here from now on."""
-        self._graph: Graph = flat.graph
+        self._graph: Graph = graph_of(flat.graph)
         self._ports: dict[str, Port] = {}
         for one in flat.walk():
             for edge in one.edges:

@@ -21,6 +21,7 @@ from hfg.graph.editing import Transaction, history_of, prepare
 from hfg.graph.editing.changes import Change, undo_all
 from hfg.graph.editing.commands import Command, Copy, encode
 from hfg.graph.flat import MAIN, Cutting, FlatGraph, cut, flatten
+from hfg.graph.graph import graph_of
 from hfg.graph.structure.history import MOST_STEPS
 from hfg.parts.model.redrawing import Concern, concerned
 from hfg.parts.steering.asking import Asking
@@ -57,7 +58,7 @@ class Drawing:
 
     def again(self) -> None:
         """The graph was edited."""
-        graph = self.flat.graph
+        graph = graph_of(self.flat.graph)
         self.flat = flatten(graph)
         self.cutting = cut(self.flat)
         self.text = self.write(graph)
