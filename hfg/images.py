@@ -4,7 +4,7 @@ Images are arrays as OpenCV has them: height x width, or height x width x channe
 red. A wrong kind of pixel is more than untidy: some functions of OpenCV end the whole process for it. So nodes that
 work on images name the kind that they take. Stands on `types`; knows neither OpenCV nor nodes.
 
-Example:
+Examples:
   >>> from hfg.types import why_not
   >>> print(why_not(Depth, Gray))
   an array of float32 is no array of uint8
@@ -47,7 +47,7 @@ __all__ = [
 class Rows(Shape):
     """Metadata of a list of points: one row for each, or, as OpenCV gives them, one row of one column for each.
 
-    Example:
+    Examples:
       >>> Rows(2).accepts((7, 2)), Rows(2).accepts((7, 1, 2)), Rows(2).accepts((7, 3))
       (True, True, False)
     """
@@ -65,7 +65,7 @@ class Rows(Shape):
 class OneOf(Shape):
     """Metadata of an array of one of several shapes.
 
-    Example:
+    Examples:
       >>> OneOf((3,), (3, 1)).accepts((3, 1)), OneOf((3,), (3, 1)).accepts((1, 3))
       (True, False)
     """
@@ -167,7 +167,7 @@ def wrong_image(value: Any, hint: Any) -> str | None:
 def describe_arrays(hint: Any) -> str:
     """Say which arrays are of a type: dtypes and shapes in words.
 
-    Example:
+    Examples:
       >>> print(describe_arrays(Points))
       an array of int32 or float32, any x 2, any x 1 x 2
     """

@@ -32,7 +32,7 @@ def publish(name: str, source: Source[Any], **parameters: Any) -> Publish:
     Raises:
       UsageError: the port belongs to no graph yet, or the name is none.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> from hfg.testing.nodes import script
       >>> graph = hfg.Graph()
@@ -64,7 +64,7 @@ def subscribe(name: str, *targets: Target[Any], **parameters: Any) -> Subscribe:
     Raises:
       UsageError: there is no port, it belongs to no graph yet, or the name is none.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> from hfg.testing.nodes import double
       >>> graph = hfg.Graph()

@@ -68,7 +68,7 @@ class _Box:
 class Timeline:
     """Writes a run as a timeline; give it to a run as its `trace`. The file is whole when the run is over.
 
-    Example:
+    Examples:
       >>> import hfg, json, tempfile, pathlib
       >>> from hfg.testing.nodes import script, sink
       >>> graph = hfg.Graph()

@@ -46,7 +46,7 @@ __all__ = [
 class Shape:
     """Metadata of an array type: one number for each axis, `None` for an axis of any length.
 
-    Example:
+    Examples:
       >>> from typing import Annotated
       >>> Points = Annotated[npt.NDArray[np.float64], Shape(None, 3)]
       >>> accepts(np.zeros((7, 3)), Points), accepts(np.zeros(3), Points)
@@ -101,7 +101,7 @@ class Pixels(Shape):
 class Named:
     """Metadata that says what a type is called in messages and lists; it changes nothing in what fits.
 
-    Example:
+    Examples:
       >>> from typing import Annotated
       >>> describe(Annotated[npt.NDArray[np.float32], Pixels(1), Named("Depth")])
       'Depth'
@@ -565,7 +565,7 @@ class ArrayFacts(NamedTuple):
 def array_facts(hint: Any) -> ArrayFacts | None:
     """Give dtypes and shapes of an array type; None if the hint is none.
 
-    Example:
+    Examples:
       >>> array_facts(Annotated[npt.NDArray[np.uint8 | np.float32], Pixels(1)])
       ArrayFacts(dtypes=(<class 'numpy.uint8'>, <class 'numpy.float32'>), shapes=((None, None), (None, None, 1)))
     """

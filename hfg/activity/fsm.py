@@ -33,7 +33,7 @@ class StateMachine:
       missing: what becomes of a letter for which a state has no transition: it leads to a "dead" state that nothing
         leaves, as rule A13 says, or is "ignore"d.
 
-    Example:
+    Examples:
       >>> door = StateMachine(
       ...     ["closed", "open"],
       ...     [("push", "closed", "open"), ("pull", "open", "closed")],

@@ -18,7 +18,7 @@ _CONTROLS: Final = re.compile(
 def escaped(text: str) -> str:
     r"""Write out what would steer a terminal; ends of lines and tabs stay.
 
-    Example:
+    Examples:
       >>> escaped("a\x1b[2Jb") == "a\\x1b[2Jb"
       True
     """

@@ -65,7 +65,7 @@ def log() -> Logger:
 
     For functions, which have no `self.log`. What a function calls may call it as well.
 
-    Example:
+    Examples:
       >>> def brighten(image: int) -> int:
       ...     log().debug("brightening %s", image)
       ...     return image + 1

@@ -24,7 +24,7 @@ _HEX: Final = re.compile(r"#([0-9a-fA-F]{6}|[0-9a-fA-F]{3})")
 class Colour(NamedTuple):
     """A colour: red, green and blue, 0 to 255 each.
 
-    Example:
+    Examples:
       >>> Colour.of("#ff8000")
       Colour(red=255, green=128, blue=0)
       >>> Colour(255, 128, 0).bgr  # as OpenCV wants it
@@ -62,7 +62,7 @@ class Colour(NamedTuple):
 class Span(NamedTuple, Generic[T]):
     """An interval of numbers, low <= high; as a parameter, limits hold for both ends.
 
-    Example:
+    Examples:
       >>> band = Span(0.2, 0.8)
       >>> 0.5 in band, band.low
       (True, 0.2)

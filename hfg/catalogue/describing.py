@@ -186,7 +186,7 @@ def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any], *, offered
       of: the type.
       offered_by: the module whose category it has, if that is not its own.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> @hfg.node
       ... def half(number: float) -> float:

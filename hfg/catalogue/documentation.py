@@ -48,7 +48,7 @@ class Documentation:
 def read_documentation(doc: str) -> Documentation:
     r"""Read a docstring; what is no Google form is left in its text.
 
-    Example:
+    Examples:
       >>> read = read_documentation("Hold back.\n\nArgs:\n  seconds: how long.\n\nCS::APEX: csapex::Delay.")
       >>> read.summary, read.entries, read.apex
       ('Hold back.', {'seconds': 'how long.'}, ('csapex::Delay',))

@@ -81,7 +81,7 @@ def search(types: Iterable[TypeDescription], words: str) -> list[TypeDescription
     Words count by their stems, and by what means the same; a word in the name counts more than one in the first line,
     that more than one in the rest. Types that have more of the words come first.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> from hfg.catalogue import describe_type
       >>> @hfg.node

@@ -66,7 +66,7 @@ class Live:
 def live_table(wanted: bool = True) -> Iterator[Live]:
     """Keep a table below what is printed inside the block; where there is no terminal for it, nothing happens.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> with live_table() as live:
       ...     report = hfg.run(hfg.Graph(), begin=live.begin)

@@ -149,7 +149,7 @@ def _compiled(hint: Any, wide: bool) -> Codec:
 def wire_problem(hint: Any) -> str | None:
     """Say what of a type cannot cross to another process and why, or None if all its values can.
 
-    Example:
+    Examples:
       >>> print(wire_problem(dict[str, list[int | None]]))
       None
       >>> print(wire_problem(list[Any]))

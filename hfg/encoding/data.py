@@ -81,7 +81,7 @@ def encode(value: Any, hint: Any = Any) -> Any:
     Raises:
       EncodingError: it is no data, or would come back as another value.
 
-    Example:
+    Examples:
       >>> encode({"path": Path("a/b.png"), "frame": Colour(255, 128, 0)}, dict[str, Path | Colour])
       {'path': {'$type': 'path', 'value': 'a/b.png'}, 'frame': {'$type': 'colour', 'value': '#ff8000'}}
       >>> encode(Colour(255, 128, 0), Colour)
@@ -118,7 +118,7 @@ def decode(data: Any, hint: Any = Any, *, where: str = "the value", find: Find |
     Raises:
       EncodingError: it is none; the message says which part, what was expected and found.
 
-    Example:
+    Examples:
       >>> decode(["a.png", "b.png"], tuple[Path, ...])[1].suffix
       '.png'
       >>> decode("red", Colour)
@@ -146,7 +146,7 @@ def read_text(text: str, hint: Any = Any, *, where: str = "the value", find: Fin
     Raises:
       EncodingError: it is none of the type.
 
-    Example:
+    Examples:
       >>> read_text("0.2, 0.8", Span[float]), read_text("a, b", list[str]), read_text("3", str)
       (Span(low=0.2, high=0.8), ['a', 'b'], '3')
     """

@@ -34,7 +34,7 @@ def type_fingerprint(hint: Any) -> str:
     Raises:
       EncodingError: values of this type cannot cross.
 
-    Example:
+    Examples:
       >>> type_fingerprint(int | str) == type_fingerprint(str | int), type_fingerprint(int) == type_fingerprint(float)
       (True, False)
     """
@@ -51,7 +51,7 @@ def difference(hint: Any, theirs: str) -> str | None:
     Raises:
       EncodingError: that is no description of a type.
 
-    Example:
+    Examples:
       >>> print(difference(dict[str, float], description_of(dict[str, list[float]])))
       the value of each key: float here, list of float there
     """

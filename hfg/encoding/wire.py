@@ -78,7 +78,7 @@ class TokenCodec(Generic[T]):
     Raises:
       EncodingError: values of this type cannot cross to another process.
 
-    Example:
+    Examples:
       >>> codec = TokenCodec(dict[str, float])
       >>> metadata, value = codec.encode(Token({"x": 0.5}, 1, stamp=2.0, sequence=7))
       >>> codec.decode(metadata, value)

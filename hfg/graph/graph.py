@@ -53,7 +53,7 @@ class Graph:
 
     While it runs its structure is changed by commands alone (`run.edit`): whatever else would raises `UsageError`.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> from collections.abc import Iterator
       >>> @hfg.node
@@ -476,7 +476,7 @@ class Graph:
           GraphError: one cannot be; the message says which and why.
           UsageError: the graph runs, or is the inside of a subgraph.
 
-        Example:
+        Examples:
           >>> from hfg import Graph, commands
           >>> graph = Graph()
           >>> graph.edit(commands.Add("hfg.testing.nodes:double", "double", options={"max_rate_hz": 5}))
@@ -521,7 +521,7 @@ class Graph:
         Raises:
           GraphError: something cannot be said by commands; the message names it and what to do.
 
-        Example:
+        Examples:
           >>> from hfg import Graph, commands
           >>> from hfg.testing.nodes import double
           >>> graph = Graph()
@@ -593,7 +593,7 @@ class Subgraph(Box):
     Ports are declared as on any node; `.inner` is the side of a port that looks into the box. A slot needs no handler:
     `begin = hfg.slot(type=int)`. The graph inside is built when the subgraph is added.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> @hfg.node
       ... def double(value: int) -> int:

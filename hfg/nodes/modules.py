@@ -51,7 +51,7 @@ def from_module(module: ModuleType, *, only: Collection[str] | None = None) -> F
     Raises:
       DeclarationError: it is no module, or `only` names what it does not have.
 
-    Example:
+    Examples:
       >>> import math
       >>> maths = from_module(math, only=["hypot", "sin"])
       >>> maths.sin()

@@ -167,7 +167,7 @@ def node(
     Raises:
       DeclarationError: what is missing, and the call to write.
 
-    Example:
+    Examples:
       >>> @node
       ... def scale(value: float, *, factor: float = 2.0) -> float:
       ...     return factor * value

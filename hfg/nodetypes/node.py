@@ -63,7 +63,7 @@ class Node:
     `State`); without declared ports the arguments and the return annotation of `process` declare them. A type without
     `process` never fires and lives by its slots. There is no `__init__`: nothing is opened before `setup()`.
 
-    Example:
+    Examples:
       >>> class Count(Node):
       ...     '''Count the values.'''
       ...     def process(self, value: object) -> int:
@@ -184,7 +184,7 @@ class Node:
         node is disabled or torn down. If it returns first, the event `completed` is triggered with what it returned.
         It may trigger events and await anything; outputs belong to firings.
 
-        Example:
+        Examples:
           >>> import asyncio
           >>> class Approach(Node):
           ...     async def do(self) -> str:
@@ -212,7 +212,7 @@ class Node:
           NotRunning: nobody runs the node.
           TypeError: it is no coroutine.
 
-        Example:
+        Examples:
           >>> import asyncio
           >>> class Beacon(Node):
           ...     beat = Event(int)

@@ -21,7 +21,7 @@ class State(Generic[T]):
       factory: makes that value instead. With its item type, `hfg.State(factory=list[int])`, the field needs no
         annotation; a plain `list` does not tell type checkers the item type.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> class Seen(hfg.Node):
       ...     names = hfg.State(factory=dict[str, int])

@@ -136,7 +136,7 @@ class Inputs(Vector[T]):
       optional: the node also fires when some are not connected or hold nothing; the list then holds `default` there.
       default: value for absent inputs; see `optional`.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> class Largest(hfg.Node):
       ...     values = hfg.Inputs(int)
@@ -223,7 +223,7 @@ class Slots(Vector[T]):
       type: type of the values at each slot.
       size: as for `Inputs`.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> class Desk(hfg.Node):
       ...     served = hfg.Event(str)

@@ -54,7 +54,7 @@ def segment_name(realm: str, agent: str, incarnation: int, output: str) -> str:
     Raises:
       SharedMemoryError: a part of it has other characters than letters, digits and "_".
 
-    Example:
+    Examples:
       >>> segment_name("robots", "arm", 3, "camera_image")
       'hfg-robots-arm-3-camera_image'
     """

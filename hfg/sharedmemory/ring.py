@@ -109,7 +109,7 @@ class Ring:
     Raises:
       SharedMemoryError: there is no shared memory, no room in it, or one of that name.
 
-    Example:
+    Examples:
       >>> from hfg.sharedmemory import segment_name
       >>> ring = Ring(segment_name("docs", "here", os.getpid(), "image"), slots=2, slot_size=2**20)
       >>> image = ring.loan((480, 640), np.uint8)

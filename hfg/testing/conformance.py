@@ -120,7 +120,7 @@ def replay(build: Any, events: Iterable[TraceEvent], *, until_s: float | None = 
     Raises:
       Divergence: at the first event that the rules do not explain.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> from hfg.testing.nodes import script, sink
       >>> graph, trace = hfg.Graph(), []

@@ -57,7 +57,7 @@ def parse(line: str, values: Mapping[str, Any] | None = None) -> list[Step]:
     Raises:
       ValueError: at a character that means nothing.
 
-    Example:
+    Examples:
       >>> parse("1-(+a)|")
       [Step(tick=0, value=1, activity=0), Step(tick=2, value='a', activity=1), Step(tick=3, value=END, activity=0)]
     """
@@ -107,7 +107,7 @@ def _meaning(letter: str, values: Mapping[str, Any], line: str, place: int) -> t
 def draw(steps: list[Step], values: Mapping[str, Any] | None = None) -> str:
     """Write a line; what has no character of its own becomes "?".
 
-    Example:
+    Examples:
       >>> draw(parse("1-(+a)|"))
       '1-(+a)|'
     """
@@ -256,7 +256,7 @@ def check(node: Node, expected: Mapping[str, str], **how: Any) -> None:
     Raises:
       AssertionError: showing both lines, one below the other.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> class Relay(hfg.Node):
       ...     heard = hfg.Event(int)

@@ -101,7 +101,7 @@ def explore(
       ScheduleFailure: with the shortest of the schedules that fail.
       UsageError: there is nothing to explore.
 
-    Example:
+    Examples:
       >>> from hfg.testing.nodes import double, script, sink
       >>> def build() -> Graph:
       ...     graph = hfg.Graph()

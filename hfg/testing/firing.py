@@ -91,7 +91,7 @@ def fire(
       UsageError: an input is missing or unknown, or an output was written twice; it is no node, or no hook of one.
       TypeError: the result does not fit the outputs, or a value its port.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> class Door(hfg.Node):
       ...     steps = hfg.State(0)

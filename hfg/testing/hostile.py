@@ -104,7 +104,7 @@ class Hostile:
       seed: the same seed gives the same values.
       guards: whether arrays are placed before pages that cannot be touched.
 
-    Example:
+    Examples:
       >>> Hostile("7", guards=False).value(Literal["fast"])
       'fast'
     """

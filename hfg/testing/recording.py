@@ -26,7 +26,7 @@ E = TypeVar("E", bound=TraceEvent)
 class Recorder(list[TraceEvent]):
     """A list of trace events that can be given to a run as `trace=`.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> from hfg.testing.nodes import script, sink
       >>> graph, seen = hfg.Graph(), Recorder()

@@ -2,7 +2,7 @@
 
 What fails is shrunk to a small graph whose `repr` is the program that builds it.
 
-Example:
+Examples:
   >>> from hypothesis import given
   >>> @given(graphs(), schedules())
   ... def test_no_token_is_lost(build, seed): ...

@@ -84,7 +84,7 @@ def try_type(
       NotUsable: a result of another type than declared, an error that is not declared, or no firing at all that went
         well.
 
-    Example:
+    Examples:
       >>> @hfg.node
       ... def half(number: int) -> float:
       ...     '''Halve a number.'''

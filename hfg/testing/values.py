@@ -93,7 +93,7 @@ def values_of(
       hypothesis.errors.ResolutionFailed: when values are drawn: nobody knows how to make one. Tell Hypothesis, by
         `register_type_strategy`.
 
-    Example:
+    Examples:
       >>> from typing import Annotated, Literal
       >>> from annotated_types import Interval
       >>> from hypothesis import given
@@ -111,7 +111,7 @@ def values_of(
 def values_of_parameter(spec: ParameterSpec, *, alike: Alike | None = None) -> st.SearchStrategy[Any]:
     """Give a strategy for the values that a parameter allows.
 
-    Example:
+    Examples:
       >>> from annotated_types import Ge
       >>> from hypothesis import given
       >>> @given(values_of_parameter(ParameterSpec("width", int, 3, (Ge(1),))))

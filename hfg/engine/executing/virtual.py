@@ -112,7 +112,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     Attributes:
       watchers: called with the seconds when time has passed, before anything that is due then.
 
-    Example:
+    Examples:
       >>> async def main() -> float:
       ...     await asyncio.sleep(3600)
       ...     return asyncio.get_running_loop().time()

@@ -365,7 +365,7 @@ def encode(commands: Iterable[Command]) -> str:
     Raises:
       GraphError: a value is no data.
 
-    Example:
+    Examples:
       >>> encode([Connect("camera.out", "show.value", active=True)])
       '[{"do":"Connect","source":"camera.out","target":"show.value","active":true}]'
     """

@@ -118,7 +118,7 @@ def operator(function: Callable[P, Operator]) -> OperatorFunction[P]:
     Raises:
       DeclarationError: it is no function.
 
-    Example:
+    Examples:
       >>> from reactivex import operators as ops
       >>> operator(ops.debounce)(0.2)
       debounce(0.2)

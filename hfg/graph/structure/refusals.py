@@ -48,7 +48,7 @@ def raise_refusals() -> Iterator[None]:
 class Refusable:
     """Around what a graph may refuse; `ends` are what the path of the finding is made of.
 
-    Example:
+    Examples:
       >>> with keep_refusals() as problems:
       ...     with Refusable("a.out", "b.in"):
       ...         raise GraphError("types do not fit; put a node between them")

@@ -29,7 +29,7 @@ class Background(Node):
       at_most: how many values are under way at once.
       done: what `work` gave back for a value.
 
-    Example:
+    Examples:
       >>> class Upload(Background):
       ...     '''Bring pictures to a server.'''
       ...     async def work(self, value: bytes) -> int:

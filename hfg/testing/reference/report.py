@@ -67,7 +67,7 @@ def reference_run(
       RuntimeError: after `max_moves` moves the run is not over.
       UsageError: it is no graph.
 
-    Example:
+    Examples:
       >>> import hfg
       >>> from hfg.testing.nodes import script, sink
       >>> graph = hfg.Graph()

@@ -31,7 +31,7 @@ def escape(name: str) -> str:
     Raises:
       TransportError: it has an empty chunk.
 
-    Example:
+    Examples:
       >>> escape("arm/what?"), escape("größe/50 %")
       ('arm/what%3F', 'größe/50 %25')
     """
@@ -43,7 +43,7 @@ def escape(name: str) -> str:
 def unescape(key: str) -> str:
     """Give back the name that was escaped.
 
-    Example:
+    Examples:
       >>> unescape("arm/what%3F")
       'arm/what?'
     """
