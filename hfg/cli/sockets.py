@@ -6,15 +6,13 @@ Stands on `show` and `engine.face.watching`.
 from __future__ import annotations
 
 import contextlib
-import socket
 from collections.abc import Iterator, Sequence
 from typing import Final
 
 import msgspec
 
-from hfg.base.private import is_of_this_user
 from hfg.cli import show
-from hfg.engine.face.watching import Answer, Question, folder, sockets
+from hfg.engine.face.watching import Answer, Question, run_names, run_sockets
 from hfg.engine.observing.encoding import encode
 from hfg.errors import TargetError
 
@@ -33,21 +31,15 @@ class Line:
 
     def __init__(self, name: str) -> None:
         self._pid = name
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.settimeout(_PATIENCE_S)
-        file = folder() / f"{name}.sock"
-        try:
-            self._socket.connect(str(file))
-        except OSError as error:
-            self._socket.close()
-            if isinstance(error, TimeoutError):
+        with contextlib.closing(run_sockets()) as there:
+            try:
+                connected = there.connect(name) if is_process(name) else None
+            except BlockingIOError:
                 raise TargetError(f"process {name} does not answer: a node blocks its loop") from None
-            if isinstance(error, ConnectionRefusedError):
-                file.unlink(missing_ok=True)  # its process died without taking it away
-            raise TargetError(_nothing_runs(name)) from None
-        if not is_of_this_user(self._socket):
-            self._socket.close()
-            raise TargetError(f"{file} is a socket of another user: remove it")
+        if connected is None:
+            raise TargetError(_nothing_runs(name))
+        self._socket = connected
+        self._socket.settimeout(_PATIENCE_S)
         self._heard = b""
         self._asked = False
 
@@ -107,7 +99,9 @@ def runs() -> list[Answer]:
     Sockets that dead processes have left are removed.
     """
     found = []
-    for name in sockets(folder()):
+    with contextlib.closing(run_sockets()) as there:
+        names = run_names(there)
+    for name in names:
         with contextlib.suppress(TargetError), Line(name) as line:
             answer = line.ask(Question("name")) or Answer(graph="(does not answer)")
             found.append(msgspec.structs.replace(answer, pid=int(name.partition("-")[0]), name=name))

@@ -61,7 +61,7 @@ def test_line_works_as_written(command: Command, line: list[str], monkeypatch: p
     Path("robot.py").write_text(ROBOT, encoding="utf-8")
     Path("my_robot").mkdir()
     Path("my_robot", "graphs.py").write_text(ROBOT.replace("def build", "def fetch"), encoding="utf-8")
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(Path.cwd()))
+    monkeypatch.setenv("XDG_STATE_HOME", str(Path.cwd()))
     program, *arguments = line[: line.index("|")] if "|" in line else line
     assert program == "hfg"
     if "robot.hfg.yaml" in arguments[:2]:

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 import hfg
+from hfg.base.private import MACHINE
 from hfg.cli import sockets, top
 from hfg.cli.sockets import Line, runs
 from hfg.engine.face import watching
@@ -34,11 +35,11 @@ def ticks() -> Iterator[int]:
 
 @pytest.fixture(autouse=True)
 def place(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Give a folder for sockets; its name is short, as sockets want it."""
+    """Give a folder for sockets."""
     made = Path(tempfile.mkdtemp(prefix="hfg"))
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(made))
+    monkeypatch.setenv("XDG_STATE_HOME", str(made))
     monkeypatch.setattr(top, "_BETWEEN_S", 0.01)
-    yield made / "hfg"
+    yield made / "hfg" / f"runs-{MACHINE}"
     shutil.rmtree(made)
 
 
@@ -126,7 +127,7 @@ def test_nothing_runs(command: Command, arguments: tuple[str, ...], sentence: st
 
 
 def test_what_a_dead_process_left_is_removed(command: Command, place: Path) -> None:
-    watching.folder()
+    watching.run_sockets().close()
     for pid in (5, 6):
         with socket.socket(socket.AF_UNIX) as dead:
             dead.bind(str(place / f"{pid}.sock"))
@@ -163,16 +164,16 @@ def test_a_run_that_blocks_its_loop_is_waited_for(command: Command, monkeypatch:
 @pytest.mark.parametrize(
     "question", [b"nonsense\n", b'{"want":"everything"}\n', b'{"want":"name","more":1}\n', b"[]\n", b"\xff\n"]
 )
-def test_a_question_that_makes_no_sense_gets_an_error(question: bytes) -> None:
+def test_a_question_that_makes_no_sense_gets_an_error(place: Path, question: bytes) -> None:
     with running(), socket.socket(socket.AF_UNIX) as stranger:
         stranger.settimeout(5)
-        stranger.connect(str(watching.folder() / f"{os.getpid()}.sock"))
+        stranger.connect(str(place / f"{os.getpid()}.sock"))
         stranger.sendall(question)
         assert b'{"error":"the question cannot be understood' in stranger.recv(1000)
 
 
 @pytest.mark.asyncio
-async def test_who_knocks_at_the_very_moment_a_run_ends_is_seen_out() -> None:
+async def test_who_knocks_at_the_very_moment_a_run_ends_is_seen_out(place: Path) -> None:
     """The loop hears of the knock and of the end in one pass, of the end first: what it has let in then is not lost."""
     loop, over, graph = asyncio.get_running_loop(), asyncio.Event(), hfg.Graph("ticking")
     graph.add(ticks(), max_rate_hz=50)
@@ -181,8 +182,7 @@ async def test_who_knocks_at_the_very_moment_a_run_ends_is_seen_out() -> None:
             stranger.settimeout(5)
             async with asyncio.timeout(5):
                 async with watching.watched(run, "ticking.py"):
-                    (door,) = watching.sockets(watching.folder()).values()
-                    stranger.connect(str(door))
+                    stranger.connect(str(place / f"{os.getpid()}.sock"))
                     loop.call_soon(over.set)
                     await over.wait()
             assert stranger.recv(1) == b""
@@ -190,10 +190,10 @@ async def test_who_knocks_at_the_very_moment_a_run_ends_is_seen_out() -> None:
 
 
 @pytest.mark.parametrize("noise", [b"x" * 5000, b'{"want":"glance"}\n' * 5])
-def test_whoever_talks_too_much_is_shown_the_door(noise: bytes) -> None:
+def test_whoever_talks_too_much_is_shown_the_door(place: Path, noise: bytes) -> None:
     with running(), socket.socket(socket.AF_UNIX) as stranger:
         stranger.settimeout(5)
-        stranger.connect(str(watching.folder() / f"{os.getpid()}.sock"))
+        stranger.connect(str(place / f"{os.getpid()}.sock"))
         stranger.sendall(noise)
         with suppress(ConnectionResetError):
             assert stranger.recv(1000) == b""
@@ -216,6 +216,7 @@ def test_only_so_many_may_look_at_once() -> None:
 def test_a_folder_that_others_could_enter_is_not_used(
     command: Command, place: Path, wrong: str, caplog: pytest.LogCaptureFixture
 ) -> None:
+    place.parent.mkdir()
     if wrong == "a file":
         place.write_text("")
     elif wrong == "a link":
@@ -226,30 +227,26 @@ def test_a_folder_that_others_could_enter_is_not_used(
         place.chmod(0o755)
     shown = command("top")
     assert (shown.code, shown.err.count("\n")) == (2, 1)
-    assert "must be a folder of yours that others cannot enter" in shown.err
+    sentence = "can be entered by others: write chmod 700" if wrong == "open to others" else "cannot be used"
+    assert f"in which hfg top and hfg tap find runs, {sentence}" in shown.err
     with caplog.at_level("INFO", "hfg.engine"), running():
         pass  # a run goes on all the same
     assert "hfg top cannot look at this run" in caplog.text
 
 
-def test_without_a_runtime_folder_there_is_one_below_the_temporary_ones(
-    place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("XDG_RUNTIME_DIR")
-    monkeypatch.setattr(tempfile, "tempdir", str(place.parent))
-    assert watching.folder() == place.parent / f"hfg-{os.geteuid()}"
-    assert watching.folder().stat().st_mode & 0o777 == 0o700
+def test_the_path_of_the_folder_may_be_longer_than_a_socket_s(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(place.parent / ("x" * 120)))
+    with running():
+        assert [answer.graph for answer in runs()] == ["ticking"]
 
 
-def test_a_path_too_long_for_a_socket_does_not_stop_a_run(
-    place: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    long = place.parent / ("x" * 120)
-    long.mkdir()
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(long))
-    with caplog.at_level("INFO", "hfg.engine"), running():
-        pass
-    assert "too long" in caplog.text
+def test_a_folder_made_without_a_umask_is_for_its_user_only(place: Path) -> None:
+    before = os.umask(0)
+    try:
+        watching.run_sockets().close()
+    finally:
+        os.umask(before)
+    assert [one.stat().st_mode & 0o777 for one in (place, place.parent)] == [0o700, 0o700]
 
 
 def test_a_run_of_the_command_opens_a_door_on_the_real_clock_only(command: Command, place: Path) -> None:

@@ -20,6 +20,7 @@ from typing import Any
 import pytest
 
 import hfg
+from hfg.base.private import MACHINE
 from hfg.cli import top
 from hfg.cli.sockets import Line, runs
 from hfg.engine.face.watching import Question
@@ -31,12 +32,12 @@ needs_sockets = pytest.mark.skipif(not hasattr(socket, "AF_UNIX"), reason="there
 
 @pytest.fixture(autouse=True)
 def place(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Give a folder for sockets; its name is short, as sockets want it."""
+    """Give a folder for sockets."""
     made = Path(tempfile.mkdtemp(prefix="hfg"))
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(made))
+    monkeypatch.setenv("XDG_STATE_HOME", str(made))
     monkeypatch.delenv("HFG_WATCH", raising=False)
     monkeypatch.setattr(top, "_BETWEEN_S", 0.01)
-    yield made / "hfg"
+    yield made / "hfg" / f"runs-{MACHINE}"
     shutil.rmtree(made)
 
 

@@ -1,4 +1,4 @@
-"""How other processes look at a run: a Unix domain socket for each, in a folder that belongs to the user alone.
+"""How other processes look at a run: a Unix domain socket for each, in a folder that only the user can enter.
 
 `<folder>/<process id>.sock` is there while the run is; a second run of a process has `<process id>-2.sock`. One line
 of JSON asks and one answers: {"want": "name"} or {"want": "glance"}; {"want": "tap", "path": ...} is answered by a
@@ -13,25 +13,23 @@ import contextlib
 import os
 import re
 import socket
-import stat
 import sys
-import tempfile
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
-from pathlib import Path
+from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Final, Literal
 
 import msgspec
 
 from hfg.base.logs import Log
-from hfg.base.private import is_of_this_user
+from hfg.base.private import MACHINE, is_of_this_user, state_folder
+from hfg.base.sockets import SocketFolder
 from hfg.engine.face.run import Run
 from hfg.engine.observing.encoding import encode, line_of
 from hfg.engine.observing.glance import Glance
 from hfg.engine.observing.taps import Tap
-from hfg.errors import HfgError, TargetError
+from hfg.errors import HfgError, TargetError, TransportError
 
-__all__ = ["Answer", "Door", "Question", "folder", "sockets", "watched"]
+__all__ = ["Answer", "Door", "Question", "run_names", "run_sockets", "watched"]
 
 _LOGGER = Log("hfg.engine")
 _LONGEST_QUESTION: Final = 1024
@@ -75,37 +73,22 @@ class Answer(msgspec.Struct, frozen=True, omit_defaults=True):
     name: str = ""
 
 
-def folder() -> Path:
-    """Where the sockets of this user are; made if need be.
+def run_sockets() -> SocketFolder:
+    """Open the folder with the sockets of this user's runs; it is created if needed.
 
     Raises:
-      TargetError: there is none that belongs to this user alone.
+      TargetError: it is not a folder that only this user can enter.
     """
-    if not hasattr(socket, "SO_PEERCRED"):
-        raise TargetError(
-            "runs cannot be looked at from other processes here: that needs Unix domain sockets whose ends the system "
-            "can tell the user of (SO_PEERCRED)"
-        )
-    own = os.environ.get("XDG_RUNTIME_DIR")
-    place = Path(own, "hfg") if own and Path(own).is_dir() else Path(tempfile.gettempdir(), f"hfg-{os.geteuid()}")
     try:
-        with contextlib.suppress(FileExistsError):
-            place.mkdir(mode=0o700)
-        found = place.lstat()  # not what a link leads to: somebody else may have put it there
-    except OSError as error:
-        raise TargetError(f"{place}, the folder for sockets of runs, cannot be used: {error.strerror}") from None
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o077:
-        raise TargetError(
-            f"{place}, the folder for sockets of runs, must be a folder of yours that others cannot enter: "
-            f"remove it, or write chmod 700 {place}"
-        )
-    return place
+        return SocketFolder(state_folder() / f"runs-{MACHINE}", "in which hfg top and hfg tap find runs")
+    except TransportError as error:
+        raise TargetError(f"runs of other processes cannot be found here: {error}") from None
 
 
-def sockets(place: Path) -> dict[str, Path]:
-    """What lies there for each run; nothing else in the folder is ours."""
-    found = {file.stem: file for file in place.glob("*.sock") if _ID.fullmatch(file.stem) and file.is_socket()}
-    return dict(sorted(found.items(), key=lambda item: [int(part) for part in item[0].split("-")]))
+def run_names(there: SocketFolder) -> list[str]:
+    """Return the name of each run that has a socket in a folder, in order of process ids."""
+    found = [name for name in there.names() if _ID.fullmatch(name)]
+    return sorted(found, key=lambda name: [int(part) for part in name.split("-")])
 
 
 class Door:
@@ -157,61 +140,37 @@ async def watched(run: Run, watch: bool | str) -> AsyncIterator[None]:
     if watch is False:
         yield
         return
-    server: asyncio.Server | None = None
-    file: Path | None = None
-    door: Door | None = None
-    try:
-        file, listening = _listen()
-        door = Door(run, sys.argv[0] if watch is True else watch, file.stem)
-        server = await asyncio.get_running_loop().create_unix_server(lambda: _Guest(door), sock=listening)
-    except (TargetError, OSError) as error:
-        _LOGGER.info("hfg top cannot look at this run: %s", error)
-    try:
-        yield
-    finally:
-        if file is not None:
-            file.unlink(missing_ok=True)
-        if server is not None and door is not None:
-            # First nobody more is let in: a server that is closed loses whom it has let in but not made a connection
-            # of yet (asyncio asserts that it is open), and the door would wait for that guest for ever.
-            asyncio.get_running_loop().remove_reader(listening)
-            await door.close()
-            server.close()
-
-
-def _listen() -> tuple[Path, socket.socket]:
-    """A socket that listens, under its name only when it does: so who is refused there can be removed."""
-    runs_here = folder()
-    there = sockets(runs_here)
-    for other in there.values():
-        _remove_if_dead(other)
-    own, number = str(os.getpid()), 1
-    while (name := own if number == 1 else f"{own}-{number}") in there and there[name].exists():
-        number += 1
-    file = runs_here / f"{name}.sock"
-    new = file.with_suffix(".new")
-    new.unlink(missing_ok=True)
-    listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
-        listening.bind(str(new))
-        listening.listen(_MOST_GUESTS)
-        new.rename(file)
-    except OSError:
-        listening.close()
-        new.unlink(missing_ok=True)
-        raise
-    return file, listening
-
-
-def _remove_if_dead(file: Path) -> None:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as knocking:
-        knocking.setblocking(False)
+    async with AsyncExitStack() as stack:
         try:
-            knocking.connect(str(file))
-        except ConnectionRefusedError:
-            file.unlink(missing_ok=True)
-        except OSError:
-            pass  # alive and busy, or gone by now
+            there = stack.enter_context(contextlib.closing(run_sockets()))
+            name, listening = _listen(there)
+            door = Door(run, sys.argv[0] if watch is True else watch, name)
+            server = await asyncio.get_running_loop().create_unix_server(lambda: _Guest(door), sock=listening)
+            stack.push_async_callback(_close, server, listening, door)
+            stack.callback(there.remove, name)
+        except (HfgError, OSError) as error:
+            _LOGGER.info("hfg top cannot look at this run: %s", error)
+        yield
+
+
+async def _close(server: asyncio.Server, listening: socket.socket, door: Door) -> None:
+    # First nobody more is let in: a server that is closed loses whom it has let in but not made a connection
+    # of yet (asyncio asserts that it is open), and the door would wait for that guest for ever.
+    asyncio.get_running_loop().remove_reader(listening)
+    await door.close()
+    server.close()
+
+
+def _listen(there: SocketFolder) -> tuple[str, socket.socket]:
+    """Return the name of a run of this process, and a socket that listens under it; removes those of dead processes."""
+    for other in run_names(there):
+        with contextlib.suppress(BlockingIOError):  # it is alive and busy
+            if connected := there.connect(other):
+                connected.close()
+    own, number, taken = str(os.getpid()), 1, set(there.names())
+    while (name := own if number == 1 else f"{own}-{number}") in taken:
+        number += 1
+    return name, there.listen(name, _MOST_GUESTS)
 
 
 class _Guest(asyncio.Protocol):

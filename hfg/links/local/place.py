@@ -1,8 +1,6 @@
 """The folder in which programs of one user meet: a socket for each of them, and a secret that all of them read.
 
-Only its user can enter the folder, which is checked each time it is opened. Sockets are reached through the handle that
-was checked, so a folder that is exchanged later leads nobody astray, and paths may have any length.
-Depends on `hfg.base.private`.
+The secret is made by whoever comes first. Depends on `hfg.base.sockets`.
 """
 
 from __future__ import annotations
@@ -17,7 +15,8 @@ import stat
 from pathlib import Path
 from typing import Final
 
-from hfg.base.private import MACHINE, is_of_this_user, open_private, state_folder
+from hfg.base.private import MACHINE, state_folder
+from hfg.base.sockets import SocketFolder
 from hfg.errors import TransportError
 
 __all__ = ["NAME_SIZE", "Place", "user_folder"]
@@ -27,7 +26,7 @@ NAME_SIZE: Final = 8
 
 _SECRET: Final = "secret"
 _SECRET_SIZE: Final = 32
-_SOCKET: Final = re.compile(r"s-([0-9a-f]{16})")
+_SESSION: Final = re.compile(r"[0-9a-f]{16}")
 _PENDING: Final = 16  # connections that the system keeps while the event loop is busy
 
 
@@ -50,7 +49,7 @@ class Place:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._handle = open_private(folder)
+        self._sockets = SocketFolder(folder)
         try:
             self.secret = self._read_secret()
         except BaseException:
@@ -59,14 +58,11 @@ class Place:
 
     def close(self) -> None:
         """Leave it."""
-        if self._handle >= 0:
-            os.close(self._handle)
-            self._handle = -1
+        self._sockets.close()
 
     def names(self) -> list[bytes]:
         """Return the names of all sessions that have a socket here, including those whose process was killed."""
-        found = (_SOCKET.fullmatch(one.name) for one in os.scandir(self._handle))
-        return [bytes.fromhex(one[1]) for one in found if one]
+        return [bytes.fromhex(one) for one in self._sockets.names() if _SESSION.fullmatch(one)]
 
     def listen(self, name: bytes) -> socket.socket:
         """Return a socket that listens under a name; it has the name only once it listens.
@@ -74,16 +70,7 @@ class Place:
         Raises:
           TransportError: the folder is gone, or the disk is full.
         """
-        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
-        new = f"n-{name.hex()}"
-        try:
-            listening.bind(self._path(new))
-            listening.listen(_PENDING)
-            os.rename(new, f"s-{name.hex()}", src_dir_fd=self._handle, dst_dir_fd=self._handle)
-        except OSError as error:
-            listening.close()
-            raise TransportError(f"no socket can be made in {self.folder}: {error.strerror}") from None
-        return listening
+        return self._sockets.listen(name.hex(), _PENDING)
 
     def connect(self, name: bytes) -> socket.socket | None:
         """Return a connection to a session of this user; None if there is no such session, or none any more.
@@ -91,34 +78,17 @@ class Place:
         Raises:
           BlockingIOError: the other is too busy to accept one now.
         """
-        connected = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
-        try:
-            connected.connect(self._path(f"s-{name.hex()}"))
-            if is_of_this_user(connected):
-                return connected
-        except BlockingIOError:
-            connected.close()
-            raise
-        except ConnectionRefusedError:
-            self.remove(name)  # its process was killed
-        except OSError:
-            pass
-        connected.close()
-        return None
+        return self._sockets.connect(name.hex())
 
     def remove(self, name: bytes) -> None:
         """Remove the socket of a session."""
-        with contextlib.suppress(OSError):
-            os.unlink(f"s-{name.hex()}", dir_fd=self._handle)
-
-    def _path(self, name: str) -> str:
-        return f"/proc/self/fd/{self._handle}/{name}"
+        self._sockets.remove(name.hex())
 
     def _read_secret(self) -> bytes:
         """Return the secret; the first to come makes it."""
         for _ in range(2):
             try:
-                handle = os.open(_SECRET, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=self._handle)
+                handle = os.open(_SECRET, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=self._sockets.handle)
             except FileNotFoundError:
                 self._make_secret()
                 continue
@@ -137,12 +107,18 @@ class Place:
         new = f"{_SECRET}-{secrets.token_hex(8)}"
         try:
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-            with os.fdopen(os.open(new, flags, 0o600, dir_fd=self._handle), "wb") as file:
+            with os.fdopen(os.open(new, flags, 0o600, dir_fd=self._sockets.handle), "wb") as file:
                 file.write(secrets.token_bytes(_SECRET_SIZE))
             with contextlib.suppress(FileExistsError):  # somebody else was first
-                os.link(new, _SECRET, src_dir_fd=self._handle, dst_dir_fd=self._handle, follow_symlinks=False)
+                os.link(
+                    new,
+                    _SECRET,
+                    src_dir_fd=self._sockets.handle,
+                    dst_dir_fd=self._sockets.handle,
+                    follow_symlinks=False,
+                )
         except OSError as error:
             raise TransportError(f"{self.folder / _SECRET} cannot be written: {error.strerror}") from None
         finally:
             with contextlib.suppress(OSError):
-                os.unlink(new, dir_fd=self._handle)
+                os.unlink(new, dir_fd=self._sockets.handle)

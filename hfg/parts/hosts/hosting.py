@@ -18,6 +18,7 @@ from typing import Any, Final
 
 import msgspec
 
+from hfg.base.private import open_private, state_folder
 from hfg.errors import TransportError
 from hfg.parts.hosts.realm import Chunk, Deploy, Missing, Start, run_id
 from hfg.parts.processes.launching import Begun, PartProcess, beat_of
@@ -163,8 +164,7 @@ def _find(name: str, where: list[str], *, is_top: bool) -> importlib.machinery.M
 
 def logs_folder() -> Path:
     """Give where the agents of this user keep what parts have written."""
-    own = os.environ.get("XDG_STATE_HOME")
-    return (Path(own) if own else Path.home() / ".local" / "state") / "hfg" / "logs"
+    return state_folder() / "logs"
 
 
 class Journal:
@@ -184,10 +184,10 @@ class Journal:
         """Make the folder, and let go of what is old.
 
         Raises:
-          TransportError: it cannot be made.
+          TransportError: it cannot be made, or other users can enter or replace it.
         """
+        os.close(open_private(self._folder, "in which an agent keeps the output of parts"))
         try:
-            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             old = sorted(self._folder.glob("*.log*"), key=lambda file: file.stat().st_mtime)[:-_MOST_LOGS]
             for file in old:
                 file.unlink(missing_ok=True)

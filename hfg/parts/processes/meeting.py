@@ -3,7 +3,7 @@
 However a run ends, its folder goes: by `leave`, or `leave_all` where the process ends without a teardown; by the end of
 the interpreter where nobody comes to either; by a part that sees that the main one was killed, and if that had no
 other process yet, by the next run on this machine. Who lives holds a lock on the folder, so that no other run takes it
-for one that was left. Stands on `clocks`.
+for one that was left. Depends on `clocks` and `hfg.base.sockets`.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import weakref
 from pathlib import Path
 from typing import ClassVar, Final
 
+from hfg.base.sockets import SOCKET_FILE
 from hfg.parts.model.clocks import machine
 
 if sys.platform != "win32":
@@ -29,7 +30,7 @@ __all__ = ["MeetingPlace", "remove"]
 _MACHINE: Final = hashlib.blake2b(machine().encode(), digest_size=4).hexdigest()
 _PREFIX: Final = f"hfg-meet-{_MACHINE}-"  # a lock may be of one machine, and the directory of several
 _NAME: Final = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")
-_HOLDS: Final = re.compile(r"secret(-[0-9a-f]+)?|[sn]-[0-9a-f]+")  # what sessions make in it
+_SECRET: Final = re.compile(r"secret(-[0-9a-f]+)?")  # which sessions make in it, beside their sockets
 _YOUNG_S: Final = 60.0  # a folder so young may belong to who has not come to lock it yet
 
 
@@ -78,7 +79,7 @@ def remove(folder: Path) -> None:
     """Remove what is ours in it, and it, if nothing else is."""
     with contextlib.suppress(OSError):
         for file in folder.iterdir():
-            if _HOLDS.fullmatch(file.name) is not None:
+            if _SECRET.fullmatch(file.name) or SOCKET_FILE.fullmatch(file.name):
                 file.unlink(missing_ok=True)
         folder.rmdir()
 
@@ -87,7 +88,10 @@ def _sweep(place: Path) -> None:
     """Remove the folders in `place` whose runs are over; what cannot be looked at is not ours."""
     if sys.platform == "win32":
         return  # where such sockets are not, nor locks of folders
-    for folder in place.iterdir():
+    folders: list[Path] = []
+    with contextlib.suppress(PermissionError):  # users may be allowed to make folders there, but not to list them
+        folders = list(place.iterdir())
+    for folder in folders:
         if _NAME.fullmatch(folder.name) is None:
             continue
         with contextlib.suppress(OSError):

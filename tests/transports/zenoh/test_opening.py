@@ -205,3 +205,91 @@ def test_a_client_without_a_certificate_is_refused(certificates: Certificates) -
                 zenoh.open(config)
     finally:
         agent.close()
+
+
+# --- who may be at the other end, and who knows the keys
+
+
+@pytest.mark.rule("L5")
+@pytest.mark.parametrize("mode", ["router", "client", "peer"])
+@pytest.mark.parametrize("name", ["listen", "meet", "agents", "connect"])
+def test_a_socket_in_a_folder_that_others_can_enter_is_refused_wherever_it_is_named(
+    tmp_path: Path, name: str, mode: str
+) -> None:
+    """Zenoh asks nobody who he is, so another user could listen at an address to which this program connects."""
+    tmp_path.chmod(0o755)
+    fields: dict[str, Any] = {name: (f"unixsock-stream/{tmp_path}/agent.sock",), "insecure": False}
+    said = refusal(mode, **fields)
+    assert f"{tmp_path}, of the socket" in said
+    assert f"can be entered by others: write chmod 700 {tmp_path}; insecure = true trusts all of them" in said
+
+
+@pytest.mark.rule("L5")
+def test_a_socket_in_a_folder_that_others_can_replace_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "private").mkdir(mode=0o700)
+    tmp_path.chmod(0o777)
+    said = refusal(insecure=False, connect=(f"unixsock-stream/{tmp_path}/private/agent.sock",))
+    assert f"other users can replace folders in {tmp_path}; write chmod go-w {tmp_path}" in said
+
+
+@pytest.mark.rule("L5")
+def test_a_socket_in_a_folder_that_is_not_there_yet_is_refused(tmp_path: Path) -> None:
+    """Who makes the folder first would decide who listens there."""
+    said = refusal("router", insecure=False, agents=(f"unixsock-stream/{tmp_path}/none/agent.sock",))
+    assert f"{tmp_path}/none: No such file or directory; write mkdir -m 700 {tmp_path}/none" in said
+
+
+@pytest.mark.rule("L5")
+def test_insecure_sockets_are_logged_at_each_start(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    tmp_path.chmod(0o755)
+    address = f"unixsock-stream/{tmp_path}/agent.sock"
+    open_session(settings(agents=(address,)), "router").close()
+    assert f'insecure: nobody proves who he is at "{address}"' in caplog.text
+
+
+@pytest.mark.rule("L5")
+@pytest.mark.parametrize(
+    ("name", "mode", "sentence"),
+    [
+        ("worker.key", 0o644, "tls.key: other users can read or change {file}; write chmod 600 {file}"),
+        (
+            "authority.pem",
+            0o666,
+            "tls.authority: other users can change {file}, and so decide whom this program trusts",
+        ),
+    ],
+)
+def test_files_of_certificates_that_others_can_use_or_change_are_refused(
+    tmp_path: Path, name: str, mode: int, sentence: str
+) -> None:
+    mine = Certificates(tmp_path)
+    (tmp_path / name).chmod(mode)
+    said = refusal(connect=(f"tls/localhost:{free_port()}",), tls=mine.tls("worker"))
+    assert sentence.format(file=tmp_path / name) in said
+
+
+def test_a_port_that_takes_connections_and_says_nothing_may_be_crowded(
+    taken: int, tmp_path: Path, certificates: Certificates
+) -> None:
+    key = tmp_path / "cell.key"
+    key.write_text("x" * 40)
+    key.chmod(0o600)
+    address = (f"tls/127.0.0.1:{taken}",)
+    ways: list[dict[str, Any]] = [{"key": str(key)}, {"tls": certificates.tls("worker")}]
+    for way in ways:
+        said = refusal(connect=address, **way)
+        assert "that port takes connections, but has not answered yet; that computer is busy, or somebody opens" in said
+
+
+@pytest.mark.rule("L5")
+def test_connections_that_say_nothing_keep_nobody_out() -> None:
+    """Zenoh itself admits a hundred at a time, and closes a port for others while so many are pending."""
+    port = free_port()
+    agent = open_session(settings(listen=(f"tcp/127.0.0.1:{port}",)), "router")
+    mute = [socket.create_connection(("127.0.0.1", port)) for _ in range(150)]
+    try:
+        open_session(settings(connect=(f"tcp/127.0.0.1:{port}",)), "client", wait_s=4.0).close()
+    finally:
+        for one in mute:
+            one.close()
+        agent.close()

@@ -80,6 +80,14 @@ def test_peers_that_meet_listen_beside_the_address_at_which_they_meet() -> None:
     assert rest == list(both)
 
 
+@pytest.mark.rule("L5")
+@pytest.mark.parametrize("options", ["#enable_mtls=false", "#verify_name_on_connect=false", "?rel=1"])
+def test_options_of_zenoh_in_an_address_cannot_switch_proofs_off(options: str) -> None:
+    (problem,) = problems_of(Settings(listen=(f"tls/127.0.0.1:1{options}",), key="cell.key"))
+    assert "could switch off that both ends prove who they are" in problem.what
+    assert problem.remedy == 'write "tls/127.0.0.1:1"'
+
+
 def test_all_findings_come_at_once_with_their_lines(tmp_path: Path) -> None:
     text = """\
 reallm = "x"

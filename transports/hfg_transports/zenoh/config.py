@@ -20,6 +20,8 @@ LONG: Final = 256 * 1024
 _BATCHES: Final = 16
 """Of 64 KiB that wait in each priority. With two, as it comes, a burst of tokens finds no room and is dropped, and each
 that is dropped costs its link a round trip; with sixteen 100,000 puts in a row lost none."""
+_MOST_SESSIONS: Final = 1000
+_ACCEPT_MS: Final = 5000
 _RETRY: Final = {"period_init_ms": 50, "period_max_ms": 250, "period_increase_factor": 2}
 _ROOM: Final = 64 * 1024
 """What Zenoh adds to a message: the key, lengths."""
@@ -45,6 +47,10 @@ def configuration(settings: Settings, mode: Mode, *, wait_s: float) -> dict[str,
         "connect/retry": _RETRY,
         # Of one attempt: one whose bytes are swallowed is given up as soon as a neighbour would be, and tried again.
         "transport/unicast/open_timeout": max(1000, int(settings.lease_s * 1000)),
+        # Connections that say nothing must not keep others out: as many may be pending as there may be sessions.
+        "transport/unicast/accept_pending": _MOST_SESSIONS,
+        "transport/unicast/max_sessions": _MOST_SESSIONS,
+        "transport/unicast/accept_timeout": max(_ACCEPT_MS, int(settings.lease_s * 1000)),
         "transport/link/tx/lease": int(settings.lease_s * 1000),
         "transport/link/tx/queue/size": dict.fromkeys(_PRIORITIES, _BATCHES),
         # Declarations are not dropped: one to somebody who stands still would hold the loop for five seconds.

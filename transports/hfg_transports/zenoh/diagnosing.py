@@ -2,7 +2,7 @@
 
 Whatever the reason, Zenoh says "Unable to connect ... Timeout!" for nobody listening, for a host without a name, and
 for every certificate that does not fit. So after the failure the same way is tried once more with Python's own TLS,
-which knows the reason, on both ends: the other one says by an alert what it dislikes. Stands on settings.
+which knows the reason, on both ends: the other one says by an alert what it dislikes. Depends on settings and keys.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ import ssl
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from hfg.base.private import exposure_of_key, may_be_changed
+from hfg_transports.zenoh.keys import authority_of_key
 from hfg_transports.zenoh.settings import Tls
 
 __all__ = ["Reason", "files_that_do_not_fit", "why_unreachable"]
@@ -33,15 +35,29 @@ class Reason(NamedTuple):
     remedy: str
 
 
+_CROWDED: Final = Reason(
+    "that port takes connections, but has not answered yet",
+    "that computer is busy, or somebody opens many connections there: try again, and if it stays so, let its firewall "
+    "admit only your hosts",
+)
+
+
 def files_that_do_not_fit(tls: Tls) -> Reason | None:
     """Look at the files of the certificates, which Zenoh reads when it connects and says nothing about."""
     for name in ("authority", "certificate", "key"):
         file = Path(getattr(tls, name))
         try:
-            with file.open("rb"):
-                pass
+            with file.open("rb") as stream:
+                found = os.fstat(stream.fileno())
         except OSError as error:
             return Reason(f"tls.{name}: {file} cannot be read: {error.strerror}", f"correct the path, or {_NEW_KEYS}")
+        if name == "key" and (exposure := exposure_of_key(file, found)):
+            return Reason(f"tls.key: {exposure[0]}", exposure[1])
+        if name == "authority" and may_be_changed(found):
+            return Reason(
+                f"tls.authority: other users can change {file}, and so decide whom this program trusts",
+                f"write chown {os.geteuid()} {file}; chmod go-w {file}",
+            )
     try:
         ssl.create_default_context(cafile=tls.authority)
     except ssl.SSLError:
@@ -57,8 +73,14 @@ def files_that_do_not_fit(tls: Tls) -> Reason | None:
     return None
 
 
-def why_unreachable(address: str, tls: Tls | None, *, has_key: bool = False) -> Reason:
-    """Say why a session could not connect to an address."""
+def why_unreachable(address: str, tls: Tls | None, key: str = "") -> Reason:
+    """Say why a session could not connect to an address.
+
+    Args:
+      address: where.
+      tls: the certificates, if there are any.
+      key: the file of the key, if there is one instead.
+    """
     protocol, _, rest = address.partition("/")
     place = rest.partition("?")[0].partition("#")[0]
     if protocol == "unixsock-stream":
@@ -69,8 +91,8 @@ def why_unreachable(address: str, tls: Tls | None, *, has_key: bool = False) -> 
         with socket.create_connection((host, int(port)), timeout=_PATIENCE_S) as connection:
             if protocol == "tls" and tls is not None:
                 return _handshake(connection, host, tls)
-            if protocol == "tls" and has_key:
-                return Reason("somebody listens there who has not our key", "take the same file for key = ... there")
+            if protocol == "tls" and key:
+                return _handshake_with_key(connection, key)
             return Reason("somebody listens there, but does not speak Zenoh without TLS", "is it TLS (tls/...)?")
     except socket.gaierror:
         return Reason(f'there is no host "{host}"', "correct the name")
@@ -98,15 +120,37 @@ def _handshake(connection: socket.socket, host: str, tls: Tls) -> Reason:
     context = ssl.create_default_context(cafile=tls.authority)
     context.load_cert_chain(tls.certificate, tls.key)
     try:
-        with context.wrap_socket(connection, server_hostname=host) as secure:
-            secure.recv(1)  # in TLS 1.3 who dislikes the certificate says so after the handshake
+        secure = context.wrap_socket(connection, server_hostname=host)
     except ssl.SSLCertVerificationError as error:
         return _about_theirs(error, host)
     except ssl.SSLError as error:
         return _about_ours(error.reason or str(error))
     except TimeoutError:
+        return _CROWDED
+    try:
+        with secure:
+            secure.recv(1)  # in TLS 1.3 who dislikes the certificate says so after the handshake
+    except ssl.SSLError as error:
+        return _about_ours(error.reason or str(error))
+    except TimeoutError:
         return Reason("the certificates fit, but nobody speaks Zenoh there", "is it the port of an hfg agent?")
     return Reason("the certificates fit, but the connection was closed", "is the agent's realm full, or stopping?")
+
+
+def _handshake_with_key(connection: socket.socket, key: str) -> Reason:
+    """Say what is wrong with whoever listens; proving that we have the key, too, is not needed for that."""
+    connection.settimeout(_PATIENCE_S)
+    context = ssl.create_default_context(cadata=authority_of_key(key))
+    context.check_hostname = False
+    try:
+        context.wrap_socket(connection).close()
+    except ssl.SSLCertVerificationError:
+        return Reason("somebody listens there who has not our key", "take the same file for key = ... there")
+    except ssl.SSLError as error:
+        return _about_ours(error.reason or str(error))
+    except TimeoutError:
+        return _CROWDED
+    return Reason("somebody listens there who has our key, but did not answer in time", _CROWDED.remedy)
 
 
 def _about_theirs(error: ssl.SSLCertVerificationError, host: str) -> Reason:

@@ -14,13 +14,14 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from hfg.base.private import exposure_of_key
 from hfg.errors import TransportError
 
 if TYPE_CHECKING:
     from cryptography import x509
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
 
-__all__ = ["SHORTEST", "key_of", "tls_of_key"]
+__all__ = ["SHORTEST", "authority_of_key", "key_of", "tls_of_key"]
 
 SHORTEST: Final = 32
 """Bytes of a key. What others can guess proves nothing, and they can try as often as they like."""
@@ -48,11 +49,22 @@ def key_of(file: str) -> bytes:
         raise TransportError(
             f"key: {file} cannot be read: {error.strerror}; correct the path, or {_MAKE_ONE}"
         ) from None
-    if found.st_mode & 0o077:
-        raise TransportError(f"key: other users can read or change {file}; write chmod 600 {file}")
+    if exposure := exposure_of_key(file, found):
+        raise TransportError(f"key: {'; '.join(exposure)}")
     if len(key) < SHORTEST:
         raise TransportError(f"key: {file} has {len(key)} bytes, and at least {SHORTEST} are needed; {_MAKE_ONE}")
     return key
+
+
+def authority_of_key(file: str) -> str:
+    """Return the certificate of the authority that a key makes, as PEM.
+
+    Raises:
+      TransportError: the key cannot be used.
+    """
+    from cryptography.hazmat.primitives import serialization
+
+    return _certificates(key_of(file))[0].public_bytes(serialization.Encoding.PEM).decode()
 
 
 def tls_of_key(file: str) -> dict[str, Any]:

@@ -6,18 +6,17 @@ Blocks until a client has found its agent, so it is called in a thread. Stands o
 from __future__ import annotations
 
 import json
-import os
 import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from hfg.base.logs import log
-from hfg.base.private import check_parents
+from hfg.base.private import check_parents, check_private
 from hfg.errors import TransportError
 from hfg_transports.zenoh import binding
 from hfg_transports.zenoh.config import configuration, listens, targets
-from hfg_transports.zenoh.diagnosing import files_that_do_not_fit, why_unreachable
+from hfg_transports.zenoh.diagnosing import Reason, files_that_do_not_fit, why_unreachable
 from hfg_transports.zenoh.keys import key_of
 from hfg_transports.zenoh.settings import Mode, Settings, open_addresses, problems_of
 
@@ -56,9 +55,14 @@ def open_session(settings: Settings | None = None, mode: Mode = "peer", *, wait_
         raise TransportError(f"{reason.what}; {reason.remedy}")
     if settings.key:
         key_of(settings.key)
-    for address in (*settings.listen, *settings.meet):
-        _need_private(address, settings)
-    if exposed := open_addresses(settings):
+    exposed = open_addresses(settings)
+    for address in (*settings.listen, *settings.meet, *settings.agents, *settings.connect):
+        if (reason := _exposed_socket(address)) is None:
+            continue
+        if not settings.insecure:
+            raise TransportError(f"{reason.what}; {reason.remedy}")
+        exposed.append(address)
+    if exposed:
         log().warning(
             "insecure: nobody proves who he is at %s, so whoever can connect there can run code as this user",
             " and ".join(f'"{address}"' for address in exposed),
@@ -75,22 +79,25 @@ def open_session(settings: Settings | None = None, mode: Mode = "peer", *, wait_
     return session
 
 
-def _need_private(address: str, settings: Settings) -> None:
-    """Refuse a socket in a folder that other users can enter."""
+def _exposed_socket(address: str) -> Reason | None:
+    """Say why other users could be at one of the ends of a local socket; None if they cannot, or it is none.
+
+    Zenoh asks neither end who the other is, so only a folder that no other user can enter keeps others away: from who
+    listens there, and from who connects.
+    """
     protocol, _, place = address.partition("/")
-    if protocol != "unixsock-stream" or settings.insecure:
-        return
-    folder = Path(place).parent
+    if protocol != "unixsock-stream":
+        return None
+    folder, purpose = Path(place).parent, f'of the socket "{address}"'
     try:
-        found = folder.stat()
-        check_parents(folder)
+        check_private(folder, folder.stat(), purpose)
+        check_parents(folder, purpose)
     except OSError as error:
-        raise TransportError(f'"{address}" cannot be used: {folder}: {error.strerror}') from None
-    if found.st_uid != os.geteuid() or found.st_mode & 0o077:
-        raise TransportError(
-            f'"{address}": other users can enter {folder}, and could steer this computer: write chmod 700 {folder}, or '
-            "insecure = true if all of them are to be trusted"
-        )
+        remedy = f"write mkdir -m 700 {folder}" if isinstance(error, FileNotFoundError) else "name another folder"
+        return Reason(f'"{address}" cannot be used: {folder}: {error.strerror}', remedy)
+    except TransportError as error:
+        return Reason(f"other users could steer this computer: {error}", "insecure = true trusts all of them")
+    return None
 
 
 def _wait_for_somebody(session: zenoh.Session, settings: Settings, wait_s: float) -> None:
@@ -126,6 +133,6 @@ def _unreachable(settings: Settings, mode: Mode) -> str:
     """Say why, for each address."""
     parts = []
     for address in targets(settings, mode):
-        reason = why_unreachable(address, settings.tls, has_key=bool(settings.key))
+        reason = why_unreachable(address, settings.tls, settings.key)
         parts.append(f'cannot connect to "{address}": {reason.what}; {reason.remedy}')
     return " / ".join(parts)

@@ -301,6 +301,9 @@ def _wrong_address(name: str, address: str, settings: Settings, *, tls_broken: b
     if found is None:
         return [_problem(name, f'"{address}" is no address', 'write "protocol/host:port", as in tls/arm.local:7447')]
     protocol, place = found["protocol"], found["place"]
+    if found["rest"]:
+        what = f'"{address}" ends in options of Zenoh, which could switch off that both ends prove who they are'
+        return [_problem(name, what, f'write "{protocol}/{place}"')]
     if protocol not in _PROTOCOLS:
         return [_problem(name, f'"{address}": "{protocol}" is not spoken here', f"take {', '.join(_PROTOCOLS)}")]
     if protocol == "unixsock-stream":
