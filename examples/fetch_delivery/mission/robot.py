@@ -272,7 +272,7 @@ def build(
         graph.connect(world.scan[number], robot.scan)
         graph.connect(world.message, robot.message)
         graph.connect(world.front[number], robot.front)
-        graph.connect(world.basket[number], robot.basket)
+        graph.connect(world.basket[number], robot.basket, overflow="latest")  # only the newest picture matters
         graph.connect(robot.command, world.command[number])
         graph.connect(robot.lamp, world.lamp[number])
         graph.connect(robot.report, world.report[number])

@@ -37,7 +37,7 @@ def process_borders(flat: FlatGraph) -> Iterator[Problem]:
 
 
 def _rings_across(flat: FlatGraph, crossing: set[int]) -> Iterator[Problem]:
-    """Cycles of `wait` edges that cross a link, where nobody sees that all of it stands still (rule F8)."""
+    """Yield an error for each cycle of `wait` edges that crosses a link: no process sees all of it (rule F8)."""
     waiting = [
         edge
         for edge in flat.edges
@@ -53,9 +53,10 @@ def _rings_across(flat: FlatGraph, crossing: set[int]) -> Iterator[Problem]:
         if across is not None:
             yield Problem(
                 path=across.label,
-                severity="hint",
+                severity="error",
                 what="a ring of edges whose queues wait leads through another process",
-                why="if they all wait for each other, a queue grows only once no process of the run moves (rule F8)",
-                remedy='let one process have all of its nodes, or say overflow="latest" or another that does not wait',
+                why="if they all wait for each other, no process can see that its queues must grow (rule F8)",
+                remedy='run all nodes of the ring in one group, or give an edge of it overflow="latest", "drop_oldest", '
+                '"drop_newest" or "error"',
                 check="process-border",
             )
