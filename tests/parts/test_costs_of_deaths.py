@@ -181,7 +181,7 @@ def test_check_says_what_a_death_costs(tmp_path: Path) -> None:
 
 def test_whoever_reads_of_a_promise_about_deaths_finds_its_test() -> None:
     root = Path(__file__).parents[2]
-    section = (root / "docs/links.md").read_text("utf-8").partition("## What is promised about deaths")[2]
+    section = (root / "docs/links.md").read_text("utf-8").partition("## Promises about deaths")[2]
     rows = re.findall(r"^\| (?!promise|---)(.+?) \| `(.+?)::(.+?)` \|$", section, re.MULTILINE)
     assert len(rows) > 10
     for promise, file, name in rows:
