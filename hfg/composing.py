@@ -1,6 +1,6 @@
-"""What stands on an upper floor and is asked for on a lower one: put in its place here, imported when it is used.
+"""Functions of a higher layer that a lower layer calls: registered here, imported on first use.
 
-`run.record` and `run.report_page` belong to a run, and what does them stands on the engine. Stands on both.
+`run.record` and `run.report_page` belong to a run, but their implementation depends on the engine. Depends on both.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ __all__: list[str] = []
 
 
 def _record(*arguments: Any, **options: Any) -> Any:
-    """Stand behind `Run.record`, which has the types; who records nothing imports nothing of what that needs."""
+    """Implement `Run.record`, which has the types; its dependencies are imported only if a run is recorded."""
     from hfg.recording import record
 
     return record(*arguments, **options)
 
 
 def _report_page(*arguments: Any, **options: Any) -> Any:
-    """Stand behind `Run.report_page`, in the same way."""
+    """Implement `Run.report_page` in the same way."""
     from hfg.reporting import report_page
 
     return report_page(*arguments, **options)
@@ -39,7 +39,7 @@ def _report_page(*arguments: Any, **options: Any) -> Any:
 def _distribute(
     graph: Graph, flat: FlatGraph, options: Mapping[str, Any], virtual: bool, settings: str | None
 ) -> Distribution:
-    """Stand behind `Composition.distribute`; who has no processes imports nothing of what they need."""
+    """Implement `Composition.distribute`; its dependencies are imported only if there are processes."""
     from hfg.parts.distribution import distribute
 
     return distribute(graph, flat, options, virtual=virtual, settings=settings)
@@ -48,7 +48,7 @@ def _distribute(
 def _refusal(
     references: Iterable[str], values: Iterable[str], types: Iterable[str], allow: Iterable[str]
 ) -> str | None:
-    """Stand behind `commands.Rule`: they are as a graph file in the working directory."""
+    """Implement `commands.Rule`: return why a graph file in the working directory could not use these."""
     from hfg.encoding import find_reference
     from hfg.errors import EncodingError
     from hfg.files.allowed import Allowed
@@ -57,7 +57,7 @@ def _refusal(
     allowed = Allowed(Path("commands").absolute(), allow, 'hfg.commands.decode(..., allow=["{top}"])')
 
     def of_node(reference: str) -> str | None:
-        file = file_of(reference)  # commands have no other word for a file that is included
+        file = file_of(reference)  # commands have no other name for a file that is included
         if file is not None and file.is_absolute() and file.resolve().is_relative_to(allowed.project):
             return None
         return allowed.refusal_of_reference(reference)
@@ -69,7 +69,7 @@ def _refusal(
         try:
             return allowed.refusal_of_value(reference, find_reference(reference))
         except EncodingError:
-            return None  # there is none, which is told where it is applied
+            return None  # there is no such file, which is reported where it is used
 
     found = itertools.chain(map(of_node, references), map(of_value, values), map(allowed.refusal_of_type, types))
     return next(filter(None, found), None)

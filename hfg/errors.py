@@ -1,16 +1,16 @@
-"""Everything hfg raises: one tree, one sentence each.
+"""All exceptions of hfg, in one tree.
 
     HfgError
     ├── DeclarationError      a node type cannot be what it says (raised where it is declared)
     ├── GraphError            the structure is wrong (raised where it is built, or by a check)
     │   ├── ConnectionError   an edge that rules P1-P9 refuse
     │   └── CheckFailed       a check found errors; `problems` holds all of them
-    ├── MachineError          what is no state machine, as a description or a graph; `problems` holds all that is wrong
+    ├── MachineError          a description or a graph that is not a state machine; `problems` lists everything wrong
     ├── UsageError            a call at the wrong moment (a port outside a run, a second run, ...)
-    │   └── NotRunning        the run that the call needs has not begun or is over
-    ├── EncodingError         a value that is no data, or data that is no value of the type it should be
-    ├── SharedMemoryError     shared memory that is full, gone, not announced or not to be had here
-    ├── FileError             a graph file without a graph, a graph that no file can say; `problems` holds all of it
+    │   └── NotRunning        the run that the call needs has not started or is over
+    ├── EncodingError         a value that cannot be data, or data that is not a value of its type
+    ├── SharedMemoryError     shared memory that is full, gone, not announced or unavailable here
+    ├── FileError             a graph file without a graph, or a graph that no file can hold; see `problems`
     ├── TargetError           a TARGET of the command line that cannot be found or imported
     ├── RunError              a run that did not end well
     │   ├── NodeError         a node's own code failed; `__cause__` is its exception (rule X1)
@@ -19,15 +19,15 @@
     │   ├── Aborted           the graph's slot `abort` was called (rule A10)
     │   ├── QueueLimit        a queue would have grown over its `capacity_limit` (rule F8)
     │   └── TeardownError     nodes failed while they were torn down (rule X3)
-    ├── TransportError        a transport cannot do what it is asked: closed, no way to the other side, ...
+    ├── TransportError        a transport cannot do what was asked: closed, no route to the other side, ...
     │   ├── MessageTooLarge   more bytes than it carries at once
-    │   ├── NoAnswer          a question that nobody answers, or not in time
-    │   └── QueryRefused      a question whose answer is a refusal; the text says why
+    │   ├── NoAnswer          no answer to a question, or not in time
+    │   └── QueryRefused      the answer to a question is a refusal; the text says why
     ├── QueueOverflow         policy `error`: the queue is full, nothing of the trigger was sent (rule P5)
-    ├── EndOfStream           raised *by* a node to say that it has ended (rule F2)
+    ├── EndOfStream           raised *by* a node to end its stream (rule F2)
     └── EngineInternalError   a fault of hfg, never of the user
 
-A class exists when somebody would catch it apart from its neighbours. Each message names the path in the graph, what
+There is a class for each error that you may want to catch separately. Each message names the path in the graph, what
 was expected, what was found, and what to do.
 """
 
@@ -73,16 +73,16 @@ __all__ = [
 ]
 
 SEVERITIES: Final = ("error", "warning", "hint")
-"""The worst first."""
+"""The most severe first."""
 
 
 class Problem(msgspec.Struct, frozen=True):
-    """One finding of `graph.check()`.
+    """One problem found by `graph.check()`.
 
     Attributes:
-      path: the node, port or edge it is about.
-      severity: a run refuses graphs with an "error"; a "warning" is only told, for what does not work as it is drawn;
-        a "hint" is for what may be meant so.
+      path: path of the node, port or edge.
+      severity: "error": the graph cannot run. "warning": the graph does not work as drawn; reported, but it runs.
+        "hint": it may be intended.
       what: the fact, in a few words.
       why: the rule or the consequence.
       remedy: what to do.
@@ -100,11 +100,11 @@ class Problem(msgspec.Struct, frozen=True):
         return f'{self.severity} at "{self.path}": {self.what}: {self.why}; {self.remedy}'
 
 
-_SHOWN = 20  # findings of a check that a message lists
+_SHOWN = 20  # problems of a check that a message lists
 
 
 class HfgError(Exception):
-    """Whatever hfg raises on purpose."""
+    """Base of all exceptions that hfg raises on purpose."""
 
 
 class DeclarationError(HfgError):
@@ -123,7 +123,7 @@ class CheckFailed(GraphError):
     """A check found errors; nothing was started.
 
     Attributes:
-      problems: every finding, warnings too, in the order of the check.
+      problems: every problem, including warnings, in the order of the check.
     """
 
     def __init__(self, problems: Sequence[Problem]) -> None:
@@ -137,10 +137,10 @@ class CheckFailed(GraphError):
 
 
 class MachineError(HfgError):
-    """What should be a state machine is none: a description, a dict or a region of a graph.
+    """Not a state machine: a description, a dict or a region of a graph.
 
     Attributes:
-      problems: every finding, errors first.
+      problems: every problem, errors first.
     """
 
     def __init__(self, sentence: str, problems: Sequence[Problem]) -> None:
@@ -148,16 +148,16 @@ class MachineError(HfgError):
         count = "1 finding" if len(self.problems) == 1 else f"{len(self.problems)} findings"
         lines = [f"  {problem}" for problem in self.problems[:_SHOWN]]
         if len(self.problems) > _SHOWN:
-            lines.append(f"  ... and {len(self.problems) - _SHOWN} more: the error's problems hold them all")
+            lines.append(f"  ... and {len(self.problems) - _SHOWN} more: the error's problems lists them all")
         super().__init__("\n".join([f"{sentence}, {count}:", *lines]))
 
 
 class FileError(HfgError):
-    """A graph file says no graph, or a graph holds what no file can say; nothing was made or written.
+    """A graph file does not describe a graph, or a file cannot hold part of a graph; nothing was made or written.
 
     Attributes:
-      problems: every finding, with its file and line, in their order.
-      wants: the modules that the file would import and may not, as `allow` names them.
+      problems: every problem, with its file and line, in order.
+      wants: the modules that the file would import but may not, in the form that `allow` takes.
     """
 
     def __init__(self, sentence: str, problems: Sequence[Problem], wants: Sequence[str] = ()) -> None:
@@ -165,21 +165,21 @@ class FileError(HfgError):
         self.wants = tuple(wants)
         lines = [f"  {problem}" for problem in self.problems[:_SHOWN]]
         if len(self.problems) > _SHOWN:
-            lines.append(f"  ... and {len(self.problems) - _SHOWN} more: the error's problems hold them all")
+            lines.append(f"  ... and {len(self.problems) - _SHOWN} more: the error's problems lists them all")
         many = "\n".join([f"{sentence}, {len(self.problems)} findings:", *lines])
         super().__init__(str(self.problems[0]) if len(self.problems) == 1 else many)
 
 
 class UsageError(HfgError):
-    """A call that is right elsewhere, made where or when it cannot work."""
+    """A call that cannot work here or now, although it can elsewhere."""
 
 
 class NotRunning(UsageError):
-    """The call needs a run that has begun and is not over."""
+    """The call needs a run that has started and is not over."""
 
 
 class EncodingError(HfgError, ValueError):
-    """A value that cannot be stored as plain data, or data that is no value of the type it should be."""
+    """A value that cannot be stored as plain data, or data that is not a value of the type it should have."""
 
 
 class SharedMemoryError(HfgError):
@@ -187,7 +187,7 @@ class SharedMemoryError(HfgError):
 
 
 class TargetError(HfgError):
-    """What `hfg run TARGET` names cannot be found, imported or is no graph."""
+    """The TARGET of `hfg run` cannot be found or imported, or is not a graph."""
 
 
 class RunError(HfgError):
@@ -199,7 +199,7 @@ class NodeError(RunError):
 
     Attributes:
       path: the node's path in the graph.
-      what: where in its life it failed: "firing 3", "slot look, call 2", "setup" ...
+      what: where it failed: "firing 3", "slot look, call 2", "setup" ...
     """
 
     def __init__(self, path: str, what: str, cause: BaseException | str) -> None:
@@ -210,9 +210,9 @@ class NodeError(RunError):
 
 
 def in_words(error: BaseException) -> str:
-    """Name an exception of a user's, whose text may be empty or may itself raise."""
+    """Return an exception in words, even if its text is empty or making the text raises."""
     if isinstance(error, SystemExit):
-        return "it left the program (sys.exit): end the run by an event that is connected to graph.stop"
+        return "it called sys.exit: to end the run, connect an event to graph.stop"
     try:
         text = _of_what_is_not_there(error) or str(error)
     except Exception as fault:
@@ -221,7 +221,7 @@ def in_words(error: BaseException) -> str:
 
 
 def shown(value: object, most: int = 80) -> str:
-    """Print a value of a user's for a message: at most so many characters of it, whatever its `repr` does."""
+    """Return the repr of a user's value for a message: at most `most` characters, even if its `repr` raises."""
     try:
         return f"{value!r:.{most}}"
     except Exception as fault:
@@ -229,26 +229,26 @@ def shown(value: object, most: int = 80) -> str:
 
 
 def _of_what_is_not_there(error: BaseException) -> str:
-    """Of an attribute that a node or a port does not have, say what they say of it, as Python names their class alone.
+    """Return the message of a node or port for an attribute that it lacks; Python names only the class.
 
-    (A `__getattr__` of theirs could say it at once, but would make each attribute of each node five times as slow.)
+    (A `__getattr__` could raise the message itself, but would make every attribute access five times as slow.)
     """
     if not isinstance(error, AttributeError):
         return ""
     without = getattr(type(error.obj), "_without", None)
     if without is None or str(error) != f"'{type(error.obj).__name__}' object has no attribute '{error.name}'":
-        return ""  # another's, or in somebody's own words
+        return ""  # another object's, or with a message of its own
     return str(without(error.obj, error.name))
 
 
 class Failure(NamedTuple):
-    """What the event `failed` of a node carries: enough to answer for it, or to try again (rule X1).
+    """The value of a node's event `failed`: enough to handle the error, or to try again (rule X1).
 
     Attributes:
-      error: what went wrong; the exception is its `__cause__`. In another process than that of the node there is no
-        exception, but its text in the sentence, and where it was raised in the notes.
-      taken: what the firing had taken, value by name of the input; empty if no firing failed but a hook or an operator.
-        In another process without those whose declared type cannot cross, which the notes name.
+      error: the error; the exception is its `__cause__`. In another process than the node's there is no exception: the
+        message contains its text, and the notes say where it was raised.
+      taken: the values that the firing had taken, by name of the input; empty if a hook or an operator failed instead.
+        In another process, values whose declared type cannot be transferred are missing, and the notes name them.
     """
 
     error: NodeError
@@ -260,19 +260,19 @@ class FiringTimeout(NodeError):
 
 
 class Stalled(RunError):
-    """Nothing can move any more, yet a source has not ended or tokens are left."""
+    """Nothing can run any more, but a source has not ended or tokens are left."""
 
 
 class Aborted(RunError):
-    """The graph said so itself: its slot `abort` was called."""
+    """The graph aborted itself: its slot `abort` was called."""
 
 
 class QueueLimit(RunError):
-    """Only a longer queue could go on, and its `capacity_limit` forbids it."""
+    """The run could continue only with a longer queue, and its `capacity_limit` forbids it."""
 
 
 class TeardownError(RunError):
-    """One or more nodes failed while they were torn down; `errors` holds each."""
+    """One or more nodes failed during teardown; `errors` holds each error."""
 
     def __init__(self, errors: Sequence[NodeError]) -> None:
         self.errors = tuple(errors)
@@ -280,27 +280,27 @@ class TeardownError(RunError):
 
 
 class TransportError(HfgError):
-    """A transport cannot do what it is asked, now or at all; nothing was sent."""
+    """A transport cannot do what was asked, now or at all; nothing was sent."""
 
 
 class MessageTooLarge(TransportError):
-    """A datagram of more bytes than the transport carries; a smaller one would go."""
+    """A datagram has more bytes than the transport carries; a smaller one can be sent."""
 
 
 class NoAnswer(TransportError):
-    """Nobody answers to the name, who did has gone, or it took too long; asking again may help."""
+    """No program answers to the name, the one that did has gone, or it took too long; asking again may help."""
 
 
 class QueryRefused(TransportError):
-    """Who was asked has refused, in words of its own; asking again will not help."""
+    """The program that was asked has refused, with a message of its own; asking again will not help."""
 
 
 class QueueOverflow(HfgError):
-    """A trigger found a full queue with policy `error`; nothing of it was sent."""
+    """A trigger found a full queue with policy `error`; its signal was not sent to any edge."""
 
 
 class EndOfStream(HfgError):
-    """Raise it in the process function or in `ready()` of a node to say that nothing more will come of it."""
+    """Raise it in the process function or in `ready()` of a node to end the node's stream."""
 
 
 class EngineInternalError(HfgError):

@@ -1,13 +1,13 @@
-"""Types of images: how many channels they have and what a pixel holds, checked where edges are drawn and on values.
+"""Types of images: number of channels and type of a pixel, checked when edges are drawn and on values.
 
 Images are arrays as OpenCV has them: height x width, or height x width x channels, colours in the order blue, green,
-red. A wrong kind of pixel is more than untidy: some functions of OpenCV end the whole process for it. So nodes that
-work on images name the kind that they take. Stands on `types`; knows neither OpenCV nor nodes.
+red. The wrong type of pixel is dangerous: some functions of OpenCV end the whole process. So nodes that work on images
+declare the type that they accept. Depends on `types`, not on OpenCV or nodes.
 
 Examples:
   >>> from hfg.types import why_not
   >>> print(why_not(Depth, Gray))
-  an array of float32 is no array of uint8
+  an array of float32 is not an array of uint8
   >>> print(wrong_image(np.zeros((480, 640)), Gray))
   expected Gray (an array of uint8, height x width), found an array of float64, 480 x 640
 """
@@ -45,7 +45,7 @@ __all__ = [
 
 
 class Rows(Shape):
-    """Metadata of a list of points: one row for each, or, as OpenCV gives them, one row of one column for each.
+    """Metadata of a list of points: one row per point, or, as in OpenCV's results, one row of one column per point.
 
     Examples:
       >>> Rows(2).accepts((7, 2)), Rows(2).accepts((7, 1, 2)), Rows(2).accepts((7, 3))
@@ -58,7 +58,7 @@ class Rows(Shape):
         super().__init__(*numbers)
 
     def shapes(self) -> tuple[tuple[int | None, ...], ...]:
-        """Give every allowed shape, `None` for an axis of any length."""
+        """Return every allowed shape, `None` for an axis of any length."""
         return tuple(shape for count in self.axes for shape in ((None, count), (None, 1, count)))
 
 
@@ -86,13 +86,13 @@ class OneOf(Shape):
         return f"OneOf({', '.join(map(str, self.allowed))})"
 
     def shapes(self) -> tuple[tuple[int | None, ...], ...]:
-        """Give every allowed shape, `None` for an axis of any length."""
+        """Return every allowed shape, `None` for an axis of any length."""
         return self.allowed
 
 
 if TYPE_CHECKING:
-    # Stubs such as those of OpenCV know no more of a result than that it is an array of numbers: to a type checker an
-    # image is an array of anything, and its pixels are checked where edges are drawn and on values.
+    # Stubs such as OpenCV's only declare that a result is an array of numbers. So to a type checker an image is an
+    # array of anything, and its pixels are checked when edges are drawn and on values.
     _Uint8: TypeAlias = npt.NDArray[Any]
     _Float32: TypeAlias = npt.NDArray[Any]
     _Uint16: TypeAlias = npt.NDArray[Any]
@@ -113,7 +113,7 @@ AnyImage: TypeAlias = Annotated[npt.NDArray[Any], Pixels(), Named("AnyImage")]
 """An image of any kind of pixel, with 1 to 4 channels."""
 
 Image: TypeAlias = Annotated[_Uint8, Pixels(), Named("Image")]
-"""An image of 8 bits, 0 to 255, with 1 to 4 channels: what cameras and files give."""
+"""An image of 8 bits, 0 to 255, with 1 to 4 channels: the type that cameras and files produce."""
 
 Gray: TypeAlias = Annotated[_Uint8, Pixels(1), Named("Gray")]
 """An image of 8 bits and one channel."""
@@ -122,25 +122,25 @@ Color: TypeAlias = Annotated[_Uint8, Pixels(3), Named("Color")]
 """An image of 8 bits and three channels: blue, green, red, unless its maker says otherwise."""
 
 ColorAlpha: TypeAlias = Annotated[_Uint8, Pixels(4), Named("ColorAlpha")]
-"""An image of 8 bits and four channels: blue, green, red and how opaque it is."""
+"""An image of 8 bits and four channels: blue, green, red and opacity."""
 
 Picture: TypeAlias = Annotated[_Uint8, Pixels(1, 3, 4), Named("Picture")]
 """An image of 8 bits that people can look at: gray, in colour, or with opacity."""
 
 Mask: TypeAlias = Annotated[_Uint8, Pixels(1), Named("Mask")]
-"""Which pixels count: 0 is out, anything else is in, and 255 what is written for it. Any `Gray` image will do."""
+"""Selects pixels: 0 is out, anything else is in; written masks use 255. Any `Gray` image can be used."""
 
 FloatImage: TypeAlias = Annotated[_Float32, Pixels(), Named("FloatImage")]
-"""An image of real numbers with 1 to 4 channels; where a range is meant it is 0 to 1."""
+"""An image of real numbers with 1 to 4 channels; if a range is implied, it is 0 to 1."""
 
 Depth: TypeAlias = Annotated[_Float32, Pixels(1), Named("Depth")]
-"""How far away each pixel is, in metres; 0 or NaN where nobody knows."""
+"""Distance of each pixel in metres; 0 or NaN if unknown."""
 
 DepthMillimetres: TypeAlias = Annotated[_Uint16, Pixels(1), Named("DepthMillimetres")]
-"""How far away each pixel is, in millimetres, as depth cameras give it; 0 where nobody knows."""
+"""Distance of each pixel in millimetres, as depth cameras send it; 0 if unknown."""
 
 Disparity: TypeAlias = Annotated[_Int16, Pixels(1), Named("Disparity")]
-"""How far each pixel moves from the left picture to the right one, in sixteenths of a pixel, as OpenCV gives it."""
+"""How far each pixel moves from the left picture to the right one, in 1/16 pixel, as OpenCV computes it."""
 
 Labels: TypeAlias = Annotated[_Int32, Pixels(1), Named("Labels")]
 """The number of the region that each pixel belongs to."""
@@ -158,14 +158,14 @@ _LETTERS: Final = {2: "height x width", 3: "height x width x {}"}
 
 
 def wrong_image(value: Any, hint: Any) -> str | None:
-    """Say what an array type expects and what was found instead, or None if the value fits."""
+    """Return what an array type expects and what was found instead, or None if the value matches."""
     if accepts(value, hint):
         return None
     return f"expected {describe(hint)} ({describe_arrays(hint)}), found {describe_value(value)}"
 
 
 def describe_arrays(hint: Any) -> str:
-    """Say which arrays are of a type: dtypes and shapes in words.
+    """Return which arrays are of a type: dtypes and shapes in words.
 
     Examples:
       >>> print(describe_arrays(Points))

@@ -1,6 +1,6 @@
-"""`hfg.publish` and `hfg.subscribe`: how programs that were started by themselves meet by a name.
+"""`hfg.publish` and `hfg.subscribe`: connect programs that are started separately by a name.
 
-What they add is in `hfg.nodes.links`, which is imported when somebody meets.
+The nodes that they add are in `hfg.nodes.links`, which is imported on first use.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ __all__ = ["publish", "subscribe"]
 
 
 def publish(name: str, source: Source[Any], **parameters: Any) -> Publish:
-    """Let a port's values be taken by the programs that subscribe to a name.
+    """Publish a port's values to the programs that subscribe to a name.
 
     Args:
-      name: by which they meet, "camera/front".
-      source: an output or event, or the input of a whole graph; its type is what is published.
-      **parameters: of `Publish`.
+      name: the common name, "camera/front".
+      source: an output or event, or the input of a whole graph; its type is the type of the published values.
+      **parameters: parameters of `Publish`.
 
     Returns:
-      The node that publishes, which was added beside the port and connected to it.
+      The publishing node, which was added to the port's graph and connected to the port.
 
     Raises:
-      UsageError: the port belongs to no graph yet, or the name is none.
+      UsageError: the port does not belong to a graph yet, or the name is not valid.
 
     Examples:
       >>> import hfg
@@ -50,19 +50,19 @@ def publish(name: str, source: Source[Any], **parameters: Any) -> Publish:
 
 
 def subscribe(name: str, *targets: Target[Any], **parameters: Any) -> Subscribe:
-    """Let what another program publishes by a name come into ports.
+    """Send the values that another program publishes under a name to ports.
 
     Args:
-      name: by which they meet, "camera/front".
+      name: the common name, "camera/front".
       *targets: inputs, slots or parameters of one type, or outputs of the whole graph; the type has to be the
         publisher's.
-      **parameters: of `Subscribe`.
+      **parameters: parameters of `Subscribe`.
 
     Returns:
-      The source that subscribes, which was added beside the first port and connected to all.
+      The subscribing source, which was added to the first port's graph and connected to all ports.
 
     Raises:
-      UsageError: there is no port, it belongs to no graph yet, or the name is none.
+      UsageError: there is no port, it does not belong to a graph yet, or the name is not valid.
 
     Examples:
       >>> import hfg
@@ -74,8 +74,8 @@ def subscribe(name: str, *targets: Target[Any], **parameters: Any) -> Subscribe:
     """
     if not targets:
         raise UsageError(
-            f'"{name}" is subscribed to for no port: give the ports that its values go to, which say their type, as in '
-            f'hfg.subscribe("{name}", viewer.picture)'
+            f'"{name}" is subscribed to without a port: pass the ports that receive the values and determine '
+            f'their type, as in hfg.subscribe("{name}", viewer.picture)'
         )
     from hfg.nodes.links import Subscribe
 
@@ -90,6 +90,8 @@ def subscribe(name: str, *targets: Target[Any], **parameters: Any) -> Subscribe:
 def _graph_of(port: Any, verb: str) -> Graph:
     graph = getattr(port, "graph", None)
     if not isinstance(graph, Graph):
-        what = f'"{port.path}" belongs to no graph yet' if hasattr(port, "path") else f"{port!r:.80} is no port"
-        raise UsageError(f"cannot {verb}: {what}; add its node with graph.add(...) and give a port of it")
+        what = (
+            f'"{port.path}" does not belong to a graph yet' if hasattr(port, "path") else f"{port!r:.80} is not a port"
+        )
+        raise UsageError(f"cannot {verb}: {what}; add its node with graph.add(...) and pass one of its ports")
     return graph

@@ -1,6 +1,6 @@
-"""Finds node types by reference, "module:qualname", and gives the reference of a type.
+"""Finds node types by reference, "module:qualname", and returns the reference of a type.
 
-Stands on `node` and `functions`.
+Depends on `node` and `functions`.
 """
 
 from __future__ import annotations
@@ -16,26 +16,30 @@ from hfg.nodetypes.description import look_up
 from hfg.nodetypes.functions import NodeFunction
 from hfg.nodetypes.node import Node
 
-__all__ = ["find", "reference_of"]
+__all__ = ["NotANodeType", "find", "reference_of"]
+
+
+class NotANodeType(TargetError):
+    """The reference is malformed or names something else; installing a package would not help."""
 
 
 def find(reference: str) -> type[Node] | NodeFunction[..., Any]:
-    """Import the module and give the node type; call it with parameters to make a node.
+    """Import the module and return the node type; call it with parameters to make a node.
 
     Raises:
-      TargetError: there is no such module or name, or it is no node type.
+      TargetError: there is no such module or name, or the object is not a node type.
     """
     module, colon, qualname = reference.partition(":")
     if not (module and colon and qualname):
-        raise TargetError(
-            f'"{reference}" is no reference to a node type; write "module:name", as in "my_robot.nodes:MapLookup"'
+        raise NotANodeType(
+            f'"{reference}" is not a reference to a node type; write "module:name", as in "my_robot.nodes:MapLookup"'
         )
     try:
         importlib.import_module(module)
     except ModuleNotFoundError as error:
         raise TargetError(
-            f'node type "{reference}": module "{error.name}" cannot be found; is it installed, or the folder on the '
-            "path?"
+            f'node type "{reference}": no module named "{error.name}"; install the package, or add its folder '
+            "to sys.path"
         ) from error
     except Exception as error:
         raise TargetError(
@@ -46,13 +50,13 @@ def find(reference: str) -> type[Node] | NodeFunction[..., Any]:
         return found
     if found is None:
         raise TargetError(f'node type "{reference}": module "{module}" has no "{qualname}"{_meant(module, qualname)}')
-    raise TargetError(
-        f'"{reference}" is {found!r}, no node type; derive it from hfg.Node, or decorate it with hfg.node'
+    raise NotANodeType(
+        f'"{reference}" is {found!r}, not a node type; derive it from hfg.Node, or decorate it with hfg.node'
     )
 
 
 def _meant(module: str, name: str) -> str:
-    """Say which name of a module was probably meant."""
+    """Return which name of a module was probably meant."""
     there = sys.modules[module]
     known = {*dir(there), *getattr(there, "__all__", ())}
     near = difflib.get_close_matches(name, [one for one in known if not one.startswith("_")], n=1)
@@ -60,5 +64,5 @@ def _meant(module: str, name: str) -> str:
 
 
 def reference_of(node_type: Node | type[Node] | NodeFunction[..., Any]) -> str | None:
-    """Give the reference of a type, or of a node's type; None if it cannot be found by name."""
+    """Return the reference of a type, or of a node's type; None if it cannot be found by name."""
     return node_type._type.reference

@@ -1,11 +1,11 @@
-"""A run as a timeline: a consumer of the trace that writes what Perfetto and chrome://tracing open.
+"""A run as a timeline: a consumer of the trace that writes the format of Perfetto and chrome://tracing.
 
-Each group is a row with its firings and slot calls as boxes; code that waits lets others begin meanwhile, which are
-drawn on further rows of the group. Each node that was ever active has a row with its active times. A signal is an arrow
-from the box that sent it to the box that took it; errors and dropped tokens are marks.
+Each group is a row with its firings and slot calls as boxes. Code that waits lets other calls start meanwhile; these
+are drawn on further rows of the group. Each node that was ever active has a row with its active times. A signal is an
+arrow from the box that sent it to the box that took it; errors and dropped tokens are marks.
 
-The file is the JSON array form of the Trace Event Format: one event a line, written while the graph runs, so that what
-a crash leaves behind can be opened too. Stands on `trace` and `graph`; knows no engine.
+The file is the JSON array form of the Trace Event Format, with one event per line, written while the graph runs, so
+that the file can be opened even after a crash. Depends on `trace` and `graph`, not on the engine.
 """
 
 from __future__ import annotations
@@ -47,11 +47,12 @@ __all__ = ["Timeline"]
 
 _GROUPS, _ACTIVITY = 1, 2  # the format's "processes"
 _ROWS = 1000  # numbers for the rows of a group
-_APART_US = 0.001  # two events are never at the same time: what happens at one instant stays in order, arrows in boxes
+# two events never have the same time, so that events of one instant stay in order, and arrows in their boxes
+_APART_US = 0.001
 
 
 class _Box:
-    """A firing or call under way, and the arrows that leave or reach it."""
+    """A firing or call in progress, and the arrows that start or end at it."""
 
     __slots__ = ("args", "arrows", "began", "category", "group", "name", "row")
 
@@ -66,7 +67,7 @@ class _Box:
 
 
 class Timeline:
-    """Writes a run as a timeline; give it to a run as its `trace`. The file is whole when the run is over.
+    """Writes a run as a timeline; pass it to a run as its `trace`. The file is complete when the run is over.
 
     Examples:
       >>> import hfg, json, tempfile, pathlib
@@ -80,11 +81,11 @@ class Timeline:
     """
 
     def __init__(self, file: str | os.PathLike[str] | BufferedIOBase, graph: Graph) -> None:
-        """Open the file, before anything runs.
+        """Open the file before the run starts.
 
         Args:
           file: where to write; a path, or a binary stream that is left open.
-          graph: whose run it will be; its groups become rows.
+          graph: the graph to be run; its groups become rows.
 
         Raises:
           UsageError: the file cannot be written.
@@ -93,7 +94,7 @@ class Timeline:
             try:
                 self._stream: Any = GrowingFile(Path(file), append=False, at_once=False)
             except OSError as error:
-                raise UsageError(f"the timeline cannot be written to {file}: {error.strerror}") from None
+                raise UsageError(f"cannot write the timeline to {file}: {error.strerror}") from None
             self._ours = True
         else:
             self._stream, self._ours = file, False
@@ -104,21 +105,21 @@ class Timeline:
         self._origin: float | None = None
         self._now = 0.0
         self._open: dict[str, dict[int, _Box]] = {}  # by node, then by number of the firing; 0: a call, -1: do()
-        self._rows: dict[str, list[str | None]] = {}  # per group: who is on each of its rows
+        self._rows: dict[str, list[str | None]] = {}  # per group: the node on each of its rows
         self._row_ids: dict[tuple[str, int], int] = {}
         self._group_order = list(dict.fromkeys(_group(node) for node in self._nodes.values()))
         self._last_row: dict[str, int] = {}
         self._active: dict[str, float] = {}
         self._activity_rows: dict[str, int] = {}
         self._events: set[str] = set()
-        self._flying: dict[tuple[str, int], int] = {}  # signals under way, by edge and number
+        self._flying: dict[tuple[str, int], int] = {}  # signals in flight, by edge and number
         self._arrows = 0
         self._stream.write(b"[\n")
         self._name("process_name", _GROUPS, 0, f'groups of "{graph.name}"')
         self._name("process_name", _ACTIVITY, 0, "activity")
 
     def __call__(self, event: TraceEvent) -> None:
-        """Take one event of the run."""
+        """Process one event of the run."""
         if self._closed:
             return
         if self._origin is None:
@@ -160,12 +161,12 @@ class Timeline:
                 self.close(outcome)
 
     def close(self, outcome: str = "cut off") -> None:
-        """End what is under way and the file. The end of the run does it; does nothing the second time."""
+        """Close open boxes and the file. Called at the end of the run; a second call does nothing."""
         if self._closed:
             return
         for node, boxes in self._open.items():
             for number in list(boxes):
-                self._end(node, number, f"under way at the end: {outcome}")
+                self._end(node, number, f"in progress at the end: {outcome}")
         for node in list(self._active):
             self._activity(node, False)
         self._closed = True
@@ -201,14 +202,14 @@ class Timeline:
         self._open.setdefault(node, {})[number] = _Box(name, category, self._now, group, row, args)
 
     def _newest(self, node: str) -> _Box | None:
-        """What the node has begun last of all that is under way (F14)."""
+        """Return the latest box in progress of a node (F14)."""
         boxes = self._open.get(node)
         return boxes[next(reversed(boxes))] if boxes else None
 
     def _end(self, node: str, number: int, outcome: str) -> None:
         box = self._open.get(node, {}).pop(number, None)
         if box is None:
-            return  # it had begun before somebody looked
+            return  # it had started before the timeline was attached
         self._rows[box.group][box.row] = None
         self._write(
             ph="X",
@@ -220,7 +221,7 @@ class Timeline:
             dur=self._now - box.began,
             args={**box.args, "outcome": outcome},
         )
-        for arrow in box.arrows:  # behind the box that they are bound to
+        for arrow in box.arrows:  # after the box that they belong to
             self._write(**arrow)
 
     def _row(self, group: str, row: int) -> int:
@@ -279,10 +280,10 @@ class Timeline:
         self._write(ph="i", s="t", name=name, cat="mark", pid=_GROUPS, tid=row, ts=self._now, args=args)
 
     def _edited(self) -> None:
-        """Nodes may be called otherwise now, or be gone: the active times of each end under the name it had."""
+        """Handle an edit: nodes may be renamed or gone, so the active times of each end under its old name."""
         before, self._nodes = self._nodes, {node.path: node for node in _nodes(flatten(self._graph))}
         path_of = {node.node: path for path, node in self._nodes.items()}
-        stays = {path for path in self._nodes if path in before and before[path].node not in path_of}  # was replaced
+        stays = {path for path in self._nodes if path in before and before[path].node not in path_of}  # replaced
         moved = {}
         for path in self._active:
             here = path if path in stays or path not in before else path_of.get(before[path].node)
@@ -313,12 +314,12 @@ class Timeline:
 
 
 def _plain(text: str) -> str:
-    """JSON has no lone surrogates, the texts of errors may."""
+    """Return a text without lone surrogates: texts of errors may have some, JSON may not."""
     return text.encode("utf-8", "replace").decode()
 
 
 def _source(edge: str) -> tuple[str, str]:
-    """The node in front of an edge, and the port it begins at."""
+    """Return the node at the start of the edge, and the port."""
     port = edge.partition(" -> ")[0]
     return port.rpartition(".")[0], port
 

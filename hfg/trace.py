@@ -1,10 +1,9 @@
 """The events of a run: everything observable, as typed values (rule R7).
 
-One stream for recorders, taps, statistics, monitors and the studio. Every event has `time`, in seconds on the run's
-clock. Nodes are named by their path ("fetch/go_to"; the graph's own boundary is ""), ports by "path.port", edges by
-"source -> target" as the plan names them after subgraphs are dissolved. In the JSON of `hfg run --trace` a token that
-holds a marker has "marker" in place of "value". Stands on `token`; knows nobody who emits or
-listens.
+Recorders, taps, statistics, monitors and the studio use this one stream. Every event has `time`, in seconds on the
+run's clock. Nodes are named by their path ("fetch/go_to"; the graph's own boundary is ""), ports by "path.port", edges
+by "source -> target" as the plan names them after subgraphs are dissolved. In the JSON of `hfg run --trace`, a token
+that holds a marker has "marker" in place of "value". Depends on `token`, not on the code that emits or consumes events.
 """
 
 from __future__ import annotations
@@ -56,13 +55,13 @@ __all__ = [
 
 
 class TraceEvent(msgspec.Struct, frozen=True, tag=True):
-    """Something happened at `time` (seconds on the run's clock)."""
+    """An event at `time` (seconds on the run's clock)."""
 
     time: float
 
 
 Consumer: TypeAlias = Callable[[TraceEvent], Any] | list[TraceEvent] | deque[TraceEvent]
-"""Who takes the events of a run: a function of each, or a list to which they are appended."""
+"""A consumer of the events of a run: a function called with each, or a list to which they are appended."""
 
 FiringKind: TypeAlias = Literal["process", "silent", "end"]
 FiringOutcome: TypeAlias = Literal["done", "silent", "ended", "failed", "abandoned"]
@@ -77,7 +76,7 @@ class RunStarted(TraceEvent, frozen=True):
 
 
 class RunEnded(TraceEvent, frozen=True):
-    """Nothing moves any more; `outcome` as in the run's report."""
+    """Nothing runs any more; `outcome` as in the run's report."""
 
     outcome: str
 
@@ -89,13 +88,13 @@ class RunPaused(TraceEvent, frozen=True):
 
 
 class RunResumed(TraceEvent, frozen=True):
-    """The run goes on after a pause (R3)."""
+    """The run continues after a pause (R3)."""
 
 
 class FiringStarted(TraceEvent, frozen=True):
     """The tokens of firing `number` (from 1, per node, silent ones counted) are taken.
 
-    `kind`: the function is run ("process"), is not ("silent", F4), or the node ends ("end", its hook is called).
+    `kind`: the function is run ("process"), is skipped ("silent", F4), or the node ends ("end", its hook is called).
     """
 
     node: str
@@ -104,7 +103,7 @@ class FiringStarted(TraceEvent, frozen=True):
 
 
 class FiringEnded(TraceEvent, frozen=True):
-    """The firing is over and its outputs have left.
+    """The firing is over and its outputs have been sent.
 
     `outcome`: "done", "silent", "ended", "failed" (X1), "abandoned" (X2, a disabled node).
     """
@@ -115,7 +114,7 @@ class FiringEnded(TraceEvent, frozen=True):
 
 
 class FiringRetried(TraceEvent, frozen=True):
-    """Attempt `attempt` (from 1) at a firing has failed with `error`; the next one begins after `pause_s` (X1)."""
+    """Attempt `attempt` (from 1) at a firing has failed with `error`; the next one starts after `pause_s` (X1)."""
 
     node: str
     number: int
@@ -125,7 +124,7 @@ class FiringRetried(TraceEvent, frozen=True):
 
 
 class CallStarted(TraceEvent, frozen=True):
-    """Slot call `number` (from 1, per node) of `slot` begins with the token that came over `edge`."""
+    """Slot call `number` (from 1, per node) of `slot` starts with the token from `edge`."""
 
     node: str
     number: int
@@ -173,21 +172,21 @@ class TokenDropped(TraceEvent, frozen=True, gc=False):
 
 
 class TokenDrained(TraceEvent, frozen=True, gc=False):
-    """A token for a node that has ended was processed at once (F12); a marker into a slot likewise (T4)."""
+    """A token for a node that has ended was processed without a firing (F12); so was a marker for a slot (T4)."""
 
     edge: str
     token: Token[Any]
 
 
 class EventTriggered(TraceEvent, frozen=True, gc=False):
-    """An event was triggered; the token is the signal before any edge gave it a number."""
+    """An event was triggered; the token is the signal before an edge gives it a number."""
 
     event: str
     token: Token[Any]
 
 
 class ActivityChanged(TraceEvent, frozen=True):
-    """A(node) changed: by a token (A6), by sending (A5), by a slot (A7), by reset (A14), or was given back (A8)."""
+    """A(node) changed: by a token (A6), by sending (A5), by a slot (A7), by reset (A14), or was returned (A8)."""
 
     node: str
     active: bool
@@ -195,7 +194,7 @@ class ActivityChanged(TraceEvent, frozen=True):
 
 
 class ActivityLost(TraceEvent, frozen=True):
-    """A +1 that nobody can have (A8): its sender is gone, or a slot of a subgraph took it; or a removed node's path."""
+    """A +1 was lost (A8): its sender is gone, a slot of a subgraph took it, or its node was removed."""
 
     edge: str
 
@@ -209,7 +208,7 @@ class DoStarted(TraceEvent, frozen=True):
 class DoEnded(TraceEvent, frozen=True):
     """The do-activity has ended: it returned ("completed"), was cancelled, or failed (A15).
 
-    One that the end of the run cuts short is not mentioned.
+    There is no such event for a do-activity that the end of the run cuts short.
     """
 
     node: str
@@ -230,7 +229,7 @@ class NodeEnabled(TraceEvent, frozen=True):
 
 
 class ErrorRaised(TraceEvent, frozen=True):
-    """A node's code failed, or a subscriber or operator did; `policy` is what is done about it (X1)."""
+    """A node's code failed, or a subscriber or operator did; `policy` is the reaction (X1)."""
 
     node: str
     what: str
@@ -254,16 +253,16 @@ class QueueGrown(TraceEvent, frozen=True):
 
 
 class EditWaits(TraceEvent, frozen=True):
-    """An edit waits for the end of what is under way; `nodes` start nothing until it is done or given up (R4)."""
+    """An edit waits until work in progress has ended; `nodes` start nothing until it is done or abandoned (R4)."""
 
     nodes: tuple[str, ...]
 
 
 class StructureChanged(TraceEvent, frozen=True):
-    """The graph is another from now on (R4); what comes of it follows.
+    """The graph has changed (R4); events about the consequences follow.
 
-    `change`: the commands as JSON (as they are shown, if a parameter's value is no data), "undo" or "redo"; "" if an
-    edit that waited was given up.
+    `change`: the commands as JSON (as text, if a parameter's value is not data), "undo" or "redo"; "" if a waiting edit
+    was abandoned.
     """
 
     change: str

@@ -1,9 +1,9 @@
-"""Which port types fit together, and which values fit a type (rule P3).
+"""Which port types match, and which values a type accepts (rule P3).
 
-Our own comparison instead of beartype's `is_subhint`, which raises on every `NDArray`, knows neither int -> float nor
-arrays with a layout, and takes bare generics for something else than open ones. Metadata of `Annotated` is taken off,
-apart from our own: `Shape` and `Pixels` say how an array is laid out, `Named` what a type is called. What cannot be
-judged is said, never guessed. Stands on `generics`, numpy and beartype; knows neither ports nor nodes. `hfg.images` has
+We compare types ourselves instead of using beartype's `is_subhint`, which raises on every `NDArray`, does not accept
+int as float or arrays with a layout, and does not treat bare generics as open. Metadata of `Annotated` is removed,
+except our own: `Shape` and `Pixels` describe the layout of an array, `Named` the name of a type. Types that cannot be
+compared are reported, never guessed. Depends on `generics`, numpy and beartype, not on ports or nodes. `hfg.images` has
 the types of images.
 """
 
@@ -44,7 +44,7 @@ __all__ = [
 
 
 class Shape:
-    """Metadata of an array type: one number for each axis, `None` for an axis of any length.
+    """Metadata of an array type: one number per axis, `None` for an axis of any length.
 
     Examples:
       >>> from typing import Annotated
@@ -68,15 +68,15 @@ class Shape:
         return f"{type(self).__name__}({', '.join(map(str, self.axes))})"
 
     def shapes(self) -> tuple[tuple[int | None, ...], ...]:
-        """Give every allowed shape, `None` for an axis of any length."""
+        """Return every allowed shape, `None` for an axis of any length."""
         return (self.axes,)
 
     def accepts(self, shape: tuple[int, ...]) -> bool:
-        """Say whether an array of this shape fits."""
+        """Return whether an array of this shape matches."""
         return any(_axes_meet(shape, allowed) for allowed in self.shapes())
 
     def meets(self, other: Shape) -> bool:
-        """Say whether some array could fit both; open axes are checked on the value."""
+        """Return whether some array could match both; open axes are checked on the value."""
         return any(_axes_meet(mine, theirs) for mine in self.shapes() for theirs in other.shapes())
 
 
@@ -92,14 +92,14 @@ class Pixels(Shape):
         super().__init__(*channels)
 
     def shapes(self) -> tuple[tuple[int | None, ...], ...]:
-        """Give every allowed shape, `None` for an axis of any length."""
+        """Return every allowed shape, `None` for an axis of any length."""
         counts = self.axes or (1, 2, 3, 4)
         flat: tuple[tuple[int | None, ...], ...] = ((None, None),) if 1 in counts else ()
         return flat + tuple((None, None, count) for count in counts)
 
 
 class Named:
-    """Metadata that says what a type is called in messages and lists; it changes nothing in what fits.
+    """Metadata that names a type in messages and lists; it does not affect matching.
 
     Examples:
       >>> from typing import Annotated
@@ -144,9 +144,9 @@ _OPEN_DTYPES: Final = frozenset(
         np.character,
     }
 )
-"""Scalar classes that stand for several dtypes."""
+"""Scalar classes that represent several dtypes."""
 _TOWER: Final[dict[type, tuple[type, ...]]] = {float: (int, bool), complex: (int, bool, float)}
-"""What a number type takes besides itself (PEP 484)."""
+"""Other number types that a number type accepts (PEP 484)."""
 
 _CALLABLE: Final[Any] = abc.Callable
 
@@ -164,30 +164,33 @@ _NUMBERS: Final = (
     np.float32,
     np.float64,
 )
-"""What an array of an open dtype is taken to hold by those who make values."""
+"""Number types to use for an array of an open dtype when values are made."""
 
 _LOOKED_AT: Final = 1000
-"""How many items of a container are checked; the first ones, for the same value must always get the same answer."""
+"""How many items of a container are checked: the first ones, so that the same value always gets the same result."""
 
 
 def compatible(source: Any, target: Any) -> bool:
-    """Say whether every value a port of type `source` sends fits a port of type `target`."""
+    """Return whether every value that a port of type `source` sends matches a port of type `target`."""
     return why_not(source, target) is None
 
 
 def why_not(source: Any, target: Any) -> str | None:
-    """Give the reason why `source` does not fit `target` in a few words, or None if it fits.
+    """Return the reason why `source` does not match `target` in a few words, or None if it matches.
 
-    Hints that cannot be judged are a reason too, which names them.
+    Hints that cannot be compared are a reason, too, which names them.
     """
     if source is target or target is Any or source is Any:
         return None
     try:
         return _why_not(source, target)
-    except TypeError:  # a hint with an unhashable part, such as Annotated[int, []]: judged each time
+    except TypeError:  # a hint with an unhashable part, such as Annotated[int, []]: compared each time
         return _judge(source, target)
     except RecursionError:
-        return f"hfg cannot judge {describe(source)} as {describe(target)}, for one of them contains itself; use Any"
+        return (
+            f"hfg cannot compare {describe(source)} with {describe(target)} because one of them contains itself; "
+            "use Any"
+        )
 
 
 @functools.lru_cache(maxsize=4096)
@@ -204,7 +207,7 @@ def _judge(source: Any, target: Any) -> str | None:
 
 
 def _fits(source: Any, target: Any) -> str | None:
-    """The same for types inside of others, where None is a value: a list may hold some."""
+    """Do the same for types inside other types, where None is a value: a list may hold some."""
     source, source_layouts = _open(source)
     target, target_layouts = _open(target)
     if source is Any or target is Any or target is object or source in (typing.Never, typing.NoReturn):
@@ -214,7 +217,7 @@ def _fits(source: Any, target: Any) -> str | None:
     if _is_union(target):
         if any(_fits(source, member) is None for member in typing.get_args(target)):
             return None
-        return f"{describe(source)} is none of {describe(target)}"
+        return f"{describe(source)} is not one of {describe(target)}"
     arrays = _judge_arrays(source, source_layouts, target, target_layouts)
     return _judge_plain(source, target) if arrays is _NOT_ARRAYS else arrays
 
@@ -243,16 +246,16 @@ def _judge_plain(source: Any, target: Any) -> str | None:
 def _judge_literals(source: Any, target: Any) -> str | None:
     values = typing.get_args(source) if typing.get_origin(source) is Literal else _all_values(source)
     if values is None:
-        return f"{describe(source)} is no {describe(target)}"
+        return f"{describe(source)} is not {describe(target)}"
     if typing.get_origin(target) is not Literal:
         return _first(_fits(type(value), target) for value in values)
     allowed = {(type(value), value) for value in typing.get_args(target)}
     wrong = [value for value in values if (type(value), value) not in allowed]
-    return f"{wrong[0]!r} is no {describe(target)}" if wrong else None
+    return f"{wrong[0]!r} is not {describe(target)}" if wrong else None
 
 
 def _all_values(hint: Any) -> tuple[Any, ...] | None:
-    """All values of a type that has few; None of others."""
+    """Return all values of a type that has few; None for other types."""
     if hint is bool:
         return (False, True)
     if hint is _NONE:
@@ -261,8 +264,8 @@ def _all_values(hint: Any) -> tuple[Any, ...] | None:
 
 
 def _judge_keys(source: Any, target: Any) -> str | None:
-    """A dict with known keys, where another one is wanted; of a plain dict nobody knows the keys."""
-    refused = f"{describe(source)} is no {describe(target)}"
+    """Compare a dict that has known keys with another; the keys of a plain dict are unknown."""
+    refused = f"{describe(source)} is not {describe(target)}"
     if not typing.is_typeddict(source):
         return refused
     has, wanted = typing.get_type_hints(source), typing.get_type_hints(target)
@@ -283,16 +286,16 @@ def _judge_callables(source: Any, target: Any) -> str | None:
             return f"{describe(source)} takes {len(given)} arguments, not {len(wanted)}"
         wrong = _first(_fits(theirs, mine) for mine, theirs in zip(given, wanted, strict=True))
         if wrong is not None:
-            return f"{describe(source)} does not take what {describe(target)} is given: {wrong}"
+            return f"{describe(source)} does not accept the arguments of {describe(target)}: {wrong}"
     return _fits(result, expected)
 
 
 def _judge_classes(source: Any, found: type, target: Any, wanted: type) -> str | None:
-    """Two classes, generic or not.
+    """Compare two classes, generic or not.
 
-    What is sent is never changed (rule T1), so what they hold may be of a narrower type.
+    Their parts may be of a narrower type because a value that was sent is never changed (rule T1).
     """
-    refused = f"{describe(source)} is no {describe(target)}"
+    refused = f"{describe(source)} is not {describe(target)}"
     if not _is_or_has(found, wanted):
         missing = generics.lacks(found, wanted)
         return refused if missing is None else f'{refused}: it has no "{missing}"'
@@ -301,7 +304,7 @@ def _judge_classes(source: Any, found: type, target: Any, wanted: type) -> str |
 
 
 def _is_or_has(found: type, wanted: type) -> bool:
-    """A class is of another one, or has what a protocol asks for."""
+    """Return whether a class is derived from another one, or has the members of a protocol."""
     return generics.lacks(found, wanted) is None if is_protocol(wanted) else issubclass(found, wanted)
 
 
@@ -338,16 +341,17 @@ def _is_unpacked(hint: Any) -> bool:
 
 
 def _ask_beartype(source: Any, target: Any) -> str | None:
-    """What we know nothing of."""
-    from beartype.door import TypeHint  # here, for it is a fifth of what importing hfg takes, and few programs need it
+    """Ask beartype about types that we know nothing about."""
+    # imported here because it takes a fifth of hfg's import time, and few programs need it
+    from beartype.door import TypeHint
     from beartype.roar import BeartypeException
 
     try:
         fits = TypeHint(source).is_subhint(TypeHint(target))
     except (BeartypeException, TypeError, ValueError) as error:
         culprit = next((hint for hint in (source, target) if not _is_hint(hint)), source)
-        return f"hfg cannot judge the type {describe(culprit)} ({type(error).__name__}); use a plainer type, or Any"
-    return None if fits else f"{describe(source)} is no {describe(target)}"
+        return f"hfg cannot compare the type {describe(culprit)} ({type(error).__name__}); use a simpler type, or Any"
+    return None if fits else f"{describe(source)} is not {describe(target)}"
 
 
 def _is_hint(hint: Any) -> bool:
@@ -367,34 +371,37 @@ _NOT_ARRAYS: Final = "not arrays"
 def _judge_arrays(
     source: Any, source_layouts: tuple[Shape, ...], target: Any, target_layouts: tuple[Shape, ...]
 ) -> str | None:
-    """Compare two arrays by dtype and layout; `_NOT_ARRAYS` if the target is none, or both are plain."""
+    """Compare two arrays by dtype and layout. Return `_NOT_ARRAYS` if the target is not an array, or both are plain."""
     target_dtype = _dtype_of(target)
     if target_dtype is None:
         return _NOT_ARRAYS if _dtype_of(source) is None or target is np.ndarray else _judge_as_container(target)
     source_dtype = _dtype_of(source)
     if source_dtype is None:
-        return f"{describe(source)} is no array"
+        return f"{describe(source)} is not an array"
     if not _dtypes_meet(source_dtype, target_dtype):
-        return f"an array of {describe(source_dtype)} is no array of {describe(target_dtype)}"
+        return f"an array of {describe(source_dtype)} is not an array of {describe(target_dtype)}"
     for mine in source_layouts:
         for theirs in target_layouts:
             if not mine.meets(theirs):
-                return f"the layout {mine!r} never fits {theirs!r}"
+                return f"the layout {mine!r} never matches {theirs!r}"
     return None
 
 
 def _judge_as_container(target: Any) -> str | None:
-    """An array where none is asked for by name: an Iterable, a Protocol; its items are checked on the value."""
+    """Compare an array with a type that is not an array: an Iterable, a Protocol.
+
+    Its items are checked on the value.
+    """
     wanted = generics.class_of(target)
     if wanted is not None and _is_or_has(np.ndarray, wanted):
         return None
-    return f"an array is no {describe(target)}"
+    return f"an array is not {describe(target)}"
 
 
 def _dtypes_meet(source: Any, target: Any) -> bool:
     """Compare scalar classes.
 
-    An open dtype (Any, np.generic, np.floating ...) fits what it may hold and is checked on the value.
+    An open dtype (Any, np.generic, np.floating ...) matches every dtype that it may hold, and is checked on the value.
     """
     source, target = (np.generic if dtype is Any else dtype for dtype in (source, target))
     if _is_union(source) or _is_union(target):
@@ -405,7 +412,7 @@ def _dtypes_meet(source: Any, target: Any) -> bool:
 
 
 def _dtype_of(hint: Any) -> Any:
-    """Give the scalar class of an array type (Any if it is open), or None if the hint is no array."""
+    """Return the scalar class of an array type (Any if it is open), or None if the hint is not an array."""
     if hint is np.ndarray:
         return Any
     if typing.get_origin(hint) is not np.ndarray:
@@ -417,7 +424,7 @@ def _dtype_of(hint: Any) -> Any:
 
 
 def _scalar(hint: Any) -> Any:
-    """Give the scalar class, or a union of them; `np.floating[Any]` is `np.floating`."""
+    """Return the scalar class, or a union of them; `np.floating[Any]` is `np.floating`."""
     hint, _ = _open(hint)
     if _is_union(hint):
         return functools.reduce(operator.or_, map(_scalar, typing.get_args(hint)))
@@ -426,7 +433,7 @@ def _scalar(hint: Any) -> Any:
 
 
 def _open(hint: Any) -> tuple[Any, tuple[Shape, ...]]:
-    """Take aliases, NewTypes' wrappers of metadata, type variables and metadata off; keep the layouts."""
+    """Remove aliases, NewTypes around metadata, type variables and metadata; keep the layouts."""
     layouts: tuple[Shape, ...] = ()
     while True:
         if hint is None:
@@ -447,7 +454,7 @@ def _open(hint: Any) -> tuple[Any, tuple[Shape, ...]]:
 
 
 def bare_type(hint: Any) -> Any:
-    """Take aliases, type variables and the metadata of `Annotated` off a type hint."""
+    """Return a type hint without aliases, type variables and the metadata of `Annotated`."""
     return _open(hint)[0]
 
 
@@ -459,9 +466,10 @@ def _is_union(hint: Any) -> bool:
 
 
 def accepts(value: Any, hint: Any) -> bool:
-    """Say whether a value is of a type; arrays with their dtype and layout, ints as floats.
+    """Return whether a value is of a type.
 
-    A value that raises while it is looked at is of none, whatever it says of itself.
+    Arrays are checked with their dtype and layout; an int is accepted as a float. A value that raises while it is
+    inspected is of no type, whatever it claims.
     """
     try:
         fits = _checker(hint)
@@ -510,13 +518,13 @@ def _array_checker(dtype: Any, layouts: tuple[Shape, ...]) -> Callable[[Any], bo
 
 
 def _is_plain_class(hint: Any) -> bool:
-    """Whether `isinstance` says who belongs to it: not of a protocol, and not of a `TypedDict`."""
+    """Return whether `isinstance` decides membership; it does not for a protocol or a `TypedDict`."""
     is_class = isinstance(hint, type) and typing.get_origin(hint) is None
     return is_class and not typing.is_typeddict(hint) and not getattr(hint, "_is_protocol", False)
 
 
 def _items_checker(origin: Any, arguments: tuple[Any, ...]) -> Callable[[Any], bool] | None:
-    """Make the check of a container, which beartype does on one item chosen at random: no two runs would agree."""
+    """Make the check of a container. Beartype checks one item chosen at random, so no two runs would agree."""
     if not (isinstance(origin, type) and issubclass(origin, Collection)) or not arguments:
         return None
     if issubclass(origin, Mapping) and len(arguments) == 2:
@@ -545,17 +553,17 @@ def _bearable(hint: Any) -> Callable[[Any], bool]:
         try:
             return is_bearable(value, hint)
         except BeartypeException:
-            return True  # what cannot be judged was refused where it was connected; here it is let through
+            return True  # types that cannot be compared were refused where they were connected; here they pass
 
     return check
 
 
 class ArrayFacts(NamedTuple):
-    """What is known of the arrays of a type, for those who make or describe them.
+    """Facts about the arrays of a type, for code that makes or describes them.
 
     Attributes:
-      dtypes: scalar classes that an array may hold; of an open dtype the usual numbers.
-      shapes: the allowed shapes, `None` for an axis of any length; empty if any shape will do.
+      dtypes: scalar classes that an array may hold; for an open dtype the usual numbers.
+      shapes: the allowed shapes, with `None` for an axis of any length; empty if any shape is allowed.
     """
 
     dtypes: tuple[type[np.generic], ...]
@@ -563,7 +571,7 @@ class ArrayFacts(NamedTuple):
 
 
 def array_facts(hint: Any) -> ArrayFacts | None:
-    """Give dtypes and shapes of an array type; None if the hint is none.
+    """Return dtypes and shapes of an array type; None if the hint is not an array.
 
     Examples:
       >>> array_facts(Annotated[npt.NDArray[np.uint8 | np.float32], Pixels(1)])
@@ -582,8 +590,8 @@ def array_facts(hint: Any) -> ArrayFacts | None:
 
 
 def describe_value(value: Any) -> str:
-    """Say what a value is, in few words: "int: 3", "an array of float64, 480 x 640"."""
-    if issubclass(type(value), np.ndarray):  # a value may lie about its class, or raise
+    """Return what a value is, in a few words: "int: 3", "an array of float64, 480 x 640"."""
+    if issubclass(type(value), np.ndarray):  # a value may pretend to be of another class, or raise
         return f"an array of {value.dtype}, {' x '.join(map(str, value.shape)) or 'without axes'}"
     return f"{describe(type(value))}: {shown(value)}"
 
@@ -594,14 +602,14 @@ def _describe(hint: Any) -> str:
 
 
 def is_hint(value: Any) -> bool:
-    """Say whether this can be a type hint at all; a value, a name in quotes, a function or a module cannot."""
+    """Return whether a value can be a type hint at all; a plain value, a quoted name, a function or a module cannot."""
     return not isinstance(value, str | bytes | int | float | complex | list | tuple | dict | set) and not isinstance(
         value, types.FunctionType | types.BuiltinFunctionType | types.ModuleType
     )
 
 
 def describe(hint: Any) -> str:
-    """Give a type in few words, as a user would write it."""
+    """Return a type in a few words, as a user would write it."""
     try:
         return _describe(hint)
     except TypeError:

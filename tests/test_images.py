@@ -55,12 +55,12 @@ def test_images_fit_where_some_of_them_are_meant(source: Any, target: Any) -> No
 @pytest.mark.parametrize(
     ("source", "target", "reason"),
     [
-        (Gray, Color, "the layout Pixels(1) never fits Pixels(3)"),
-        (Color, ColorAlpha, "the layout Pixels(3) never fits Pixels(4)"),
-        (Depth, Gray, "an array of float32 is no array of uint8"),
-        (DepthMillimetres, Depth, "an array of uint16 is no array of float32"),
-        (Labels, Mask, "an array of int32 is no array of uint8"),
-        (FlowField, Depth, "the layout Pixels(2) never fits Pixels(1)"),
+        (Gray, Color, "the layout Pixels(1) never matches Pixels(3)"),
+        (Color, ColorAlpha, "the layout Pixels(3) never matches Pixels(4)"),
+        (Depth, Gray, "an array of float32 is not an array of uint8"),
+        (DepthMillimetres, Depth, "an array of uint16 is not an array of float32"),
+        (Labels, Mask, "an array of int32 is not an array of uint8"),
+        (FlowField, Depth, "the layout Pixels(2) never matches Pixels(1)"),
     ],
     ids=str,
 )
@@ -146,7 +146,7 @@ def test_an_edge_between_images_of_different_kinds_is_refused_where_it_is_drawn(
     graph = hfg.Graph("pictures")
     with pytest.raises(hfg.errors.ConnectionError) as error:
         graph.connect(graph.add(scene()).out, graph.add(find()).ports.inputs["image"])
-    assert '"find.image" expects Gray, "scene.out" sends Depth (an array of float32 is no array of uint8)' in str(
+    assert '"find.image" expects Gray, "scene.out" sends Depth (an array of float32 is not an array of uint8)' in str(
         error.value
     )
 

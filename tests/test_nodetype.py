@@ -261,12 +261,14 @@ def declare(**body: Any) -> type[hfg.Node]:
 
 @pytest.mark.parametrize("name", sorted(RESERVED - {"process"}))
 def test_reserved_names_are_no_ports(name: str) -> None:
-    with pytest.raises(DeclarationError, match=f'"{name}" is reserved for every node; choose another name'):
+    with pytest.raises(DeclarationError, match=f'"{name}" is a reserved name that every node has; choose another'):
         declare(**{name: hfg.Input(int)})
 
 
 def test_init_is_not_overridden() -> None:
-    with pytest.raises(DeclarationError, match=r"__init__ is not overridden.*hfg\.Parameter and hfg\.State.*setup\(\)"):
+    with pytest.raises(
+        DeclarationError, match=r"__init__ cannot be overridden.*hfg\.Parameter and hfg\.State.*setup\(\)"
+    ):
         declare(__init__=lambda self: None)
 
 
@@ -283,12 +285,12 @@ def test_an_argument_without_annotation_is_refused() -> None:
 
 
 def test_a_result_that_nothing_is_said_of_is_refused() -> None:
-    with pytest.raises(DeclarationError, match="process says nothing about its result; annotate it, `-> int`"):
+    with pytest.raises(DeclarationError, match="process does not say what it returns; annotate its result, `-> int`"):
 
         class Broken(hfg.Node):
             def process(self, value: int): ...  # type: ignore[no-untyped-def]
 
-    with pytest.raises(DeclarationError, match="process says nothing about its result"):
+    with pytest.raises(DeclarationError, match="process does not say what it returns; annotate its result,"):
 
         class Silent(hfg.Node):
             def process(self):  # type: ignore[no-untyped-def]
@@ -345,7 +347,7 @@ def test_arguments_and_declared_inputs_must_agree() -> None:
 
 
 def test_a_generator_takes_no_inputs() -> None:
-    with pytest.raises(DeclarationError, match=r'a generator is a source and takes no inputs, but it has "value"'):
+    with pytest.raises(DeclarationError, match=r'a generator is a source and cannot have inputs, but it has "value"'):
 
         class Broken(hfg.Node):
             def process(self, value: int) -> Iterator[int]:
@@ -383,7 +385,7 @@ def test_a_subgraph_does_not_fire() -> None:
 
 @pytest.mark.parametrize("hint", [3, "int", [int], print, logging])
 def test_what_is_no_type_is_refused_as_the_type_of_a_port(hint: Any) -> None:
-    said = '"value" is .*, which is no type; write the type itself, as in `int`'
+    said = '"value" is .*, which is not a type; write the type itself, as in `int`'
     for declare in (hfg.Input, hfg.Output, hfg.Event):
         with pytest.raises(DeclarationError, match=said):
             type("Broken", (hfg.Node,), {"value": declare(hint)})
@@ -397,7 +399,7 @@ def test_what_is_no_type_is_refused_as_the_type_of_a_port(hint: Any) -> None:
 
 @pytest.mark.parametrize("method", [{"__eq__": lambda self, other: True}, {"__hash__": None}])
 def test_nodes_are_equal_to_themselves_alone(method: dict[str, Any]) -> None:
-    with pytest.raises(DeclarationError, match="__eq__ and __hash__ are not overridden, .* another name"):
+    with pytest.raises(DeclarationError, match="__eq__ and __hash__ cannot be overridden because .* another name"):
         type("Broken", (hfg.Node,), method)
 
 
@@ -443,7 +445,9 @@ def test_a_node_can_always_be_made_again() -> None:
 def test_outside_a_run_a_node_is_not_active_and_has_no_place() -> None:
     node = MapLookup()
     assert not node.active
-    with pytest.raises(UsageError, match=r'^node "map_lookup" is in no graph, so it has no place: add it first, with'):
+    with pytest.raises(
+        UsageError, match=r'^node "map_lookup" is not in a graph, so it has no place: add it first, with'
+    ):
         _ = node.place
     assert repr(node) == "<MapLookup(tolerance=0.1)>"
     node._place = Place(None, "lookup", "fetch/lookup")
@@ -488,11 +492,11 @@ def test_results_are_split_into_one_value_for_each_output() -> None:
     assert Two()._split((1, None)) == [1, None]
     assert Two()._split(None) == [None, None]
     assert Sink()._split(None) == []
-    with pytest.raises(TypeError, match='two gave back 3 values, but has 2 outputs: "a", "b"; return one for each'):
+    with pytest.raises(TypeError, match='two returned 3 values, but has 2 outputs: "a", "b"; return one for each'):
         Two()._split((1, 2, 3))
-    with pytest.raises(TypeError, match='two gave back 7, but has the outputs "a", "b"; return a tuple'):
+    with pytest.raises(TypeError, match='two returned 7, but has the outputs "a", "b"; return a tuple'):
         Two()._split(7)
-    with pytest.raises(TypeError, match="sink has no output but gave back 7"):
+    with pytest.raises(TypeError, match="sink has no output but returned 7"):
         Sink()._split(7)
 
 

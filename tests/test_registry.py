@@ -63,11 +63,11 @@ def test_a_type_has_the_name_of_the_package_that_lists_it(tmp_path: Path, monkey
     ("reference", "message"),
     [
         ("Arm", 'write "module:name"'),
-        ("no_such_module:Arm", 'module "no_such_module" cannot be found'),
+        ("no_such_module:Arm", 'no module named "no_such_module"'),
         ("hfg.errors:Arm", 'module "hfg.errors" has no "Arm"'),
         ("hfg.testing.nodes:Scrpt", r'module "hfg\.testing\.nodes" has no "Scrpt" \(did you mean "Script"\?\)'),
         ("hfg.nodes.cv:blurr", r'module "hfg\.nodes\.cv" has no "blurr" \(did you mean "blur"\?\)'),
-        ("hfg.errors:HfgError", "no node type; derive it from hfg.Node"),
+        ("hfg.errors:HfgError", "not a node type; derive it from hfg.Node"),
     ],
 )
 def test_what_is_no_node_type_is_refused(reference: str, message: str) -> None:

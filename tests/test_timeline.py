@@ -172,7 +172,7 @@ def test_errors_and_dropped_tokens_are_marks() -> None:
 def test_what_is_under_way_at_the_end_is_closed() -> None:
     events = timeline(build(), until_s=0.3)
     last = [box for box in of(events, "X") if box["name"] == "ask"][-1]
-    assert last["args"]["outcome"] == "under way at the end: until"
+    assert last["args"]["outcome"] == "in progress at the end: until"
 
 
 def test_the_file_is_whole_when_the_run_fails(tmp_path: Path) -> None:
@@ -187,9 +187,9 @@ def test_the_file_is_whole_when_the_run_fails(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("make", [str, Path])
 def test_a_file_that_cannot_be_written_is_refused_before_the_run(make: Any, tmp_path: Path) -> None:
-    with pytest.raises(hfg.errors.UsageError, match="the timeline cannot be written to .*nowhere.*: No such file"):
+    with pytest.raises(hfg.errors.UsageError, match="cannot write the timeline to .*nowhere.*: No such file"):
         Timeline(make(tmp_path / "nowhere" / "run.json"), build())
-    with pytest.raises(hfg.errors.UsageError, match="the timeline cannot be written to .*: Is a directory"):
+    with pytest.raises(hfg.errors.UsageError, match="cannot write the timeline to .*: Is a directory"):
         Timeline(make(tmp_path), build())
 
 

@@ -244,51 +244,51 @@ FITS = [
 ]
 
 DOES_NOT_FIT = [
-    (float, int, "float is no int"),
-    (str, int, "str is no int"),
-    (Animal, Dog, "Animal is no Dog"),
-    (object, int, "object is no int"),
-    (int | str, int, "str is no int"),
-    (str, int | None, "str is none of int | None"),
-    (None, int, "None is no int"),
-    (list[str], list[int], "list[str] is no list[int]"),
-    (Literal["c"], Literal["a", "b"], "is no"),
-    (str, Meters, "is no"),
-    (int, Image, "int is no array"),
-    (Image, int, "an array is no int"),
-    (Bytes, Floats, "array of uint8 is no array of float32"),
+    (float, int, "float is not int"),
+    (str, int, "str is not int"),
+    (Animal, Dog, "Animal is not Dog"),
+    (object, int, "object is not int"),
+    (int | str, int, "str is not int"),
+    (str, int | None, "str is not one of int | None"),
+    (None, int, "None is not int"),
+    (list[str], list[int], "list[str] is not list[int]"),
+    (Literal["c"], Literal["a", "b"], "is not"),
+    (str, Meters, "is not"),
+    (int, Image, "int is not an array"),
+    (Image, int, "an array is not int"),
+    (Bytes, Floats, "array of uint8 is not an array of float32"),
     (npt.NDArray[np.floating[Any]], Bytes, "array of floating"),
-    (GrayImage, ColorImage, "the layout Pixels(1) never fits Pixels(3)"),
+    (GrayImage, ColorImage, "the layout Pixels(1) never matches Pixels(3)"),
     (Points, Annotated[npt.NDArray[np.float64], Shape(None, 2)], "the layout"),
     (Annotated[npt.NDArray[np.float64], Shape(3)], Image, "the layout"),
     (list[Bytes], list[Floats], "array of uint8"),
-    (npt.NDArray[np.uint8 | np.float32], Bytes, "is no array of uint8"),
-    (list[float], Sequence[int], "float is no int"),
-    (tuple[int, str], Iterable[int], "tuple[int, str] is no Iterable[int]: str is no int"),
+    (npt.NDArray[np.uint8 | np.float32], Bytes, "is not an array of uint8"),
+    (list[float], Sequence[int], "float is not int"),
+    (tuple[int, str], Iterable[int], "tuple[int, str] is not Iterable[int]: str is not int"),
     (tuple[int, ...], tuple[int, int], "its length is open"),
     (tuple[int], tuple[int, int], "it has 1 items, not 2"),
-    (list[int], tuple[int, ...], "is no tuple"),
-    (dict[str, int], Iterable[int], "str is no int"),
-    (str, Sequence[int], "str is no Sequence[int]: str is no int"),
-    (str, list[str], "str is no list[str]"),
-    (Sequence[int], list[int], "is no list[int]"),
-    (Mapping[str, int], dict[str, int], "is no dict"),
-    (set[int], Sequence[int], "is no Sequence"),
-    (list[int | None], list[int], "None is no int"),  # inside of another value it is one
-    (Poses, Sequence[int], "Pose is no int"),
-    (BoxOfInt, Boxed[str], "int is no str"),
-    (Animal, HasX, 'Animal is no HasX: it has no "x"'),
+    (list[int], tuple[int, ...], "is not tuple"),
+    (dict[str, int], Iterable[int], "str is not int"),
+    (str, Sequence[int], "str is not Sequence[int]: str is not int"),
+    (str, list[str], "str is not list[str]"),
+    (Sequence[int], list[int], "is not list[int]"),
+    (Mapping[str, int], dict[str, int], "is not dict"),
+    (set[int], Sequence[int], "is not Sequence"),
+    (list[int | None], list[int], "None is not int"),  # inside of another value it is one
+    (Poses, Sequence[int], "Pose is not int"),
+    (BoxOfInt, Boxed[str], "int is not str"),
+    (Animal, HasX, 'Animal is not HasX: it has no "x"'),
     (str, SupportsFloat, '"__float__"'),
-    (Callable[[int], int], Callable[[float], int], "does not take what"),
+    (Callable[[int], int], Callable[[float], int], "does not accept the arguments of"),
     (Callable[[int], int], Callable[[int, int], int], "takes 1 arguments, not 2"),
-    (Callable[[int], str], Callable[[int], int], "str is no int"),
+    (Callable[[int], str], Callable[[int], int], "str is not int"),
     (Animal, Callable[..., Any], "cannot be called"),
-    (bool, Literal[True], "False is no"),
-    (Options, Mapping[str, str], "int is no str"),
+    (bool, Literal[True], "False is not"),
+    (Options, Mapping[str, str], "int is not str"),
     (Options, LongOptions, 'it has no key "height"'),
-    (dict[str, int], Options, "is no Options"),
-    (list, Hashable, "list is no Hashable"),
-    (Array, Sequence[float], "an array is no Sequence"),
+    (dict[str, int], Options, "is not Options"),
+    (list, Hashable, "list is not Hashable"),
+    (Array, Sequence[float], "an array is not Sequence"),
 ]
 
 
@@ -311,13 +311,13 @@ def test_types_that_do_not_fit_say_why(source: Any, target: Any, reason: str) ->
 def test_what_cannot_be_judged_is_an_error_that_names_the_hint(hint: Any) -> None:
     reason = why_not(hint, int)
     assert reason is not None
-    assert "cannot judge" in reason
+    assert "cannot compare" in reason
     assert describe(hint) in reason
 
 
 def test_metadata_that_cannot_be_hashed_is_judged_all_the_same() -> None:
     assert compatible(Annotated[int, []], float)
-    assert why_not(Annotated[str, []], int) == "str is no int"
+    assert why_not(Annotated[str, []], int) == "str is not int"
     assert accepts(3, Annotated[int, []])
 
 

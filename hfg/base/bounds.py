@@ -1,8 +1,8 @@
-"""How much what comes from outside may ask for before it is refused: one table, docs/howto/untrusted.md (rule L4).
+"""Limits on the resources that untrusted input may use: one table, docs/howto/untrusted.md (rule L4).
 
-A file of a few kilobytes can ask for gigabytes of memory. Each reader asks here how much it may spend, and refuses the
-rest with a sentence that names the limit. A limit is raised by an environment variable of its name, so that it holds in
-every process of a run. Stands on nothing.
+A file of a few kilobytes can ask for gigabytes of memory. Each reader asks here how much it may use, and refuses more
+with an error that names the limit. An environment variable with the limit's name changes it, so the limit holds in
+every process of a run. No dependencies.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ class Bound(NamedTuple):
     """A limit.
 
     Attributes:
-      variable: the environment variable that sets another one.
-      usual: what holds without it.
-      what: it limits.
+      variable: the environment variable that changes it.
+      usual: the default.
+      what: the name of what it limits.
     """
 
     variable: str
@@ -28,20 +28,20 @@ class Bound(NamedTuple):
 
     @property
     def most(self) -> int:
-        """What holds now."""
+        """The limit in effect."""
         said = os.environ.get(self.variable, "")
         return int(said) if said.isdecimal() and said.isascii() and len(said) < 20 else self.usual
 
     @property
     def remedy(self) -> str:
-        """What to do about something that asks for more."""
+        """What to do about input that needs more."""
         return f"the limit is {self.most:,}; if you trust it, set {self.variable} to a larger number"
 
 
 CHUNK_BYTES: Final = Bound("HFG_MOST_CHUNK_BYTES", 256 * 2**20, "bytes of one chunk of a recording, unpacked")
 FILE_BYTES: Final = Bound("HFG_MOST_FILE_BYTES", 2**30, "bytes of a file, line or array that is read whole")
 GRAPH_FILE_BYTES: Final = Bound("HFG_MOST_GRAPH_FILE_BYTES", 32 * 2**20, "bytes of a graph file or .apex file")
-JSON_VALUES: Final = Bound("HFG_MOST_JSON_VALUES", 10_000_000, "values of a text of JSON, keys counted")
+JSON_VALUES: Final = Bound("HFG_MOST_JSON_VALUES", 10_000_000, "values in a JSON text, including keys")
 PICTURE_PIXELS: Final = Bound("HFG_MOST_PICTURE_PIXELS", 2**27, "pixels of one picture or of a frame of a video")
 
 BOUNDS: Final = (CHUNK_BYTES, FILE_BYTES, GRAPH_FILE_BYTES, JSON_VALUES, PICTURE_PIXELS)

@@ -1,8 +1,8 @@
-"""What time it is for a graph: seconds on the run's clock, and since the run began.
+"""The time in a graph: seconds on the run's clock, and since the start of the run.
 
-`now()` is the clock of the run that the caller's code belongs to, real or virtual; outside a run it is the loop's,
-if that is in virtual time, else the real clock. `elapsed()` counts from the run's own start. Stands on nothing; the
-engine brings the clocks (rule R6).
+`now()` reads the clock of the run that the caller's code belongs to, real or virtual. Outside a run it reads the loop's
+clock if that is in virtual time, otherwise the real clock. `elapsed()` counts from the start of the run. No
+dependencies; the engine sets the clocks (rule R6).
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ current_clock: Final[ContextVar[Callable[[], float]]] = ContextVar("hfg.base.clo
 """Set by the engine around the code of a run, on the loop and in threads."""
 
 current_elapsed: Final[ContextVar[Callable[[], float] | None]] = ContextVar("hfg.elapsed", default=None)
-"""The same, in seconds since the start of the run; None outside of one."""
+"""The same in seconds since the start of the run; None outside a run."""
 
 
 @contextmanager
 def time_told_by(clock: Callable[[], float]) -> Iterator[None]:
-    """Inside the block, let a clock that began at 0 tell the time."""
+    """Make `now` read another clock, which began at 0, inside the block."""
     resets = current_clock.set(clock), current_elapsed.set(clock)
     try:
         yield
@@ -36,25 +36,25 @@ def time_told_by(clock: Callable[[], float]) -> Iterator[None]:
 
 
 def now() -> float:
-    """Seconds on the current run's clock, the one of stamps.
+    """Return seconds on the current run's clock, the clock of stamps.
 
-    On the real clock Unix time, as it was when the run began and carried on by the machine's monotonic clock: a step of
-    the system's clock does not touch a run. On a virtual one seconds since its loop was made, so since the start of
-    `hfg.run(graph, clock="virtual")`.
+    On the real clock this is Unix time: read once at the start of the run, then advanced by the monotonic clock, so
+    that setting the system clock does not affect a run. On a virtual clock it is seconds since its loop was made, which
+    is the start of `hfg.run(graph, clock="virtual")`.
     """
     return current_clock.get()()
 
 
 def elapsed() -> float:
-    """Seconds since the start of the run to which the caller's code belongs: its nodes' `setup` begins at 0.
+    """Return seconds since the start of the run that the caller's code belongs to; its nodes' `setup` begins at 0.
 
     Raises:
-      NotRunning: the caller's code belongs to no run.
+      NotRunning: the caller's code does not belong to a run.
     """
     clock = current_elapsed.get()
     if clock is None:
         raise NotRunning(
-            "hfg.elapsed() counts from the start of the run whose code asks, and this is called outside of one: "
-            "call it in a node, or ask the run itself, run.elapsed()"
+            "hfg.elapsed() counts from the start of the run whose code calls it, but was called outside a "
+            "run: call it in a node, or use run.elapsed()"
         )
     return clock()

@@ -1,6 +1,6 @@
-"""Characters that steer whoever shows a text: a terminal obeys them, and marks of direction turn letters round (L4).
+"""Control characters: a terminal obeys them, and marks of direction reverse the text after them (L4).
 
-Names have none of them. Values may, so whatever goes to a terminal goes through `escaped`. Stands on nothing.
+Names cannot contain any. Values can, so everything written to a terminal goes through `escaped`. No dependencies.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _CONTROLS: Final = re.compile(
 
 
 def escaped(text: str) -> str:
-    r"""Write out what would steer a terminal; ends of lines and tabs stay.
+    r"""Return a text with control characters escaped, except line ends and tabs.
 
     Examples:
       >>> escaped("a\x1b[2Jb") == "a\\x1b[2Jb"
@@ -26,10 +26,10 @@ def escaped(text: str) -> str:
 
 
 def _written(found: re.Match[str]) -> str:
-    """In a form that JSON reads back, too, where it may stand in its texts."""
+    """Return the escape of a character, in a form that JSON accepts where the text may be JSON."""
     number = ord(found.group())
     if number < 0x20:
-        return f"\\x{number:02x}"  # JSON has none of them
+        return f"\\x{number:02x}"  # JSON text does not contain them
     if number < 0x10000:
         return f"\\u{number:04x}"
     high, low = divmod(number - 0x10000, 0x400)
@@ -37,16 +37,16 @@ def _written(found: re.Match[str]) -> str:
 
 
 def name_problem(name: str) -> str | None:
-    """Say why a text is no name that people could be shown; None if it is one."""
+    """Return why a text is not a valid name, or None if it is valid."""
     if not (_CONTROLS.search(name) or "\n" in name or "\t" in name):
         return None
     clean = " ".join(escaped(name).split())
-    return f'cannot be named "{clean}": a name is one line without characters that steer a terminal; leave them out'
+    return f'cannot be named "{clean}": a name is one line without control characters; remove them'
 
 
 def is_terminal(stream: Any) -> bool:
-    """Whether a stream goes to a terminal."""
+    """Return whether a stream goes to a terminal."""
     try:
         return stream is not None and bool(stream.isatty())
-    except (ValueError, AttributeError):  # it is closed, or no stream
+    except (ValueError, AttributeError):  # it is closed, or not a stream
         return False

@@ -1,6 +1,6 @@
-"""Which part of a traceback is the user's: without the frames of hfg and of what lies between it and node code.
+"""The user's part of a traceback: without frames of hfg and of the libraries between hfg and node code.
 
-Stands on nothing.
+No dependencies.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ _MACHINERY: Final = (
 
 
 def is_ours(file: str) -> bool:
-    """Whether a frame of this file is hfg's own."""
+    """Return whether a frame of this file is hfg's own."""
     return file.startswith(_OURS)
 
 
 def is_standard(file: str) -> bool:
-    """Whether a frame of this file is one of Python's own library."""
+    """Return whether a frame of this file belongs to Python's standard library."""
     return file.startswith(f"{_STANDARD}/") and "site-packages" not in file
 
 
 def is_machinery(file: str) -> bool:
-    """Whether a frame of this file tells a user nothing."""
+    """Return whether a frame of this file is of no use to users."""
     inside = file.removeprefix(f"{_STANDARD}/").replace("\\", "/")
     return is_ours(file) or ((inside != file or file.startswith("<")) and inside.startswith(_MACHINERY))
 
 
 def users_part(found: TracebackType | None) -> TracebackType | None:
-    """Give a traceback of the user's frames alone, for a log record or an error that is shown."""
+    """Return a traceback with only the user's frames, for a log record or an error that is shown."""
     kept: list[TracebackType] = []
     while found is not None:
         if not is_machinery(found.tb_frame.f_code.co_filename):

@@ -1,6 +1,6 @@
-"""What a type is made of, and what it is when it is looked at as another: a `str` as a Sequence of `str`.
+"""The parts of a type, including its parts when it is seen as another type: a `str` as a Sequence of `str`.
 
-Type hints are read here, never judged: that is what `types` does. Stands on typing alone.
+This module only reads type hints; `types` judges them. Depends only on typing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing_extensions import get_protocol_members, is_protocol
 __all__ = ["UNKNOWN", "callable_parts", "class_of", "lacks", "parts_as", "tuple_items"]
 
 UNKNOWN: Final = None
-"""The parts of a bare generic type: `list` may hold anything, so it is judged on the values."""
+"""The parts of a bare generic type: `list` may hold anything, so its values are checked instead."""
 
 _PARTS: Final[dict[type, tuple[Any, ...]]] = {
     str: (str,),
@@ -24,22 +24,22 @@ _PARTS: Final[dict[type, tuple[Any, ...]]] = {
     memoryview: (int,),
     range: (int,),
 }
-"""What is in types that are containers and not generic."""
+"""Item types of containers that are not generic."""
 
 _FIRST: Final = (abc.Generator, abc.AsyncGenerator, abc.KeysView, abc.ValuesView)
-"""Generic types of which an iteration gives the first part."""
+"""Generic types whose iteration yields the first part."""
 
 
 def class_of(hint: Any) -> type | None:
-    """Give the class of a plain or generic type; None for hints that are no class, such as a Literal."""
+    """Return the class of a plain or generic type; None for hints that are not classes, such as a Literal."""
     origin = typing.get_origin(hint) or hint
     return origin if isinstance(origin, type) else None
 
 
 def parts_as(source: Any, wanted: type) -> tuple[Any, ...] | None:
-    """Give the parts of `source` as those of `wanted`, a base or abstract type of it.
+    """Return the parts of `source` when it is seen as `wanted`, a base or abstract type of it.
 
-    Those of `dict[str, int]` as an Iterable are `str` alone. `UNKNOWN` if nothing says what they are.
+    For `dict[str, int]` as an Iterable, that is only `str`. Returns `UNKNOWN` if the parts are not declared.
     """
     cls = class_of(source)
     if cls is None:
@@ -60,7 +60,7 @@ def parts_as(source: Any, wanted: type) -> tuple[Any, ...] | None:
 
 
 def _builtin_parts(cls: type, parts: tuple[Any, ...], wanted: type) -> tuple[Any, ...] | None:
-    """The same for Python's own containers."""
+    """Do the same for Python's own containers."""
     if cls is Counter:
         parts = (parts[0], int)
     if issubclass(cls, abc.Coroutine):
@@ -75,7 +75,7 @@ def _builtin_parts(cls: type, parts: tuple[Any, ...], wanted: type) -> tuple[Any
 
 
 def _parts_of_bases(cls: type, parts: tuple[Any, ...] | None, wanted: type) -> tuple[Any, ...] | None:
-    """The same for a class of somebody's, which says it of its bases: `class Poses(list[Pose])`."""
+    """Do the same for a user's class, which declares the parts in its bases: `class Poses(list[Pose])`."""
     names = getattr(cls, "__parameters__", ())
     for base in cls.__dict__.get("__orig_bases__", cls.__bases__):
         base_class = class_of(base)
@@ -101,9 +101,9 @@ def _derives(cls: type, wanted: type) -> bool:
 
 
 def tuple_items(source: Any) -> tuple[Any, ...] | None:
-    """Give the types of a tuple's items, with `...` behind the only one of a tuple of any length.
+    """Return the types of a tuple's items, with `...` after the only one if the tuple has any length.
 
-    `UNKNOWN` if nothing says what they are, or the source is no tuple.
+    Returns `UNKNOWN` if the types are not declared, or the source is not a tuple.
     """
     cls = class_of(source)
     if cls is None or not issubclass(cls, tuple):
@@ -123,7 +123,7 @@ def tuple_items(source: Any) -> tuple[Any, ...] | None:
 def _fields(cls: type) -> tuple[Any, ...]:
     try:
         hints = typing.get_type_hints(cls)
-    except Exception:  # names that exist for type checkers alone
+    except Exception:  # names that exist only for type checkers
         hints = {}
     return tuple(hints.get(name, Any) for name in getattr(cls, "_fields", hints))
 
@@ -134,7 +134,7 @@ def _union(hints: tuple[Any, ...]) -> Any:
 
 
 def callable_parts(hint: Any) -> tuple[list[Any] | None, Any]:
-    """Give the types of the arguments, None if they are open, and of the result, of what can be called."""
+    """Return the argument types of a callable, None if they are open, and its result type."""
     arguments = typing.get_args(hint)
     if typing.get_origin(hint) is type:
         return None, arguments[0]
@@ -144,9 +144,9 @@ def callable_parts(hint: Any) -> tuple[list[Any] | None, Any]:
 
 
 def lacks(cls: type, protocol: type) -> str | None:
-    """Give the first member of a protocol that a class does not have, as far as it can be seen; None if it has all.
+    """Return the first member of a protocol that a class visibly lacks; None if it has all.
 
-    What `__init__` writes counts as a member, as it does for type checkers.
+    Attributes that `__init__` assigns count as members, as they do for type checkers.
     """
     if not is_protocol(protocol) or protocol in cls.__mro__:
         return None
@@ -158,7 +158,7 @@ def _has(cls: type, name: str) -> bool:
     for one in cls.__mro__:
         own = vars(one)
         if name in own:
-            return own[name] is not None  # `__hash__ = None` takes it away
+            return own[name] is not None  # `__hash__ = None` removes it
         begin = own.get("__init__")
         if name in own.get("__annotations__", ()) or (
             isinstance(begin, FunctionType) and name in begin.__code__.co_names

@@ -1,7 +1,7 @@
-"""Limits of values, in the words of annotated-types, and what a value says to them.
+"""Limits of values, in the terms of annotated-types, and checks of values against them.
 
-A limit on numbers holds for every element of a list, set, tuple or array; `Len` and `Predicate` for the whole. Stands
-on values and types; knows no parameter.
+A limit on numbers holds for every element of a list, set, tuple or array; `Len` and `Predicate` hold for the whole.
+Depends on values and types, not on parameters.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["LIMITS", "Inside", "breaks", "kept_metadata", "limits_of", "limits_w
 
 
 class Inside(msgspec.Struct, frozen=True, repr_omit_defaults=True):
-    """Limits that a type has further in, as in `list[Annotated[float, Ge(0)]]`."""
+    """Limits of a type's parts, as in `list[Annotated[float, Ge(0)]]`."""
 
     hint: Any
 
@@ -41,7 +41,7 @@ LIMITS: Final = (
 
 
 def limits_of(metadata: Iterable[Any]) -> tuple[Any, ...]:
-    """Open groups such as `Interval` and keep what is a limit; other metadata is somebody else's."""
+    """Open groups such as `Interval` and keep only limits; other metadata is ignored."""
     limits: list[Any] = []
     for item in metadata:
         if isinstance(item, at.GroupedMetadata):
@@ -54,7 +54,7 @@ def limits_of(metadata: Iterable[Any]) -> tuple[Any, ...]:
 
 
 def limits_within(hint: Any) -> tuple[Any, ...]:
-    """Give what the parts of a type ask for, as one limit; nothing if they ask for nothing."""
+    """Return the limits of the parts of a type, as one limit; empty if there are none."""
     return (Inside(hint),) if any(map(_asks, typing.get_args(_bare(hint)))) else ()
 
 
@@ -68,7 +68,7 @@ def _asks(hint: Any) -> bool:
 
 
 def breaks(limit: Any, value: Any) -> str | None:
-    """Say which limit a value breaks: "must be <= 1"; None if it keeps it."""
+    """Return which limit a value violates: "must be <= 1"; None if it violates none."""
     try:
         match limit:
             case at.Gt(gt):
@@ -103,7 +103,7 @@ def _all(value: Any, holds: Callable[[Any], Any]) -> bool:
 
 
 def _divides(step: Any, value: Any) -> Any:
-    """Whether a value is a multiple; 0.3 is one of 0.1, for all that the computer knows."""
+    """Return whether a value is a multiple; 0.3 counts as a multiple of 0.1 despite rounding."""
     if isinstance(value, np.ndarray) and (value.dtype.kind == "f" or isinstance(step, float)):
         return np.abs(value / step - np.round(value / step)) <= 1e-9 * np.maximum(1, np.abs(value / step))
     if isinstance(value, float) or isinstance(step, float):
@@ -112,7 +112,7 @@ def _divides(step: Any, value: Any) -> Any:
 
 
 def _breaks_within(hint: Any, value: Any) -> str | None:
-    """Say what a part of the value breaks, and which part."""
+    """Return what a part of the value violates, and which part."""
     bare = _bare(hint)
     arguments = typing.get_args(bare)
     for place, part, asked in _parts(bare, arguments, value):
@@ -124,7 +124,7 @@ def _breaks_within(hint: Any, value: Any) -> str | None:
 
 
 def _parts(hint: Any, arguments: tuple[Any, ...], value: Any) -> list[tuple[str, Any, Any]]:
-    """Where, what, and of which type the parts of a value are."""
+    """Yield place, value and type of each part of a value."""
     if not arguments:
         return []
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
@@ -140,7 +140,7 @@ def _parts(hint: Any, arguments: tuple[Any, ...], value: Any) -> list[tuple[str,
 
 
 def numbers_within(limits: Iterable[Any]) -> tuple[Any, Any]:
-    """Give the smallest and the largest number that limits speak of, allowed or just not; None for no end."""
+    """Return the smallest and the largest number in limits, whether included or excluded; None for no limit."""
     low: list[Any] = []
     high: list[Any] = []
     for limit in limits:
@@ -153,12 +153,12 @@ def numbers_within(limits: Iterable[Any]) -> tuple[Any, Any]:
 
 
 def step_within(limits: Iterable[Any]) -> Any:
-    """Give what values are multiples of; None without such a limit."""
+    """Return the step that values must be multiples of; None without such a limit."""
     return next((limit.multiple_of for limit in limits if isinstance(limit, at.MultipleOf)), None)
 
 
 def kept_metadata(hint: Any) -> Any:
-    """Take what limits said off a type, and keep what belongs to it: the layout of an array, and its name."""
+    """Remove limits from a type, and keep metadata that belongs to the type: the layout of an array, and its name."""
     if typing.get_origin(hint) is not Annotated:
         return hint
     bare = typing.get_args(hint)[0]

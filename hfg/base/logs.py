@@ -1,8 +1,8 @@
-"""Where hfg and the nodes of its graphs log: below "hfg", those of a node at "hfg.node." and its path.
+"""Loggers of hfg and of nodes: below "hfg"; a node logs to "hfg.node." plus its path.
 
-A path has dots there instead of slashes, so `logging.getLogger("hfg.node.fetch").setLevel(...)` speaks of all that is
-inside the subgraph "fetch". A record says its `path` as well. A handler that raises loses a record and harms nobody:
-what goes wrong with logging is no error of the node that logs. Stands on errors.
+The path has dots instead of slashes there, so `logging.getLogger("hfg.node.fetch").setLevel(...)` applies to everything
+inside the subgraph "fetch". Records have the path in their attribute `path`, too. If a handler raises, a record is lost
+and nothing else: an error in logging is not an error of the node that logs. Depends on errors.
 """
 
 from __future__ import annotations
@@ -24,46 +24,46 @@ _NODES: Final = "hfg.node"
 
 
 class Log(Logger):
-    """A logger that never raises; with a path its records carry it."""
+    """A logger that never raises. If it has a path, its records carry it."""
 
     def __init__(self, name: str, path: str = "") -> None:
         super().__init__(logging.getLogger(name), {})
         self.path = path
 
     def process(self, msg: Any, kwargs: MutableMapping[str, Any]) -> tuple[Any, MutableMapping[str, Any]]:
-        """Add the path to what the record says anyway."""
+        """Add the path to the record's other attributes."""
         if self.path:
             kwargs["extra"] = {**(kwargs.get("extra") or {}), "path": self.path}
         return msg, kwargs
 
     def log(self, level: int, msg: object, *args: object, **kwargs: Any) -> None:
-        """See `logging.Logger.log`; a handler that raises is told of on standard error."""
+        """See `logging.Logger.log`. A handler that raises is reported on standard error."""
         if not self.isEnabledFor(level):
             return
-        kwargs["stacklevel"] = kwargs.get("stacklevel", 1) + 1  # the line that is named is the caller's, not this one
+        kwargs["stacklevel"] = kwargs.get("stacklevel", 1) + 1  # name the caller's line, not this one
         try:
             super().log(level, msg, *args, **kwargs)
         except Exception as error:
-            with suppress(OSError, ValueError, AttributeError):  # there may be no standard error either
+            with suppress(OSError, ValueError, AttributeError):  # standard error may be unavailable, too
                 sys.stderr.write(
-                    f'hfg: a log handler raised {in_words(error)}; a record of "{self.logger.name}" is lost, and the '
-                    "run goes on\n"
+                    f'hfg: a log handler raised {in_words(error)}; a record of "{self.logger.name}" is lost, '
+                    "and the run continues\n"
                 )
 
 
 current_log: Final[ContextVar[Callable[[], Logger] | None]] = ContextVar("hfg.log", default=None)
-"""Set by the engine around the code of a run: gives the log of the node whose code asks."""
+"""Set by the engine around the code of a run: returns the log of the node that the calling code belongs to."""
 
 
 def node_log(path: str) -> Log:
-    """Give the log of the node at a path."""
+    """Return the log of the node at a path."""
     return Log(f"{_NODES}.{path.replace('/', '.')}", path)
 
 
 def log() -> Logger:
-    """Give the log of the node whose function calls this, "hfg.node." and its path; outside a run "hfg.node".
+    """Return the log of the node whose function calls this, "hfg.node." plus its path; outside a run "hfg.node".
 
-    For functions, which have no `self.log`. What a function calls may call it as well.
+    Use it in functions, which have no `self.log`, and in code that they call.
 
     Examples:
       >>> def brighten(image: int) -> int:

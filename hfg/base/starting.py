@@ -1,7 +1,7 @@
-"""Ctrl-C while the command `hfg` is still being imported: one sentence, nothing is torn down, for nothing was begun.
+"""Handles Ctrl-C while the command `hfg` is still being imported.
 
-The first thing that `hfg` imports. In any other program it does nothing: a library leaves signals alone. Stands on
-nothing.
+It prints one line and exits; there is nothing to clean up. This is the first module that `hfg` imports. In any other
+program it does nothing: a library does not touch signals. No dependencies.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ __all__ = ["is_command", "let_go_at_once"]
 
 
 def is_command() -> bool:
-    """Whether this process is the command: the script `hfg`, or `python -m hfg`."""
-    if sys.argv[:1] == ["-m"]:  # so it is while the package is imported
+    """Return whether this process is the command: the script `hfg`, or `python -m hfg`."""
+    if sys.argv[:1] == ["-m"]:  # its value while the package is being imported
         given = sys.orig_argv
         return "-m" in given[:-1] and given[given.index("-m") + 1] in ("hfg", "hfg.__main__")
     return PurePath(sys.argv[0] if sys.argv else "").stem in ("hfg", "hfg-script")
 
 
 def let_go_at_once() -> None:
-    """Until the command line takes over, let Ctrl-C end the process without a traceback."""
+    """Let Ctrl-C end the process without a traceback until the command line installs its own handler."""
     if threading.current_thread() is not threading.main_thread():
         return
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:

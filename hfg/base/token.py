@@ -1,6 +1,6 @@
-"""What flows along an edge: a value or a marker, with its activity modifier, stamp and number (rules T1-T5).
+"""Tokens, which travel along edges: a value or a marker, with its activity modifier, stamp and number (rules T1-T5).
 
-A token never changes; fan-out shares its value. Stands on nothing and knows neither ports nor nodes.
+A token never changes; fan-out shares its value. No dependencies.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ T_co = TypeVar("T_co", covariant=True)
 
 
 class Marker(enum.Enum):
-    """What a token holds in place of a value (rule T3, T4); compare with `is`."""
+    """Takes the place of a token's value (rules T3, T4); compare with `is`."""
 
     NO_MESSAGE = "NO_MESSAGE"
     END = "END"
@@ -26,20 +26,20 @@ class Marker(enum.Enum):
 
 
 NO_MESSAGE: Final = Marker.NO_MESSAGE
-"""Nothing this time; on synchronous edges only."""
+"""No value this time; only on synchronous edges."""
 
 END: Final = Marker.END
-"""Nothing any more."""
+"""No more values."""
 
 
 class Token(msgspec.Struct, Generic[T_co], frozen=True):
     """One token.
 
     Attributes:
-      value: what was sent, or a `Marker`.
+      value: the value that was sent, or a `Marker`.
       activity: the modifier a of the paper (eq. 8): +1 activates, -1 deactivates, 0 changes nothing.
       stamp: seconds on the run's clock (rule T5).
-      sequence: its number on its edge, from 1; 0 if it took none (initial tokens, signals seen before any edge).
+      sequence: its number on its edge, from 1; 0 if it has no number (initial tokens, signals seen before any edge).
     """
 
     value: T_co
@@ -49,5 +49,5 @@ class Token(msgspec.Struct, Generic[T_co], frozen=True):
 
     @property
     def is_marker(self) -> bool:
-        """Whether it carries no value."""
+        """Whether it carries a marker instead of a value."""
         return type(self.value) is Marker

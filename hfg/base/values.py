@@ -1,6 +1,6 @@
-"""Values that parameters have and Python has no type for, and what any value may be asked: equal? whose own?
+"""Value types for parameters that Python lacks, and two operations on any value: equality and copying.
 
-`Colour` and `Span` are plain tuples to whoever receives them. Stands on numpy; knows neither types nor ports.
+For receivers, `Colour` and `Span` are plain tuples. Depends on numpy, not on types or ports.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ class Colour(NamedTuple):
         """Read "#rrggbb", or "#rgb" for short.
 
         Raises:
-          ValueError: the text is neither.
+          ValueError: the text has another form.
         """
         found = _HEX.fullmatch(text.strip())
         if found is None:
-            raise ValueError(f'{text!r:.80} is no colour; write "#rrggbb", as in "#ff8000"')
+            raise ValueError(f'{text!r:.80} is not a colour; write "#rrggbb", as in "#ff8000"')
         digits = found[1] if len(found[1]) == 6 else "".join(2 * digit for digit in found[1])
         return cls(*bytes.fromhex(digits))
 
     @property
     def hex(self) -> str:
-        """It as "#rrggbb"."""
+        """The colour as "#rrggbb"."""
         return f"#{self.red:02x}{self.green:02x}{self.blue:02x}"
 
     @property
@@ -72,7 +72,7 @@ class Span(NamedTuple, Generic[T]):
     high: T
 
     def __contains__(self, value: Any) -> bool:
-        """Say whether a number lies between the two, or is one of them."""
+        """Return whether a number is in the interval, ends included."""
         return bool(self.low <= value <= self.high)
 
 
@@ -81,9 +81,10 @@ _CONTAINERS: Final = frozenset({list, tuple, dict, set, frozenset})
 
 
 def same(one: Any, other: Any) -> bool:
-    """Say whether two values are equal, in type too; arrays by dtype, shape and elements, and nan equals nan.
+    """Return whether two values are equal, including their types.
 
-    What cannot be compared is the same only as itself.
+    Arrays need equal dtype, shape and elements; nan equals nan. Values that cannot be compared are equal only to
+    themselves.
     """
     if one is other:
         return True
@@ -109,15 +110,15 @@ def same(one: Any, other: Any) -> bool:
         if isinstance(one, Mapping):
             return len(one) == len(other) and all(key in other and same(one[key], other[key]) for key in one)
         parts = _fields(one)
-        if parts is not None:  # one with an array in it cannot say itself whether it is equal
+        if parts is not None:  # an object that contains an array cannot decide itself whether it is equal
             return all(same(getattr(one, name), getattr(other, name)) for name in parts)
         return bool(one == other)
-    except Exception:  # values of users raise what they like
+    except Exception:  # users' values may raise anything
         return False
 
 
 def _fields(value: Any) -> tuple[str, ...] | None:
-    """The fields that say what a value is; None of what has none, or does not compare by them."""
+    """Return the fields that define a value; None if it has none, or does not compare by them."""
     if isinstance(value, msgspec.Struct):
         return value.__struct_fields__ if value.__struct_config__.eq else None
     if dataclasses.is_dataclass(value):
@@ -128,9 +129,9 @@ def _fields(value: Any) -> tuple[str, ...] | None:
 
 
 def own_copy(value: Any) -> Any:
-    """Give a value that nobody else can change: containers are copied, and arrays, which are read-only from then on.
+    """Return a value that other code cannot change: containers are copied, and arrays are copied and read-only.
 
-    Other objects are what they are.
+    Other objects are returned unchanged.
     """
     kind = type(value)
     if kind in _ATOMS or kind is float:

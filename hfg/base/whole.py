@@ -1,6 +1,7 @@
-"""Files that are whole or not there: written beside their place, brought to the disk, then renamed.
+"""Files that are complete or absent: written next to their place, flushed to disk, then renamed.
 
-A disk that becomes full, a limit and a sudden end leave the old file, or none. Stands on the standard library alone.
+A full disk, a size limit or a sudden end of the process leaves the old file, or none. Depends only on the standard
+library.
 """
 
 from __future__ import annotations
@@ -21,17 +22,17 @@ _HELD_BYTES: Final = 64 * 1024
 
 
 def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool = True) -> None:
-    """Write a file so that it is either the old one or the new one, whatever happens meanwhile.
+    """Write a file so that either the old or the new content exists, whatever happens meanwhile.
 
     A device or a pipe is written to directly.
 
     Args:
-      path: where it will be; of a symbolic link, what that leads to.
+      path: the file; for a symbolic link, its target.
       write: writes the content.
-      overwrite: whether a file that is there may be replaced.
+      overwrite: whether an existing file may be replaced.
 
     Raises:
-      OSError: it cannot be written; the old file is whole.
+      OSError: it cannot be written; the old file is unchanged.
     """
     target = _target(path)
     if not overwrite and target.exists():
@@ -57,7 +58,7 @@ def write_whole(path: Path, write: Callable[[BinaryIO], Any], *, overwrite: bool
 
 
 def need_writable(path: Path) -> None:
-    """See that a file could be written there, and leave nothing behind.
+    """Check that a file could be written here. Leave no file.
 
     Raises:
       OSError: it could not.
@@ -81,7 +82,7 @@ def _is_no_file(path: Path) -> bool:
 
 
 def _keep_the_name(file: Path) -> None:
-    """Bring the name to the disk too; not every system can."""
+    """Flush the folder entry to disk, too; not every system can."""
     with suppress(OSError):
         folder = os.open(file.parent, os.O_RDONLY)
         try:
@@ -91,24 +92,24 @@ def _keep_the_name(file: Path) -> None:
 
 
 def _own_part(path: Path) -> BinaryIO:
-    """Open an empty file under a name that anybody can foresee: none that another user put there, and through no link.
+    """Open an empty file with a predictable name, but never a file that another user has put there, nor through a link.
 
-    One that an earlier run of this user left is emptied.
+    A file left by an earlier run of this user is emptied.
     """
-    # what waits for a reader does not open, and nothing is emptied before it is known to be ours
+    # opening a pipe that waits for a reader must fail, and no file is emptied before it is known to be ours
     flags = os.O_WRONLY | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     try:
         number = os.open(path, flags | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0), 0o666)
     except OSError as error:
         if path.is_symlink():
-            raise PermissionError(errno.EPERM, "a symbolic link is in its place; take it away", str(path)) from error
+            raise PermissionError(errno.EPERM, "a symbolic link is in its place; remove it", str(path)) from error
         raise
     try:
         there = os.fstat(number)
         is_ours = not hasattr(os, "geteuid") or there.st_uid == os.geteuid()
         if not (stat.S_ISREG(there.st_mode) and is_ours and there.st_nlink == 1):
             raise PermissionError(
-                errno.EPERM, "what is in its place is no file of yours alone; take it away", str(path)
+                errno.EPERM, "the file in its place does not belong only to you; remove it", str(path)
             )
         os.ftruncate(number, 0)
         return os.fdopen(number, "wb", buffering=0)
@@ -118,13 +119,13 @@ def _own_part(path: Path) -> BinaryIO:
 
 
 class GrowingFile:
-    """A file that grows piece by piece, each whole, and has its name when it is complete.
+    """A file that grows piece by piece, each written completely, and gets its name when it is complete.
 
-    Until then it is named `<name>.part`, so whoever likes can follow it, and a sudden end leaves what was written. A
-    file that is appended to keeps its name, and loses no more than the pieces that could not be written.
+    Until then it is named `<name>.part`, so it can be followed, and a sudden end leaves the pieces written so far. A
+    file that is appended to keeps its name, and loses only the pieces that could not be written.
 
     Attributes:
-      place: what is written to.
+      place: the file that is written to.
       lost: how many pieces could not be written; such a file is never complete.
     """
 
@@ -132,9 +133,9 @@ class GrowingFile:
         """Open it.
 
         Args:
-          path: its name; of a symbolic link, what that leads to.
-          append: whether what is there stays in front.
-          at_once: whether each piece is given to the system at once, else many together.
+          path: its name; for a symbolic link, its target.
+          append: keep the existing content and write after it.
+          at_once: pass each piece to the system at once; otherwise many together.
 
         Raises:
           OSError: it cannot be opened.
@@ -151,7 +152,7 @@ class GrowingFile:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is in it."""
+        """Whether it is empty."""
         return not self._length and not self._held
 
     def write(self, piece: bytes) -> None:
@@ -166,7 +167,7 @@ class GrowingFile:
             self.flush()
 
     def flush(self) -> None:
-        """Give the system what is held.
+        """Pass buffered pieces to the system.
 
         Raises:
           OSError: it cannot be written, so the file ends with the last whole piece.
@@ -187,10 +188,10 @@ class GrowingFile:
         self._length += len(data)
 
     def complete(self) -> None:
-        """Close it and give it its name. A file that lacks something stays as it is.
+        """Close the file and give it its name. A file that lacks a piece keeps its temporary name.
 
         Raises:
-          OSError: not everything is in it.
+          OSError: not every piece is in it.
         """
         try:
             self.flush()

@@ -447,10 +447,10 @@ class _Making:
         elif said.type:
             try:
                 kind = registry.find(said.type)
+            except registry.NotANodeType as error:
+                self.wrong((*key, "type"), error, graph_path(key))
+                return None
             except TargetError as error:
-                if "no node type" in str(error) or "no reference" in str(error):
-                    self.wrong((*key, "type"), error, graph_path(key))
-                    return None
                 where = f"{self.read.file}, line {self.lines.get((*key, 'type'), 0)}"
                 self.loading.absent.append(
                     (self.read.file, self.lines.get((*key, "type"), 0), graph_path(key), str(error))

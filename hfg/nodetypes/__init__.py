@@ -1,6 +1,6 @@
-"""Node types: classes derived from `Node` and decorated functions, and what is read from their code.
+"""Node types: classes derived from `Node` and decorated functions, and the description that is read from their code.
 
-Depends on `hfg.ports`; knows no graph and no engine.
+Depends on `hfg.ports`, not on graphs or the engine.
 """
 
 __all__: list[str] = []

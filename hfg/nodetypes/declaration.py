@@ -1,6 +1,6 @@
-"""Makes a `NodeType` of a class body, and refuses bodies that cannot work.
+"""Makes a `NodeType` from a class body, and refuses bodies that cannot work.
 
-Stands on ports, `signature` and `description`; `Node` calls it when a subclass is made.
+Depends on ports, `signature` and `description`; `Node` calls it when a subclass is made.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ __all__ = [
 ]
 
 HOOKS: Final = ("setup", "ready", "end", "teardown", "on_activated", "on_deactivated", "do")
-"""Methods of a node that a runner calls besides `process`."""
+"""Methods of a node that a runner calls in addition to `process`."""
 
 RESERVED: Final = frozenset(
     {*HOOKS, "process", "ports", "place", "active", "log", "inner", "start_soon", *AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS}
 )
-"""Every public name of `Node`; a test keeps the list closed."""
+"""Every public name of `Node`; a test keeps this list complete."""
 
 _SUBGRAPH_RESERVED: Final = RESERVED | {"graph", "build", "iterate_over"}
 
@@ -56,7 +56,7 @@ _DECLARATIONS: Final = (Input, Output, Event, Slot, Vector, Parameter, State)
 
 
 class Shared:
-    """Stands on a class where an input side and an output side have one name: the short form would be a guess."""
+    """Replaces an attribute whose name belongs to both an input side and an output side: it would be ambiguous."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -68,7 +68,7 @@ class Shared:
 
 
 def _shared_name(node: Any, name: str) -> Exception:
-    """Make the refusal that names both ports."""
+    """Return the error that names both ports."""
     kinds = [kind for kind in ("inputs", "outputs", "events", "slots") if name in getattr(node._type, kind)]
     both = " or ".join(f'node.ports.{kind}["{name}"]' for kind in kinds)
     return UsageError(f'"{name}" of {node._type.name} is two ports; write {both}')
@@ -81,7 +81,7 @@ def snake_case(name: str) -> str:
 
 
 def declare(cls: type[Any], base: type[Any]) -> NodeType:
-    """Describe a subclass of `base`, which is `Node`; ports that `process` declares are added to the class."""
+    """Describe a subclass of `base`, which is `Node`. Ports that `process` declares are added to the class."""
     where = f"node type {cls.__qualname__}"
     is_subgraph = issubclass(cls, Relaying)
     _wrap_overridden_slots(cls, base)
@@ -96,7 +96,7 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
     if process is not base.process:
         if is_subgraph:
             raise DeclarationError(
-                f"{where}: a subgraph does not fire itself; put the work into a node and add it in build()"
+                f"{where}: a subgraph does not fire itself; move the work into a node and add it in build()"
             )
         if isinstance(process, _DECLARATIONS) or not callable(process):
             raise DeclarationError(
@@ -148,18 +148,18 @@ def declare(cls: type[Any], base: type[Any]) -> NodeType:
 
 
 def _do_activity(cls: Any, base: type, where: str, is_subgraph: bool) -> Any:
-    """What the do-activity of a type returns (rule A15); None, as of one that says nothing, if it has none."""
+    """Return the result type of a type's do-activity (rule A15); None if it has no annotation, or no do-activity."""
     found = cls.do
     if found is getattr(base, "do") or isinstance(found, _DECLARATIONS):  # noqa: B009 - type checkers know no base but Node
         return None  # a port of this name is refused as such
     if is_subgraph:
         raise DeclarationError(
-            f"{where}: a subgraph runs no code of its own, so it has no do-activity; write do() in a node inside"
+            f"{where}: a subgraph runs no code of its own, so it cannot have a do-activity; write do() in a node inside"
         )
     if not inspect.iscoroutinefunction(found):
         raise DeclarationError(
-            f'{where}: "do" is reserved for the do-activity of a node and has to be `async def do(self)`; got '
-            f"{found!r:.80}: choose another name, or make it async"
+            f'{where}: "do" is reserved for the do-activity of a node, which must be `async def do(self)`; '
+            f"got {found!r:.80}: choose another name, or make it async"
         )
     return hints_of(found, f"{where}.do").get("return", Any)
 
@@ -169,7 +169,7 @@ def _of(declared: Mapping[str, Declaration], kind: type[D]) -> dict[str, D]:
 
 
 def _declared_as(declared: Mapping[str, Declaration], *kinds: type[Any]) -> Iterator[tuple[str, Any]]:
-    """Give the declarations of some kinds, in order of declaration."""
+    """Return the declarations of some kinds, in order of declaration."""
     return ((name, declaration) for name, declaration in declared.items() if isinstance(declaration, kinds))
 
 
@@ -188,7 +188,7 @@ def _caller(signature: Signature) -> Callable[[Any], Callable[..., Any]]:
 
 
 def _declared(cls: type, base: type, where: str) -> dict[str, Declaration]:
-    """Collect declarations, bases first; what `process` of a base declared is read anew."""
+    """Collect declarations, bases first; the `process` of a base is read again."""
     found: dict[str, Declaration] = {}
     for owner in reversed(cls.__mro__):
         if owner is base or owner is object:
@@ -199,8 +199,8 @@ def _declared(cls: type, base: type, where: str) -> dict[str, Declaration]:
                     continue
                 if value.name != name:
                     raise DeclarationError(
-                        f'{where}: "{name}" and "{value.name}" are the same object; declare each port by a call of '
-                        "its own"
+                        f'{where}: "{name}" and "{value.name}" are the same object; declare each port with a '
+                        "call of its own"
                     )
                 found[name] = value
             elif name in found and not name.startswith("__"):
@@ -212,7 +212,7 @@ def _declared(cls: type, base: type, where: str) -> dict[str, Declaration]:
 
 
 def _wrap_overridden_slots(cls: type, base: type) -> None:
-    """A method that overrides a slot's handler is a handler too, decorated or not."""
+    """Make handlers of methods that override a slot's handler, decorated or not."""
     for name, value in list(vars(cls).items()):
         inherited = next((vars(owner)[name] for owner in cls.__mro__[1:] if name in vars(owner)), None)
         if inspect.isfunction(value) and isinstance(inherited, Slot) and inherited.handler is not None:
@@ -235,7 +235,7 @@ def _slot_type(inherited: Slot[Any], name: str) -> Any:
 
 
 def _argument(handler: Any) -> str | None:
-    """Give the name of a handler's argument behind self."""
+    """Return the name of a handler's argument after self."""
     names = [a.name for a in inspect.signature(handler).parameters.values()]
     return names[1] if len(names) > 1 else None
 
@@ -251,8 +251,8 @@ def _slot_spec(cls: type, slot: Slot[Any] | Slots[Any], where: str, is_subgraph:
             )
         if slot.while_active:
             raise DeclarationError(
-                f'{where}: slot "{name}" of a subgraph only passes on, so while_active means nothing; say it at the '
-                "slots inside that it leads to"
+                f'{where}: slot "{name}" of a subgraph only forwards signals, so while_active has no effect; '
+                "set it at the inner slots that it is connected to"
             )
         return SlotSpec(name, object if slot.type is UNSET else slot.type)
     arguments = _behind_self(slot.handler, f'the handler of slot "{name}"', where)
@@ -260,8 +260,8 @@ def _slot_spec(cls: type, slot: Slot[Any] | Slots[Any], where: str, is_subgraph:
     if len(needed) > 1 or any(a.kind is a.KEYWORD_ONLY for a in needed):
         names = ", ".join(a.name for a in needed)
         raise DeclarationError(
-            f'{where}: the handler of slot "{name}" needs {len(needed)} arguments ({names}), but a signal has one '
-            "value; take at most one"
+            f'{where}: the handler of slot "{name}" takes {len(needed)} arguments ({names}), but a signal '
+            "carries one value; use at most one argument"
         )
     positional = [a for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
     runs = "async" in kind_of(slot.handler)
@@ -278,7 +278,7 @@ def _slot_spec(cls: type, slot: Slot[Any] | Slots[Any], where: str, is_subgraph:
 
 
 def _slots_spec(slots: Slots[Any], where: str, is_subgraph: bool) -> SlotSpec:
-    """Describe each slot of a vector; its handler is told the number first."""
+    """Describe each slot of a vector; its handler gets the slot's number first."""
     name, hint = slots.name, slots.type
     if slots.handler is None:
         if not is_subgraph:
@@ -302,10 +302,10 @@ def _slots_spec(slots: Slots[Any], where: str, is_subgraph: bool) -> SlotSpec:
 
 
 def _behind_self(function: Callable[..., Any], what: str, where: str) -> list[inspect.Parameter]:
-    """Give the arguments of a method behind the node itself.
+    """Return the arguments of a method after the node itself.
 
     Raises:
-      DeclarationError: the first cannot be the node.
+      DeclarationError: the first argument cannot be the node.
     """
     arguments = list(inspect.signature(function).parameters.values())
     first = arguments[0] if arguments else None
@@ -333,12 +333,12 @@ def _read_process(
 
 
 def _outputs(signature: Signature, where: str, *, must_say: bool) -> dict[str, OutputSpec]:
-    """Give the one output "out" of a return annotation; silence about it is only allowed beside declared inputs."""
+    """Return the one output "out" of a return annotation, which may be missing only next to declared inputs."""
     if signature.output is MISSING:
         if must_say:
             raise DeclarationError(
-                f"{where}: process says nothing about its result; annotate it, `-> int` for an output, `-> None` for "
-                "none"
+                f"{where}: process does not say what it returns; annotate its result, `-> int` for an output, "
+                "`-> None` for none"
             )
         return {}
     return {} if signature.output is None else {"out": OutputSpec("out", signature.output)}
@@ -347,12 +347,12 @@ def _outputs(signature: Signature, where: str, *, must_say: bool) -> dict[str, O
 def shared_names(
     inputs: Iterable[str], outputs: Iterable[str], events: Iterable[str], slots: Iterable[str]
 ) -> frozenset[str]:
-    """Give the names that mean a port on both sides."""
+    """Return the names that mean a port on both sides."""
     return frozenset({*inputs, *slots} & {*outputs, *events})
 
 
 def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED) -> None:
-    """Refuse names that are taken, twice or no names.
+    """Refuse names that are reserved, used twice or not identifiers.
 
     Raises:
       DeclarationError: naming the port and the remedy.
@@ -361,11 +361,11 @@ def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED)
     for side in ([*kind.inputs, *kind.slots, *values], [*kind.outputs, *kind.events, *values]):
         doubled = next((name for name in side if side.count(name) > 1), None)
         if doubled is not None:
-            raise DeclarationError(f'{where}: two ports are called "{doubled}"; rename one{_rename(kind, doubled)}')
+            raise DeclarationError(f'{where}: two ports are named "{doubled}"; rename one{_rename(kind, doubled)}')
     for name in [*kind.inputs, *kind.outputs, *kind.events, *kind.slots, *values, *kind.states]:
         if name in reserved:
             raise DeclarationError(
-                f'{where}: "{name}" is reserved for every node; choose another name{_rename(kind, name)}'
+                f'{where}: "{name}" is a reserved name that every node has; choose another{_rename(kind, name)}'
             )
         if not name.isidentifier() or name.startswith("_"):
             raise DeclarationError(
@@ -380,17 +380,17 @@ def check_names(kind: NodeType, where: str, reserved: frozenset[str] = RESERVED)
         _check_conditions(spec, kind.parameters, where)
         if spec.read_only and kind.is_subgraph:
             raise DeclarationError(
-                f'{where}: parameter "{spec.name}" is read-only, but a subgraph has no code of its own to set it; make '
-                "it an output, and connect to that the parameter of the node inside that is set"
+                f'{where}: parameter "{spec.name}" is read-only, but a subgraph has no code of its own to set '
+                "it; make it an output, and connect to it the parameter of the inner node that is set"
             )
 
 
 def _check_type(name: str, hint: Any, where: str) -> None:
-    """Refuse what stands in the place of a type and is none."""
+    """Refuse an annotation that is not a type."""
     if not is_hint(hint):
         raise DeclarationError(
-            f'{where}: the type of "{name}" is {hint!r:.80}, which is no type; write the type itself, as in `int` or '
-            "`list[str]`"
+            f'{where}: the type of "{name}" is {hint!r:.80}, which is not a type; write the type itself, as '
+            "in `int` or `list[str]`"
         )
 
 
@@ -399,7 +399,7 @@ def _rename(kind: NodeType, name: str) -> str:
 
 
 def _check_default(spec: ParameterSpec, where: str) -> None:
-    """Refuse a default that breaks its own limits."""
+    """Refuse a default that violates its own limits."""
     wrong = None if spec.trigger or spec.default is REQUIRED else spec.check(spec.default)
     if wrong is not None:
         raise DeclarationError(
@@ -408,31 +408,32 @@ def _check_default(spec: ParameterSpec, where: str) -> None:
 
 
 def _check_conditions(spec: ParameterSpec, parameters: Mapping[str, ParameterSpec], where: str) -> None:
-    """Refuse to show a parameter by what can never be."""
+    """Refuse a shown_if condition that can never hold."""
     for condition in spec.shown_if:
         other = parameters.get(condition.parameter)
         if other is None or other.trigger:
             there = ", ".join(f'"{name}"' for name, one in parameters.items() if not one.trigger and one is not spec)
             raise DeclarationError(
-                f'{where}: parameter "{spec.name}" is shown by "{condition.parameter}", which is no parameter with a '
-                f"value; the others are {there or 'none'}"
+                f'{where}: parameter "{spec.name}" is shown by "{condition.parameter}", which is not a '
+                f"parameter with a value; the others are {there or 'none'}"
             )
         wrong = next((wrong for value in condition.values if (wrong := other.check(value))), None)
         if wrong is not None:
             raise DeclarationError(
-                f'{where}: parameter "{spec.name}" is shown if "{other.name}" is what that can never be: it {wrong}'
+                f'{where}: parameter "{spec.name}" is shown if "{other.name}" has a value that it can never '
+                f"have: it {wrong}"
             )
     ring = _ring_of_conditions(spec.name, parameters)
     if ring:
         names = " by ".join(f'"{name}"' for name in ring)
         raise DeclarationError(
-            f"{where}: parameters are shown by each other, {names}, so that all could hide for ever; let one of them "
-            "be shown always"
+            f"{where}: parameters depend on each other to be shown, {names}, so all of them could be hidden "
+            "forever; always show one of them"
         )
 
 
 def _ring_of_conditions(name: str, parameters: Mapping[str, ParameterSpec]) -> tuple[str, ...]:
-    """Follow who is shown by whom from a parameter; give the way if it comes back to it."""
+    """Follow the shown_if conditions from a parameter. Return the path if it comes back to it."""
     ways: list[tuple[str, ...]] = [(name,)]
     seen: set[str] = set()
     while ways:
@@ -447,7 +448,7 @@ def _ring_of_conditions(name: str, parameters: Mapping[str, ParameterSpec]) -> t
 
 
 def install_ports(cls: type, kind: NodeType, base: type) -> None:
-    """Make ports that were read from a function attributes of the class, as if they had been declared there."""
+    """Make ports that were read from a function attributes of the class, as if they had been declared in its body."""
     for name in kind.shared:
         if not isinstance(kind.declared.get(name), Parameter):
             setattr(cls, name, Shared(name))

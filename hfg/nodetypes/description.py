@@ -1,7 +1,7 @@
-"""What is known of a node type: its ports, its process function and where to find it.
+"""The description of a node type: its ports, its process function and where to find it.
 
 Plain data, computed once at declaration. Files, the studio, checks and runners read a node type here and never look at
-the class. Stands on ports; knows neither `Node` nor graphs.
+the class. Depends on ports, not on `Node` or graphs.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Result = Literal["none", "single", "fields"]
 
 
 class InputSpec(msgspec.Struct, frozen=True):
-    """An input; `token`: the process function wants the token itself, not its value."""
+    """An input; `token`: the process function takes the token itself instead of its value."""
 
     name: str
     type: Any
@@ -67,10 +67,10 @@ class SlotSpec(msgspec.Struct, frozen=True):
     """A slot.
 
     Attributes:
-      handler_name: the method, or "" if there is none: a trigger parameter's, which triggers the event of its name, and
-        a subgraph's.
+      handler_name: the method; "" for the slot of a trigger parameter, which triggers the event of the same name, and
+        for slots of a subgraph.
       takes_value: the handler has an argument for the value, or for the token if `token`.
-      while_active: it listens only while its node is active, or about to be (rule T4).
+      while_active: it accepts signals only while its node is active, or about to become active (rule T4).
     """
 
     name: str
@@ -88,20 +88,22 @@ class NodeType:
 
     Attributes:
       name: in snake case, the default name of its nodes.
-      origin: what a user calls to make a node: the class, or the `NodeFunction`.
+      origin: the object that users call to make a node: the class, or the `NodeFunction`.
       module: where it was declared.
-      doc: its docstring, indentation taken off.
-      process_kind: how the process function runs; "none" lives by its slots.
-      result: how what the function gives back maps to outputs: "none" of it, the "single" output, or "fields", one each
-        in order.
-      fields: attribute names to read a "fields" result by, for results that are no sequence.
+      doc: its docstring without indentation.
+      process_kind: how the process function runs; "none": the type only has slots.
+      result: how the function's result maps to outputs: "none" is sent, the "single" output gets it, or "fields" go to
+        one output each, in order.
+      fields: attribute names for reading a "fields" result that is not a sequence.
       shared: names that an input side and an output side both use; the short form `node.name` is refused for them.
-      declared: the declarations in the class by name; identity tells a method reached by `super()` from the node's own.
+      declared: the declarations in the class by name; their identity distinguishes a method reached by `super()` from
+        the node's own.
       hooks: the hooks it overrides.
       completes: type of what `do` returns (rule A15).
       caller: makes `node._process_call()`.
-      vectors: vectors of ports, whose ports are among the others, "values[0]" ...
-      layout: of a type with vectors of outputs, for each declared output how many ports it has, None for no vector.
+      vectors: vectors of ports; their ports are listed with the others, "values[0]" ...
+      layout: for a type with vectors of outputs: the number of ports of each declared output, None if it is not a
+        vector.
     """
 
     name: str
@@ -130,29 +132,29 @@ class NodeType:
 
     @property
     def is_source(self) -> bool:
-        """Whether it fires without inputs; belongs to the type, never to how it is connected (rule F2)."""
+        """Whether it fires without inputs; a property of the type, never of its connections (rule F2)."""
         return self.process_kind != "none" and not self.inputs
 
     @property
     def given_parameters_once(self) -> bool:
-        """Whether its code is given the parameters as it begins and sees no later value: a generator function."""
+        """Whether its code receives the parameters once, at its start, and sees no later value (generator function)."""
         return self.is_function and self.process_kind in ("generator", "async generator")
 
     def help_of(self, name: str) -> str | None:
-        """Say what a port or parameter means: what its declaration says, else its entry in the docstring."""
+        """Return the meaning of a port or parameter: from its declaration, otherwise from the docstring."""
         spec = self.parameters.get(name)
         if spec is not None and spec.help is not None:
             return spec.help
         return _documented(self.doc).get(name)
 
     def is_shown(self, name: str, values: Mapping[str, Any]) -> bool:
-        """Say whether an editor shows a parameter, where they have these values.
+        """Return whether an editor shows a parameter when the parameters have these values.
 
-        What is asked of one that is hidden itself does not hold: nobody could see why.
+        A condition on a parameter that is itself hidden does not hold, because users could not see the reason.
 
         Args:
-          name: of the parameter.
-          values: of the others; those that are not here have their defaults.
+          name: name of the parameter.
+          values: values of the other parameters; missing ones have their defaults.
         """
         return all(
             one.holds(values.get(one.parameter, self.parameters[one.parameter].default))
@@ -161,7 +163,7 @@ class NodeType:
         )
 
     def spread(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Give values by input, where those of a vector may be a list under its name."""
+        """Return values by input; the values of a vector may be given as a list under the vector's name."""
         found: dict[str, Any] = {}
         for name, value in values.items():
             if name in self.vectors and isinstance(value, list | tuple):
@@ -172,14 +174,14 @@ class NodeType:
 
     @property
     def is_there(self) -> bool:
-        """Whether this is the type itself, and not what stands in for one that cannot be found."""
+        """Whether this is the type itself, rather than a placeholder for one that cannot be found."""
         return True
 
     @property
     def reference(self) -> str | None:
-        """Where to find it, "module:qualname"; None for what has no name of its own.
+        """Its reference, "module:qualname"; None for types without a name of their own.
 
-        Lambdas and types made inside functions.
+        Such types are lambdas and types made inside functions.
         """
         for module, qualname in self._places():
             if "<" not in qualname and look_up(module, qualname) is self.origin:
@@ -187,11 +189,11 @@ class NodeType:
         return None
 
     def _places(self) -> list[tuple[str, str]]:
-        """Where it may be.
+        """Return the references under which the type may be found.
 
-        Under its own name in a package around its module that lists it in `__all__`, so that a module which became too
-        long can be parted and files still find its types; else in its module; else under the name that its module gave
-        it (`smooth = hfg.node(cv2.medianBlur)`).
+        First its own name in a package around its module that lists it in `__all__`, so that a long module can be split
+        and files still find its types. Then its name in its module. Then the name that its module assigned it to
+        (`smooth = hfg.node(cv2.medianBlur)`).
         """
         around = [package for package in _packages_around(self.module) if self.qualname in _listed_by(package)]
         places = [(place, self.qualname) for place in (*around, self.module)]
@@ -200,7 +202,7 @@ class NodeType:
 
 
 def _packages_around(module: str) -> list[str]:
-    """Give the packages in which a module lies, the outermost first."""
+    """Return the packages that contain a module, the outermost first."""
     parts = module.split(".")
     return [".".join(parts[:count]) for count in range(1, len(parts))]
 
@@ -212,8 +214,8 @@ def _listed_by(package: str) -> Any:
 
 @functools.lru_cache(maxsize=256)
 def _documented(doc: str) -> Mapping[str, str]:
-    """Give what a docstring says of each argument and attribute; nothing where it cannot be read."""
-    from docstring_parser import ParseError  # when somebody asks, for not every run does
+    """Return the descriptions of arguments and attributes in a docstring; empty if it cannot be parsed."""
+    from docstring_parser import ParseError  # imported on demand: most runs do not need it
     from docstring_parser.google import GoogleParser
 
     try:
@@ -224,13 +226,13 @@ def _documented(doc: str) -> Mapping[str, str]:
 
 
 class TypesByName:
-    """An object whose attributes are node types, so that a reference may lead through it: "module:object.name"."""
+    """An object whose attributes are node types, so that a reference may go through it: "module:object.name"."""
 
 
 def look_up(module: str, qualname: str) -> Any:
-    """Find a name in a module that is already imported, or in classes there; None if there is no such name.
+    """Find a name in a module that is already imported, or in its classes. Return None if the name does not exist.
 
-    What the module has imported itself is not in it: `my_robot:os.system` names nothing.
+    Names that the module has itself imported do not count: `my_robot:os.system` names nothing.
     """
     first, *nested = qualname.split(".")
     found: Any = getattr(sys.modules.get(module), first, None)
@@ -240,11 +242,11 @@ def look_up(module: str, qualname: str) -> Any:
 
 
 def parameter_values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
-    """Give every parameter of a new node its value.
+    """Return the values of all parameters of a new node.
 
     Raises:
-      TypeError: a name that the type does not have, or a parameter without default is missing.
-      ValueError: a value breaks its limits.
+      TypeError: the type does not have a parameter of this name, or a parameter without a default is missing.
+      ValueError: a value violates its limits.
     """
     values: dict[str, Any] = {}
     for name, spec in type_.parameters.items():
@@ -262,7 +264,7 @@ def parameter_values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
                 f'{type_.name} needs a value for its parameter "{name}": write {type_.qualname}({name}=...)'
             )
         else:
-            value = own_copy(spec.default)  # a list as default must not be shared by all nodes
+            value = own_copy(spec.default)  # nodes must not share a list that is a default
         values[name] = value
     unknown = [name for name in given if name not in values]
     if unknown:
@@ -271,16 +273,16 @@ def parameter_values(type_: NodeType, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def read_only_refusal(path: str) -> str:
-    """Say why nobody but its node sets a parameter that is read-only (rule P8)."""
+    """Return the message for setting a read-only parameter, which only its node may set (rule P8)."""
     name = path.rpartition(".")[2]
     return (
-        f'parameter "{path}" is read-only: its node alone sets it; read node.{name}, or connect '
+        f'parameter "{path}" is read-only: only its node sets it; read node.{name}, or connect '
         f'node.ports.parameters["{name}"] to an input'
     )
 
 
 def unknown_parameter(type_: NodeType, name: str) -> str:
-    """Say that a type has no such parameter, and which it has."""
+    """Return the message for an unknown parameter; it lists the known ones."""
     known = ", ".join(f'"{known}"' for known, spec in type_.parameters.items() if spec.is_given) or "none"
     hint = "; inputs are connected, not given here" if name in type_.inputs else ""
     return f'{type_.name} has no parameter "{name}"; its parameters are {known}{hint}'

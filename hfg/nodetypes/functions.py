@@ -1,7 +1,7 @@
-"""Node types as functions: `hfg.node` turns any function into something that makes nodes.
+"""Node types as functions: `hfg.node` turns any function into a factory of nodes.
 
-Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output "out"; what a library
-does not say is said in the call. Stands on `node` and `signature`.
+Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output "out". Arguments of the
+call add what a library function does not declare. Depends on `Node` and `signature`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ F = TypeVar("F")
 
 
 class FunctionNode(Node, Generic[T]):
-    """A node whose type is a function; `out` is its output unless outputs= gave others."""
+    """A node whose type is a function; `out` is its output unless outputs= declares others."""
 
     if TYPE_CHECKING:
 
@@ -59,7 +59,7 @@ class FunctionNode(Node, Generic[T]):
 
 
 class NodeFunction(Generic[P, R_co]):
-    """A node type made of a function; calling it with parameters makes a node.
+    """A node type made from a function; calling it with parameters makes a node.
 
     Attributes:
       function: the function itself.
@@ -100,8 +100,8 @@ class NodeFunction(Generic[P, R_co]):
         """Make a node.
 
         Raises:
-          TypeError: called like the function itself.
-          ValueError: a value breaks the parameter's limits.
+          TypeError: it was called like the function itself.
+          ValueError: a value violates the parameter's limits.
         """
         return self._class(*args, **parameters)
 
@@ -109,7 +109,7 @@ class NodeFunction(Generic[P, R_co]):
         return f"<node type {self._type.name}>"
 
 
-# One overload for each number of positional arguments: they are inputs and no part of the call that makes a node.
+# One overload for each number of positional arguments: these are inputs, and not part of the call that makes a node.
 @overload
 def node(function: Callable[Concatenate[A, B, C, D, E, F, P], R], /) -> NodeFunction[P, R]: ...
 @overload
@@ -154,10 +154,10 @@ def node(
     outputs: Any = None,
     parameters: Mapping[str, Any] | None = None,
 ) -> Any:
-    """Make a node type of a function.
+    """Make a node type from a function.
 
     Args:
-      function: with annotations; else `inputs` and `outputs` say what it does not. A generator, sync or async, is a
+      function: a function with annotations; without them, use `inputs` and `outputs`. A generator, sync or async, is a
         source.
       inputs: argument name -> type, or -> new name as a string.
       outputs: one type; or a NamedTuple or dataclass, or a mapping from name to type, whose fields become one output
@@ -165,7 +165,7 @@ def node(
       parameters: argument name -> default.
 
     Raises:
-      DeclarationError: what is missing, and the call to write.
+      DeclarationError: something is missing; the message shows the call to write.
 
     Examples:
       >>> @node
@@ -179,12 +179,12 @@ def node(
     if function is None:
         return functools.partial(node, inputs=inputs, outputs=outputs, parameters=parameters)
     if isinstance(function, NodeFunction) or (inspect.isclass(function) and issubclass(function, Node)):
-        raise DeclarationError(f"{function_name(function)} is a node type already; use it as it is")
+        raise DeclarationError(f"{function_name(function)} is already a node type; use it without hfg.node")
     if isinstance(function, Node):
-        raise DeclarationError(f"{function!r} is a node already; add it to a graph: graph.add(node)")
+        raise DeclarationError(f"{function!r} is already a node; add it to a graph: graph.add(node)")
     if not callable(function):
         raise DeclarationError(
-            f"hfg.node needs a function, got {function!r}; options are given by keyword, as in hfg.node(outputs=Found)"
+            f"hfg.node needs a function, got {function!r}; pass options by keyword, as in hfg.node(outputs=Found)"
         )
     for word, given in (("inputs", inputs), ("parameters", parameters)):
         if given is not None and not isinstance(given, Mapping):
@@ -205,7 +205,7 @@ def make_type(
     outputs: Any = None,
     parameters: Mapping[str, Any] | None = None,
 ) -> NodeFunction[..., Any]:
-    """Make a node type that belongs to a module, as `node` does for the module that calls it."""
+    """Make a node type that belongs to a given module; `node` does this for the module that calls it."""
     name = function_name(function)
     where = f"node type {name}"
     declared = _declared_vectors(where, inputs, outputs)
@@ -216,8 +216,8 @@ def make_type(
     plan = signature.plan
     if inspect.isclass(function) and not signature.inputs:
         raise DeclarationError(
-            f"{where}: a class without inputs would be a source of {name} objects without end; write "
-            f"`class {name}(hfg.Node)` for a node type with state, or decorate a function"
+            f"{where}: a class without inputs would be an endless source of {name} objects; write `class "
+            f"{name}(hfg.Node)` for a node type with state, or decorate a function"
         )
     inputs_by_name = {spec.name: spec for spec in signature.inputs}
     parameters_by_name = {spec.name: spec for spec in signature.parameters} | size_parameters(vectors)
@@ -230,7 +230,7 @@ def make_type(
     def describe_type(cls: type[Node]) -> NodeType:
         made = NodeType(
             name=snake_case(name) or "function",
-            origin=cls,  # the NodeFunction takes this place below
+            origin=cls,  # replaced by the NodeFunction below
             module=module,
             qualname=getattr(function, "__qualname__", name)
             if getattr(function, "__module__", None) == module
@@ -272,7 +272,7 @@ def make_type(
 
 
 def _declared_vectors(where: str, inputs: Mapping[str, Any] | None, outputs: Any) -> dict[str, Vector[Any]]:
-    """Give the vectors that the call declares, each under its name.
+    """Return the vectors that the call declares, each under its name.
 
     Raises:
       DeclarationError: an input and an output share a name, or a vector is of the other kind.
@@ -320,7 +320,7 @@ def _read(
 def _read_outputs(
     function: Any, where: str, outputs: Any, signature: Signature
 ) -> tuple[list[OutputSpec], tuple[str, ...] | None]:
-    """Give the outputs, and the field names if the result is split; None if it is one value."""
+    """Return the outputs, and the field names if the result is split; None if the result is one value."""
     if isinstance(outputs, Outputs):
         raise DeclarationError(
             f"{where}: a vector of outputs needs a name; write "
@@ -342,14 +342,14 @@ def _read_outputs(
     if signature.output is MISSING:
         given = ", inputs={...}" if signature.inputs and not inspect.isfunction(function) else ""
         raise DeclarationError(
-            f"{where}: nothing says what it gives back; annotate the result (`-> None` for a sink), or write "
+            f"{where}: it does not say what it returns; annotate the result (`-> None` for a sink), or write "
             f"hfg.node({function_name(function)}{given}, outputs=Any)"
         )
     return ([] if signature.output is None else [OutputSpec("out", signature.output)]), None
 
 
 def _fields_of(outputs: Any, where: str) -> dict[str, Any] | None:
-    """Give the fields of a NamedTuple, dataclass or msgspec struct; None for any other type."""
+    """Return the fields of a NamedTuple, dataclass or msgspec struct; None for any other type."""
     if not inspect.isclass(outputs):
         return None
     named_tuple = issubclass(outputs, tuple) and hasattr(outputs, "_fields")

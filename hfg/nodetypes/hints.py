@@ -1,6 +1,6 @@
-"""What the annotations of a function say: its types, how it runs, and where `Token` and None stand.
+"""Reads the annotations of a function: its types, how it runs, and where `Token` and None occur.
 
-Stands on errors, tokens and the words of `description`; knows no class of nodes.
+Depends on errors, tokens and the terms of `description`, not on classes of nodes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ MISSING: Final = inspect.Parameter.empty
 
 
 def hints_of(function: Any, where: str) -> dict[str, Any]:
-    """Resolve the annotations of a callable, metadata kept.
+    """Resolve the annotations of a callable, keeping metadata.
 
     Raises:
       DeclarationError: a name in them does not exist at run time.
@@ -48,12 +48,12 @@ def hints_of(function: Any, where: str) -> dict[str, Any]:
         hints = hints_of(target.__init__, where)
         return {**hints, "return": target}
     if not hasattr(target, "__annotations__") and not inspect.isroutine(target):
-        target = target.__call__  # an object that can be called
+        target = target.__call__  # a callable object
     return _resolve(target, where)
 
 
 def hints_of_class(cls: type, where: str) -> dict[str, Any]:
-    """Resolve the annotations of a class body, metadata kept; the errors are those of `hints_of`."""
+    """Resolve the annotations of a class body, keeping metadata; raises the same errors as `hints_of`."""
     return _resolve(cls, where)
 
 
@@ -73,15 +73,15 @@ def _resolve(target: Any, where: str) -> dict[str, Any]:
             "define it at module level before the node type, and import it outside `if TYPE_CHECKING:`"
         ) from None
     except TypeError as error:
-        if not hasattr(target, "__annotations__"):  # a function of a C library has none
+        if not hasattr(target, "__annotations__"):  # C functions have none
             return {}
-        raise DeclarationError(f"{where}: its annotations cannot be read ({error})") from error
+        raise DeclarationError(f"{where}: cannot resolve its annotations ({error})") from error
     except Exception as error:
-        raise DeclarationError(f"{where}: its annotations cannot be read ({type(error).__name__}: {error})") from error
+        raise DeclarationError(f"{where}: cannot resolve its annotations ({type(error).__name__}: {error})") from error
 
 
 def kind_of(function: Any) -> ProcessKind:
-    """Say how a callable runs by what it is; annotations may say more."""
+    """Return how a callable runs, judged by its kind; annotations may refine this."""
     while isinstance(function, functools.partial):
         function = function.func
     candidates = (
@@ -97,7 +97,7 @@ def kind_of(function: Any) -> ProcessKind:
 
 
 def split_token(hint: Any) -> tuple[Any, bool]:
-    """Take `Token[...]` off: its value's type, and whether it was there."""
+    """Remove `Token[...]` from a type. Return the type of its value, and whether it was there."""
     bare = _without_none(hint)
     if bare is Token:
         return Any, True
@@ -107,7 +107,7 @@ def split_token(hint: Any) -> tuple[Any, bool]:
 
 
 def _without_none(hint: Any) -> Any:
-    """Take None out of a union: None in an output is silence (rule T2)."""
+    """Return a union without None, which means silence in an output (rule T2)."""
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         members = [member for member in typing.get_args(hint) if member is not _NONE]
         if len(members) < len(typing.get_args(hint)):
@@ -116,15 +116,15 @@ def _without_none(hint: Any) -> Any:
 
 
 def output_type(hint: Any) -> Any:
-    """Give what an output annotated like this sends; None for no output."""
+    """Return the type that an output with this annotation sends; None for no output."""
     hint = _without_none(hint)
     return None if hint in (None, _NONE, NoReturn, typing.Never) else split_token(hint)[0]
 
 
 def result_of(hint: Any, kind: ProcessKind, has_inputs: bool) -> tuple[Any, ProcessKind]:
-    """Take iterators and awaitables off the return annotation.
+    """Remove iterators and awaitables from the return annotation.
 
-    A function that gives an iterator and has no inputs is a generator too.
+    A function without inputs that returns an iterator is a generator, too.
     """
     origin, arguments = typing.get_origin(hint) or hint, typing.get_args(hint)
     first = arguments[0] if arguments else Any
@@ -142,12 +142,12 @@ def result_of(hint: Any, kind: ProcessKind, has_inputs: bool) -> tuple[Any, Proc
 
 
 def is_iterator(hint: Any) -> bool:
-    """Say whether an annotation promises one value after the other."""
+    """Return whether an annotation promises a sequence of values."""
     return (typing.get_origin(hint) or hint) in (*_SYNC_ITERATORS, *_ASYNC_ITERATORS)
 
 
 def function_name(function: Any) -> str:
-    """Give what to call a function in messages."""
+    """Return the name of a function for messages."""
     while isinstance(function, functools.partial):
         function = function.func
     return str(getattr(function, "__name__", type(function).__name__))

@@ -1,9 +1,9 @@
-"""Node types as classes: `Node`, what it offers to users, and what a runner does with it.
+"""Node types as classes: `Node`, with its interface for users and for runners.
 
-A node is a type, parameters and options, nothing else: it can always be made again from its reference and parameters,
-so copies, files, workers and reload work. What is the same for all nodes of a type lies in its `NodeType`; a node holds
-its parameters and the ports that somebody asked for. Stands on ports, `declaration` and `description`; knows neither
-graphs nor who runs it.
+A node is a type, parameters and options, and nothing else. It can always be made again from its reference and
+parameters, which is why copies, files, workers and reload work. Data that all nodes of a type share is in its
+`NodeType`; a node holds only its parameters and the ports that were used. Depends on ports, `declaration` and
+`description`, not on graphs or runners.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ Other = TypeVar("Other")
 
 _NO_PARAMETERS: Final[
     dict[str, Any]
-] = {}  # shared by all nodes without any; never written, since there is no name to write
+] = {}  # shared by all nodes that have none; never written because there is no name to write
 _NOTHING: Final[frozenset[str]] = frozenset()
 
 
 class Place(msgspec.Struct, frozen=True):
-    """Where a node is: its graph, its name there, and its path from the root, "subgraph/node"."""
+    """The place of a node: its graph, its name there, and its path from the root, "subgraph/node"."""
 
     graph: Any
     name: str
@@ -60,8 +60,8 @@ class Node:
     """Base of node types that are classes; see `hfg.node` for functions.
 
     Ports, parameters and state are declared in the class body (`hfg.Input`, `Output`, `Event`, `slot`, `Parameter`,
-    `State`); without declared ports the arguments and the return annotation of `process` declare them. A type without
-    `process` never fires and lives by its slots. There is no `__init__`: nothing is opened before `setup()`.
+    `State`); without declared ports, the arguments and the return annotation of `process` declare them. A type without
+    `process` never fires; it only has slots. There is no `__init__`: open resources in `setup()`.
 
     Examples:
       >>> class Count(Node):
@@ -73,8 +73,8 @@ class Node:
       <ports <inputs ['value']> <outputs ['out']> <events []> <slots []> <parameters []>>
     """
 
-    # Slots keep what hfg needs apart from what users write on `self`: a run starts fresh by looking at the instance's
-    # dictionary alone.
+    # Slots keep hfg's own data apart from attributes that users write on `self`: to reset a node, a run only looks at
+    # the instance's dictionary.
     __slots__ = (
         "__dict__",
         "__weakref__",
@@ -90,13 +90,14 @@ class Node:
 
     _type: ClassVar[NodeType]
     _active: bool  # A(v) during a run; written by the runner
-    _written_before: frozenset[str] | None  # attributes that users set before the first run; None before it
+    _written_before: frozenset[str] | None  # attributes that users set before the first run; None until then
     _path_log: Log | None
     _options: Any  # written by the graph
     _parameters: dict[str, Any]  # the live values; change them by `_set_parameter`
-    _outdated: Callable[[], bool] | None  # whether a do-activity asks that is about to end, while there is one (A15)
+    # while there is a do-activity: whether it is the one that asks and is about to end (A15)
+    _outdated: Callable[[], bool] | None
     _place: Place | None  # written by the graph
-    _start_task: Callable[[Coroutine[Any, Any, Any]], None] | None  # while somebody runs it
+    _start_task: Callable[[Coroutine[Any, Any, Any]], None] | None  # set while a runner runs the node
 
     activated: Event[None] = automatic_event("activated")
     deactivated: Event[None] = automatic_event("deactivated")
@@ -111,12 +112,11 @@ class Node:
     reset = automatic_slot("reset")
 
     def __init__(self, *positional: Any, **parameters: Any) -> None:
-        """Make a node; parameters by keyword only.
+        """Make a node; parameters are passed by keyword only.
 
         Raises:
-          TypeError: a value without a name, or a parameter that the type does not have, or one without default is
-            missing.
-          ValueError: a value breaks the parameter's limits.
+          TypeError: a value has no name, the type has no such parameter, or a parameter without a default is missing.
+          ValueError: a value violates the parameter's limits.
         """
         self._active = False
         self._outdated = None
@@ -135,13 +135,13 @@ class Node:
         super().__init_subclass__(**arguments)
         if cls.__init__ is not Node.__init__:
             raise DeclarationError(
-                f"node type {cls.__name__}: __init__ is not overridden, a node is made from its parameters alone; "
-                "declare hfg.Parameter and hfg.State, and open things in setup()"
+                f"node type {cls.__name__}: __init__ cannot be overridden because a node is made from its "
+                "parameters only; declare hfg.Parameter and hfg.State, and open resources in setup()"
             )
         if cls.__eq__ is not object.__eq__ or cls.__hash__ is not object.__hash__:
             raise DeclarationError(
-                f"node type {cls.__name__}: __eq__ and __hash__ are not overridden, a node is equal to itself alone; "
-                "compare what it holds by a method of another name"
+                f"node type {cls.__name__}: __eq__ and __hash__ cannot be overridden because a node is equal "
+                "only to itself; compare its contents in a method of another name"
             )
         hidden = next((name for name in vars(cls) if name in _HIDDEN), None)
         if hidden is not None and not cls.__module__.startswith("hfg."):
@@ -154,7 +154,10 @@ class Node:
 
     @classmethod
     def _stand_for_sizes(cls) -> None:
-        """Let the class make nodes of the size they are asked for (`vectors`); its type was read as their pattern."""
+        """Let the class make nodes of the size that they are asked for (`vectors`).
+
+        Its type serves as their pattern.
+        """
         vectors = Vectors(cls, cls._type)
         setattr(cls, "__new__", vectors.make)  # noqa: B010 - type checkers would take it for that of every node
         cls._type = vectors.shown
@@ -162,27 +165,27 @@ class Node:
     # --- for users ---
 
     def setup(self) -> Any:
-        """Open what a run needs; called before the first firing and after `reset`. May be async, like all hooks."""
+        """Open resources for a run; called before the first firing and after `reset`. May be async, like all hooks."""
 
     def process(self, *inputs: Any, **parameters: Any) -> Any:
-        """Work on one token from every input; overridden, or the node never fires."""
+        """Work on one token from every input. A node that does not override it never fires."""
 
     def ready(self) -> Any:
-        """Say whether the node may fire now; asked last (rule F1)."""
+        """Return whether the node may fire now; called last (rule F1)."""
         return True
 
     def end(self) -> Any:
-        """Give the last outputs when the inputs have ended (rule F4)."""
+        """Return the last outputs when the inputs have ended (rule F4)."""
 
     def teardown(self) -> Any:
-        """Close what `setup` opened; called in any case."""
+        """Close what `setup` opened; called in every case."""
 
     async def do(self) -> Any:
         """Work for as long as the node is active (rule A15).
 
-        Overridden, it starts when A(v) becomes 1, after `on_activated`, and is cancelled when A(v) becomes 0 or the
-        node is disabled or torn down. If it returns first, the event `completed` is triggered with what it returned.
-        It may trigger events and await anything; outputs belong to firings.
+        If overridden, it starts when A(v) becomes 1, after `on_activated`. It is cancelled when A(v) becomes 0, or when
+        the node is disabled or torn down. If it returns first, the event `completed` is triggered with its result. It
+        may trigger events and await anything, but cannot write to outputs: outputs belong to firings.
 
         Examples:
           >>> import asyncio
@@ -193,24 +196,25 @@ class Node:
         """
 
     def on_activated(self) -> Any:
-        """Learn that A(v) became 1."""
+        """Called when A(v) becomes 1."""
 
     def on_deactivated(self) -> Any:
-        """Learn that A(v) became 0."""
+        """Called when A(v) becomes 0."""
 
     def start_soon(self, coroutine: Coroutine[Any, Any, Any]) -> None:
-        """Run a coroutine beside the firings of the node, as its child; in setup(), process(), slots and hooks.
+        """Start a coroutine as a child task of this node, concurrently with its firings.
 
-        Its errors are the node's, by `on_error`; the run does not end before it has, and it is cancelled when the node
-        is torn down or disabled (rules X1, X3, R5). It may trigger events; outputs belong to firings. For threads it is
-        refused.
+        Call it in setup(), process(), slots and hooks; nodes in thread groups cannot use it. Errors are handled by the
+        node's `on_error`. The run does not end before the task does. The task is cancelled when the node is torn down
+        or disabled (rules X1, X3, R5). It may trigger events, but it cannot write to outputs: outputs belong to
+        firings.
 
         Args:
-          coroutine: what an `async def` gives when it is called.
+          coroutine: the coroutine object, as in `self.start_soon(self.listen())`.
 
         Raises:
-          NotRunning: nobody runs the node.
-          TypeError: it is no coroutine.
+          NotRunning: the node is not part of a run.
+          TypeError: the argument is not a coroutine.
 
         Examples:
           >>> import asyncio
@@ -226,8 +230,8 @@ class Node:
         path = _name(self)
         if not isinstance(coroutine, Coroutine):
             raise TypeError(
-                f'start_soon of "{path}" takes a coroutine, got {coroutine!r:.80}; call what makes one: '
-                f"self.start_soon({_called(coroutine)})"
+                f'start_soon of "{path}" takes a coroutine, got {coroutine!r:.80}; call the function that '
+                f"makes it: self.start_soon({_called(coroutine)})"
             )
         if self._start_task is not None:
             self._start_task(coroutine)
@@ -235,8 +239,10 @@ class Node:
         coroutine.close()
         what = f'"{path}" cannot start_soon({_called(coroutine)})'
         if self._type.is_subgraph:
-            raise UsageError(f"{what}, for a subgraph runs no code of its own; let a node inside do it")
-        raise NotRunning(f"{what}, for nobody runs it; do it in setup(), process() or a slot, while its graph runs")
+            raise UsageError(f"{what} because a subgraph runs no code of its own; call it in a node inside")
+        raise NotRunning(
+            f"{what} because it is not part of a run; call it in setup(), process() or a slot, while its graph runs"
+        )
 
     @property
     def ports(self) -> Ports:
@@ -248,11 +254,11 @@ class Node:
         """Graph, name and path.
 
         Raises:
-          UsageError: the node is in no graph.
+          UsageError: the node is not in a graph.
         """
         if self._place is None:
             raise UsageError(
-                f'node "{_name(self)}" is in no graph, so it has no place: add it first, with graph.add(node)'
+                f'node "{_name(self)}" is not in a graph, so it has no place: add it first, with graph.add(node)'
             )
         return self._place
 
@@ -260,41 +266,41 @@ class Node:
     def active(self) -> bool:
         """A(v) of the paper; False outside a run.
 
-        Code in a thread sees each change at once, but under the virtual clock what was when it began (R6). A `do` that
-        was cancelled never sees a later activity than its own (A15).
+        Code in a thread sees each change at once, except under the virtual clock, where it sees the value at its start
+        (R6). A cancelled `do` never sees an activity that is newer than its own (A15).
         """
         return self._active and (self._outdated is None or not self._outdated())
 
     @property
     def log(self) -> Logger:
-        """The logger "hfg.node." and the node's path, with dots for slashes; its records carry the `path`, too.
+        """The logger "hfg.node." plus the node's path, with dots for slashes; its records have the attribute `path`.
 
-        A handler that raises does not harm the node. In functions `hfg.log()` gives it.
+        A log handler that raises does not harm the node. In functions, use `hfg.log()`.
         """
         path = _name(self)
-        if self._path_log is None or self._path_log.path != path:  # it was placed since, or moved
+        if self._path_log is None or self._path_log.path != path:  # the node has been added or moved since
             self._path_log = node_log(path)
         return self._path_log
 
     @property
     def inner(self) -> Any:
-        """Refused: ports have inner sides, nodes do not."""
+        """Not available: ports have inner sides, nodes do not."""
         raise UsageError(
             f'node "{_name(self)}" has no inner side; .inner belongs to the ports of a subgraph: self.port.inner'
         )
 
-    if not TYPE_CHECKING:  # type checkers say of themselves what there is not
+    if not TYPE_CHECKING:  # type checkers report missing attributes themselves
 
         def __call__(self, *values: Any, **named: Any) -> Any:
-            """Refused: a node is no function."""
+            """Not available: a node is not a function."""
             function = f", the function itself is {self._type.qualname}.function" if self._type.is_function else ""
             raise UsageError(
-                f'"{_name(self)}" is a node, which its graph fires{function}: make one firing of it with '
-                "hfg.testing.fire(node, name=value), or give parameters where it is made"
+                f'"{_name(self)}" is a node, which its graph fires{function}: make one firing with '
+                "hfg.testing.fire(node, name=value), or pass parameters where the node is made"
             )
 
     def __rshift__(self, other: Other) -> Other:
-        """Connect the only port that sends to a target, or to the only free one of a node; gives back `other`."""
+        """Connect the only sending port to a target, or to the only free target of a node. Return `other`."""
         return self._free_source() >> other
 
     def __repr__(self) -> str:
@@ -305,7 +311,7 @@ class Node:
     # --- for whoever runs, draws or stores nodes ---
 
     def _without(self, name: str) -> str:
-        """Say that there is nothing of this name, neither a port nor anything else, and what there is."""
+        """Return the message for an unknown attribute, with the known names."""
         kind = self._type
         ports = dict.fromkeys([*kind.vectors, *kind.inputs, *kind.outputs, *kind.events, *kind.slots, *kind.parameters])
         known = [port for port in ports if port.isidentifier()]
@@ -314,7 +320,7 @@ class Node:
         return f'node "{_name(self)}" has no "{name}"; ' + (f'did you mean "{near[0]}"? ' if near else "") + has
 
     def _port(self, kind: Kind, name: str) -> Any:
-        """Give the bound port, made at the first call and kept where attribute access finds it."""
+        """Return the bound port. It is made at the first call and stored where attribute access finds it."""
         key = f"{name} {kind}" if name in self._type.shared else name
         port = self.__dict__.get(key)
         if port is None:
@@ -354,27 +360,28 @@ class Node:
                 return EventPort(self, name, type_.outputs[output].type)
         if type_.is_subgraph and (sent_of(name) or "") in type_.outputs:
             raise UsageError(
-                f'subgraph "{_name(self)}" has no {kind} "{name}", for its outputs only pass on; declare an event of '
-                f"its own, and in build() connect to its inner side the .sent of the node whose output it is"
+                f'subgraph "{_name(self)}" has no {kind} "{name}": outputs of a subgraph only forward tokens; '
+                "declare a separate event, and in build() connect to its inner side the .sent of the node "
+                "that the output belongs to"
             )
         if type_.is_subgraph and name in (*AUTOMATIC_EVENTS, *AUTOMATIC_SLOTS):
             raise UsageError(
-                f'subgraph "{_name(self)}" has no {kind} "{name}", for it does not fire itself; connect that of a '
-                f"node inside, or a {kind} of its own"
+                f'subgraph "{_name(self)}" has no {kind} "{name}" because it does not fire itself; connect '
+                f"the {kind} of an inner node, or declare a separate {kind}"
             )
         raise UsageError(f'node type {type_.name} has no {kind} "{name}"')
 
     def _process_call(self) -> Callable[..., Any]:
-        """Give what runs one firing: one positional argument for each input in order.
+        """Return the function for one firing, with one positional argument for each input in order.
 
-        The raw result, coroutine or iterator comes back.
+        It returns the raw result, coroutine or iterator.
         """
         if self._type.caller is None:
             raise EngineInternalError(f'node "{_name(self)}" has no process function to call')
         return self._type.caller(self)
 
     def _handler(self, name: str) -> Callable[..., Any] | None:
-        """Give the bound handler of a slot, or None if it has none."""
+        """Return the bound handler of a slot, or None if it has none."""
         spec = self._type.slots.get(name)
         if spec is None or not spec.handler_name:
             return None
@@ -382,7 +389,10 @@ class Node:
         return handler
 
     def _slot_call(self, name: str) -> Callable[[Token[Any]], Any]:
-        """Give what runs one call of a declared slot for a token; an async handler's coroutine comes back."""
+        """Return the function for one call of a declared slot with a token.
+
+        For an async handler it returns the coroutine.
+        """
         spec = self._type.slots[name]
         handler = self._handler(name)
         if handler is None:
@@ -396,14 +406,14 @@ class Node:
         return lambda token: run()
 
     def _hook(self, name: str) -> Callable[..., Any] | None:
-        """Give a hook that the type overrides, else None."""
+        """Return a hook if the type overrides it, otherwise None."""
         return getattr(self, name) if name in self._type.hooks else None
 
     def _split(self, result: Any) -> list[Any]:
-        """Give one value for each output, in order of declaration, of what the process function gave back.
+        """Split the result of the process function into one value per output, in order of declaration.
 
         Raises:
-          TypeError: the result does not fit the outputs.
+          TypeError: the result does not match the outputs.
         """
         type_ = self._type
         if type_.result == "single":
@@ -415,31 +425,31 @@ class Node:
         names = ", ".join(f'"{name}"' for name in type_.outputs)
         if type_.result == "none":
             raise TypeError(
-                f"{type_.name} has no output but gave back {shown(result)}; declare an output (annotate the result), "
-                "or return nothing"
+                f"{type_.name} has no output but returned {shown(result)}; declare an output (annotate the "
+                "result), or return nothing"
             )
         if isinstance(result, tuple | list):
             if len(result) != len(type_.outputs):
                 raise TypeError(
-                    f"{type_.name} gave back {len(result)} values, but has {len(type_.outputs)} outputs: {names}; "
-                    "return one for each"
+                    f"{type_.name} returned {len(result)} values, but has {len(type_.outputs)} outputs: "
+                    f"{names}; return one for each"
                 )
             return list(result)
         if type_.fields and all(hasattr(result, name) for name in type_.fields):
             return [getattr(result, name) for name in type_.fields]
         raise TypeError(
-            f"{type_.name} gave back {shown(result)}, but has the outputs {names}; return a tuple with one value for "
-            "each"
+            f"{type_.name} returned {shown(result)}, but has the outputs {names}; return a tuple with one "
+            "value for each"
         )
 
     def _spread(self, result: Any) -> list[Any]:
-        """Put what was given back for a vector of outputs in the place of the vector."""
+        """Replace the result for a vector of outputs by its values."""
         type_ = self._type
         parts = [result] if len(type_.layout) == 1 else result
         if not isinstance(parts, tuple | list) or len(parts) != len(type_.layout):
             raise TypeError(
-                f"{type_.name} gave back {shown(result)}, but has {len(type_.layout)} outputs and vectors of outputs; "
-                "return a tuple with one value for each, and a list for each vector"
+                f"{type_.name} returned {shown(result)}, but has {len(type_.layout)} outputs and vectors of "
+                "outputs; return a tuple with one value for each, and a list for each vector"
             )
         values: list[Any] = []
         for part, count in zip(parts, type_.layout, strict=True):
@@ -449,31 +459,32 @@ class Node:
                 values += [None] * count
             elif not isinstance(part, tuple | list) or len(part) != count:
                 raise TypeError(
-                    f"{type_.name} gave back {shown(part)} for a vector of {count} outputs; return a list with one "
-                    "value for each, None for silence"
+                    f"{type_.name} returned {shown(part)} for a vector of {count} outputs; return a list with "
+                    "one value for each, None for silence"
                 )
             else:
                 values += part
         return values
 
     def _set_parameter(self, name: str, value: Any, *, own: bool = False) -> None:
-        """Change a parameter; the value stays if it is refused.
+        """Change a parameter. A value that is refused changes nothing.
 
         Args:
-          name: of the parameter.
-          value: the node keeps a copy of a list, a set, a dict or an array.
-          own: the node's code says so, which alone sets what is read-only.
+          name: name of the parameter.
+          value: the new value; a list, a set, a dict or an array is copied.
+          own: the call comes from the node's code, which is the only one to set read-only parameters.
 
         Raises:
-          ValueError: the value breaks the limits, or the parameter is not for others to set.
+          ValueError: the value violates the limits, or only the node may set the parameter.
         """
         spec = self._type.parameters.get(name)
         if spec is None or spec.trigger:
             raise ValueError(unknown_parameter(self._type, name))
         if spec.size:
             raise ValueError(
-                f'"{_name(self)}.{name}" is a vector of {self._parameters[name]} ports, and a node keeps its ports: '
-                f"make another, {self._type.qualname}({name}={value!r}), or replace it by an edit"
+                f'"{_name(self)}.{name}" is a vector of {self._parameters[name]} ports, and the ports of a '
+                f"node are fixed: make another node, {self._type.qualname}({name}={value!r}), or replace it "
+                "by an edit"
             )
         if spec.read_only and not own:
             raise ValueError(read_only_refusal(f"{_name(self)}.{name}"))
@@ -487,14 +498,14 @@ class Node:
                 tell(kept)
 
     def _reset_states(self) -> None:
-        """Begin a run: state afresh, and nothing left of what an earlier run wrote on the node.
+        """Reset the node for a run: state is new, and attributes that an earlier run wrote are removed.
 
-        What was there before the first run stays.
+        Attributes from before the first run stay.
         """
         own = self.__dict__
         states = self._type.states
         if self._written_before is None:
-            # Ports are the node's own and stay as well; state is written anew.
+            # Ports belong to the node and stay, too; state is set below.
             self._written_before = (
                 frozenset(name for name, value in own.items() if not isinstance(value, Port) and name not in states)
                 or _NOTHING
@@ -511,7 +522,7 @@ class Node:
                 self._parameters[name] = own_copy(spec.default)
 
     def _copy(self) -> Node:
-        """Make a node of the same type and parameters that is in no graph."""
+        """Return a node of the same type and parameters that is not in a graph."""
         specs = self._type.parameters
         return type(self)(**{name: value for name, value in self._parameters.items() if specs[name].is_given})
 
@@ -553,7 +564,7 @@ def _name(node: Node) -> str:
 
 
 def _called(one: Any) -> str:
-    """How a call is written that gives a coroutine."""
+    """Return how to write a call that makes a coroutine."""
     return f"{getattr(one, '__name__', 'work')}(...)"
 
 
@@ -565,6 +576,6 @@ def _positional(type_: NodeType) -> str:
 
 
 _HIDDEN: Final = frozenset(name for name in vars(Node) if name.startswith("_") and not name.endswith("__"))
-"""What a user's class must not define by chance; only hfg's own classes may."""
+"""Names that a user's class must not define by accident; only hfg's own classes may."""
 
 Node._type = NodeType("node", Node, Node.__module__, Node.__qualname__, "")

@@ -1,7 +1,7 @@
 """Reads a function as a node type.
 
-Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output. Stands on ports and
-descriptions; knows no class of nodes. Every refusal says which function, which argument and what to write instead.
+Arguments are inputs, keyword-only arguments are parameters, the return annotation is the output. Depends on ports and
+descriptions, not on classes of nodes. Every error names the function and the argument, and shows what to write instead.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ _POSITIONAL: Final = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSIT
 
 @dataclass(frozen=True, slots=True)
 class CallPlan:
-    """How values of inputs and parameters become the arguments of a call.
+    """Maps values of inputs and parameters to the arguments of a call.
 
     Attributes:
-      positional: for each positional argument, the index of its input, or the name of its parameter.
+      positional: for each positional argument, the index of its input or the name of its parameter.
       keyword_inputs: argument name and index of inputs passed by keyword.
       keyword_parameters: names of parameters passed by keyword.
       rest: the index of the input whose list becomes all further positional arguments, `*values`.
@@ -43,10 +43,10 @@ class CallPlan:
     rest: int | None = None
 
     def bind(self, function: Callable[..., Any], parameters: Mapping[str, Any]) -> Callable[..., Any]:
-        """Make what takes one positional argument for each input.
+        """Return a function that takes one positional argument for each input.
 
-        Parameters are read from the live mapping at each call. Without parameters and with inputs in order it is the
-        function itself: no call between runner and user.
+        It reads parameters from the live mapping at each call. Without parameters and with inputs in order, it is the
+        function itself, which saves a call between runner and user.
         """
         names, rest = self.keyword_parameters, self.rest
         inputs_lead = self.positional == tuple(range(len(self.positional))) and not self.keyword_inputs and rest is None
@@ -68,7 +68,10 @@ class CallPlan:
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """What a function says; `output` is its return type, or None without one, or `MISSING` if nothing was said."""
+    """The description of a function.
+
+    `output` is its return type, None without one, or `MISSING` without an annotation.
+    """
 
     inputs: tuple[InputSpec, ...]
     parameters: tuple[ParameterSpec, ...]
@@ -90,11 +93,11 @@ def read_signature(
     """Read a callable.
 
     Args:
-      function: a function, or anything else that can be called.
-      where: names the node type in messages.
+      function: a function or another callable.
+      where: the node type, for error messages.
       inputs: types of arguments that are inputs, or new names as strings.
       parameters: defaults of arguments that are parameters.
-      known: for classes, inputs declared as ports; then arguments take their types from there.
+      known: for classes: inputs declared as ports; arguments take their types from them.
       bound: the first argument is the node itself.
       vectors: which inputs are vectors; the argument takes a list, or is `*values`.
 
@@ -105,7 +108,7 @@ def read_signature(
 
 
 class _Reader:
-    """Goes through the arguments once; its fields are what was found so far."""
+    """Goes through the arguments once; its fields hold what it has found so far."""
 
     def __init__(
         self,
@@ -122,7 +125,8 @@ class _Reader:
         self.given_parameters = parameters
         self.known = known
         self.vectors = vectors
-        # With types in inputs= that list is complete; with new names only, the others are read from the annotations.
+        # If inputs= has types, that list is complete; if it only has new names, the other inputs are read from the
+        # annotations.
         self.inputs_complete = any(not isinstance(value, str) for value in inputs.values())
         self.inputs: list[InputSpec] = []
         self.parameters: list[ParameterSpec] = []
@@ -139,7 +143,7 @@ class _Reader:
             return self._unreadable()
         self.hints = hints_of(self.function, self.where)
         self._check_given({argument.name for argument in arguments}, any(a.kind is a.VAR_KEYWORD for a in arguments))
-        by_position = True  # until an argument is left at its default: what follows must be passed by keyword
+        by_position = True  # until an argument keeps its default: arguments after it must be passed by keyword
         for argument in arguments:
             by_position = self._argument(argument, by_position)
         if self.known is not None:
@@ -150,16 +154,17 @@ class _Reader:
             output, kind = result_of(self.hints["return"], kind, bool(self.inputs))
             if kind == "async" and not self.inputs and is_iterator(self.hints["return"]):
                 raise DeclarationError(
-                    f"{self.where}: it is async and annotated as an iterator, but has no `yield`; write one, or "
-                    "annotate the value that it gives back"
+                    f"{self.where}: it is async and annotated as an iterator, but has no `yield`; write one, "
+                    "or annotate the value that it returns"
                 )
         return self._signature(output, kind)
 
     def _signature(self, output: Any, kind: ProcessKind) -> Signature:
         if kind in ("generator", "async generator") and self.inputs:
             raise DeclarationError(
-                f'{self.where}: a generator is a source and takes no inputs, but it has "{self.inputs[0].name}"; '
-                "return one value for each firing, or make the argument a keyword-only parameter"
+                f"{self.where}: a generator is a source and cannot have inputs, but it has "
+                f'"{self.inputs[0].name}"; return one value per firing, or make "{self.inputs[0].name}" a '
+                "keyword-only parameter"
             )
         plan = CallPlan(tuple(self.positional), tuple(self.keyword_inputs), tuple(self.keyword_parameters), self.rest)
         return Signature(tuple(self.inputs), tuple(self.parameters), output, kind, plan)
@@ -169,8 +174,8 @@ class _Reader:
             unknown = [name for name in given if name not in names and not any_keyword]
             if unknown:
                 raise DeclarationError(
-                    f'{self.where}: {word}= names "{unknown[0]}", which is no argument of it; its arguments are '
-                    f"{', '.join(sorted(names)) or 'none'}"
+                    f'{self.where}: {word}= names "{unknown[0]}", which is not an argument of it; its '
+                    f"arguments are {', '.join(sorted(names)) or 'none'}"
                 )
         if any_keyword:
             self.keyword_parameters += [name for name in self.given_parameters if name not in names]
@@ -181,8 +186,8 @@ class _Reader:
         if argument.kind is argument.VAR_KEYWORD:
             if self.known is not None or not (self.given_inputs or self.given_parameters):
                 raise DeclarationError(
-                    f'{self.where}: "**{name}" takes what nobody can give, for ports and parameters have names; name '
-                    f"each, as in `*, gain: float = 1.0`, or leave **{name} out"
+                    f'{self.where}: "**{name}" takes arguments that no port or parameter can supply, since '
+                    f"these have fixed names; name each, as in `*, gain: float = 1.0`, or remove **{name}"
                 )
             return by_position
         if argument.kind is argument.VAR_POSITIONAL:
@@ -214,7 +219,7 @@ class _Reader:
         return by_position
 
     def _is_left_alone(self, argument: inspect.Parameter) -> bool:
-        """Arguments of library functions that nobody asked for stay at their defaults."""
+        """Return whether an argument of a library function keeps its default because the call does not mention it."""
         if argument.name in self.given_inputs or argument.default is MISSING:
             return False
         return self.inputs_complete or (
@@ -257,8 +262,8 @@ class _Reader:
             )
         if self.known:
             raise DeclarationError(
-                f'{self.where}: process has an argument "{name}", but the declared inputs are {_names(self.known)}; '
-                f"declare `{name} = hfg.Input(...)` too"
+                f'{self.where}: process has an argument "{name}", but the declared inputs are '
+                f"{_names(self.known)}; also declare `{name} = hfg.Input(...)`"
             )
         if hint is MISSING:
             raise DeclarationError(
@@ -271,14 +276,17 @@ class _Reader:
         return InputSpec(given if isinstance(given, str) else name, type_, has_default, default, token)
 
     def _of_each(self, hint: Any, argument: inspect.Parameter) -> Any:
-        """What one port of a vector brings; the list of them is annotated, or each of `*values`."""
+        """Return the type of one port of a vector; the annotation is that of the list, or of each of `*values`."""
         parts = typing.get_args(hint)
         if argument.name not in self.vectors or argument.kind is argument.VAR_POSITIONAL or len(parts) != 1:
             return hint
         return parts[0] if split_token(parts[0])[1] else hint
 
     def _match_known(self) -> None:
-        """The call gives values in the order of the declared ports, whatever the order of the arguments."""
+        """Match arguments with declared inputs.
+
+        Values are passed in the order of the ports, whatever the order of the arguments.
+        """
         assert self.known is not None
         if not self.known:
             return
@@ -313,11 +321,9 @@ class _Reader:
         return spec_of(name, default, hint, self.where)
 
     def _unreadable(self) -> Signature:
-        """A function of a C library: only what inputs= and parameters= say is known."""
+        """Describe a C function, of which only the contents of inputs= and parameters= are known."""
         if not self.given_inputs or not self.inputs_complete:
-            raise DeclarationError(
-                f"{self.where}: the function's signature cannot be read; {self._call_to_write(None)}"
-            )
+            raise DeclarationError(f"{self.where}: cannot read the function's signature; {self._call_to_write(None)}")
         by_position = not self.given_parameters
         for name, hint in self.given_inputs.items():
             type_, token = split_token(hint)

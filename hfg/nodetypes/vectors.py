@@ -1,7 +1,7 @@
-"""Node types with vectors of ports: for each size there is a type of its own, which is made when a node needs it.
+"""Node types with vectors of ports: each size has a type of its own, made when a node needs it.
 
-So whoever looks at a node finds its ports as those of any other, and a node is still its type, by name, and its
-parameters, of which the sizes are some. Stands on ports and descriptions; knows no class of nodes.
+So the ports of such a node are found like those of any other node, and a node is still described by its type's name and
+its parameters, which include the sizes. Depends on ports and descriptions, not on classes of nodes.
 """
 
 from __future__ import annotations
@@ -25,33 +25,36 @@ __all__ = ["Sizes", "Vectors", "list_of", "size_parameters", "vector_specs"]
 Sizes = tuple[int, ...]
 
 _SHOWN_SIZE: Final = 1
-"""What the type itself has where a node must be made with a size: for those who list types."""
+"""Size in listings of types, for vectors whose size must be given when a node is made."""
 
 
 def list_of(hint: Any) -> Any:
-    """Give the type of what `process` gets for all ports of a vector; what is no type is left to be refused."""
+    """Return the type of the argument that `process` gets for a whole vector.
+
+    A hint that is not a type is refused later.
+    """
     return list[hint] if is_hint(hint) else hint
 
 
 def vector_specs(declared: Mapping[str, Any], where: str) -> dict[str, VectorSpec]:
-    """Give the vectors among declarations.
+    """Return the vectors among declarations.
 
     Raises:
-      DeclarationError: one should have the size of what is no vector.
+      DeclarationError: a vector refers to the size of something that is not a vector.
     """
     specs = {name: one.spec() for name, one in declared.items() if isinstance(one, Vector)}
     for spec in specs.values():
         if spec.like and (spec.like not in specs or specs[spec.like].like):
             sized = [name for name, one in specs.items() if not one.like]
             raise DeclarationError(
-                f'{where}: "{spec.name}" should have the size of "{spec.like}", which is no vector with a size of its '
-                f"own; {'there is ' + ', '.join(sized) if sized else 'give it a number'}"
+                f'{where}: "{spec.name}" should have the size of "{spec.like}", which is not a vector '
+                f"with a size of its own; {'there is ' + ', '.join(sized) if sized else 'give it a number'}"
             )
     return specs
 
 
 def size_parameters(specs: Mapping[str, VectorSpec]) -> dict[str, ParameterSpec]:
-    """Give the parameters that the sizes are: a node is made with them, and they never change."""
+    """Return the parameters for the sizes: a node is made with them, and they never change."""
     return {
         name: ParameterSpec(name, int, REQUIRED if spec.size is None else spec.size, size=True)
         for name, spec in specs.items()
@@ -72,11 +75,11 @@ class Vectors:
         self._classes: dict[Sizes, type] = {}
 
     def sizes(self, parameters: Mapping[str, Any]) -> Sizes:
-        """Read the sizes with which a node is to be made.
+        """Return the sizes with which to make a node.
 
         Raises:
-          TypeError: one is missing.
-          ValueError: one is no number from 1 on.
+          TypeError: a size is missing.
+          ValueError: a size is not an integer of 1 or more.
         """
         found: dict[str, int] = {}
         for name, spec in self.pattern.vectors.items():
@@ -98,20 +101,20 @@ class Vectors:
 
     @property
     def shown(self) -> NodeType:
-        """The type without a node: with the sizes by default."""
+        """The type for listings, with default sizes."""
         specs = self.pattern.vectors
         sizes = {name: spec.size or _SHOWN_SIZE for name, spec in specs.items()}
         return self.sized(tuple(sizes[spec.like or name] for name, spec in specs.items()))
 
     def make(self, cls: type, *positional: Any, **parameters: Any) -> Any:
-        """Stand for `__new__`: the node is of the class with its sizes.
+        """Make a node in place of `__new__`; its class has the node's sizes.
 
         Raises:
           TypeError: a size is missing.
-          ValueError: one is no number from 1 on.
+          ValueError: a size is not an integer of 1 or more.
         """
         made: Any = object.__new__(self._class_of(self.sizes(parameters)))
-        if not isinstance(made, cls):  # called on a class with other sizes: then Python does not go on by itself
+        if not isinstance(made, cls):  # called on a class with other sizes, for which Python does not call __init__
             made.__init__(*positional, **parameters)
         return made
 
@@ -165,7 +168,7 @@ class Vectors:
 
 
 def _spread(specs: Mapping[str, Any], counts: Mapping[str, int], made: Callable[[Any, str], Any]) -> Mapping[str, Any]:
-    """Put the ports of a vector in the place of it."""
+    """Replace each vector by its ports."""
     found: dict[str, Any] = {}
     for name, spec in specs.items():
         if name in counts:
@@ -187,7 +190,7 @@ def _numbered(handler: Callable[..., Any], number: int) -> Callable[..., Any]:
 def _gathering(
     caller: Callable[[Any], Callable[..., Any]], inputs: Iterable[str], counts: Mapping[str, int]
 ) -> Callable[[Any], Callable[..., Any]]:
-    """Make what gives `process` a list for each vector; who fires the node gives a value for each port."""
+    """Return a caller that passes `process` a list for each vector; the runner passes one value per port."""
     parts: list[int | slice] = []
     position = 0
     for name in inputs:

@@ -236,9 +236,7 @@ def test_code_that_raises_what_is_no_error_fails_the_run_with_its_path(
     with pytest.raises((NodeError, hfg.errors.TeardownError), match='node "node" failed in ') as raised:
         run(graph, fast)
     if problem is SystemExit and where in ("process", "setup", "hear"):
-        assert "it left the program (sys.exit): end the run by an event that is connected to graph.stop" in str(
-            raised.value
-        )
+        assert "it called sys.exit: to end the run, connect an event to graph.stop" in str(raised.value)
 
 
 def test_async_code_that_cancels_itself_does_not_hang_the_run(fast: bool) -> None:

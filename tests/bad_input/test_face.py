@@ -78,7 +78,7 @@ def a_node_as_a_function() -> None:
         (slot_without_self, r'the handler of slot "hear" is a method .* write `def hear\(self, value: '),
         (hook_without_self, r"setup is a method and takes the node first; write `def setup\(self\)`"),
         (stars, r'"\*values" does not say how many .* inputs=\{"values": hfg.Inputs\(int, 3\)\}'),
-        (a_node_as_a_function, r"is a node already; add it to a graph"),
+        (a_node_as_a_function, r"is already a node; add it to a graph"),
     ],
     ids=lambda item: getattr(item, "__name__", ""),
 )
@@ -159,8 +159,9 @@ def test_a_port_holds_no_value() -> None:
         node.value.connect(3)
     with pytest.raises(AttributeError) as refused:
         _ = node.value.shape
-    assert 'input "forward.value" has no "shape": it is only an end of edges; ask for its name' in in_words(
-        refused.value
+    assert (
+        'input "forward.value" has no "shape": it is only an end of edges; its attributes are name, type, node and path'
+        in in_words(refused.value)
     )
 
 

@@ -104,7 +104,7 @@ def test_types_that_are_not_there_are_told_with_what_else_is_wrong() -> None:
 def test_a_name_of_the_graph_that_would_steer_a_terminal_is_told_with_its_line_and_all_else(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    said = "a name is one line without characters that steer a terminal; leave them out"
+    said = "a name is one line without control characters; remove them"
     assert refusal(
         """
         hfg: 1
@@ -187,7 +187,7 @@ BOX = "hfg: 1\nnodes:\n  b:\n    graph:\n      parameters:\n        p: "
         ("hfg: 1\nnodes:\n  a: text", '3: "a": "a" is a mapping, got the text "text"'),
         ("hfg: 1\nnodes:\n  a: {type: 'x:y', file: b.hfg.yaml}", '3: "a": it has a file and a type'),
         ("hfg: 1\nnodes:\n  a/b: {type: 'hfg.testing.nodes:double'}", '3: "a/b": '),
-        ("hfg: 1\nnodes:\n  a: {type: double}", '3: "a": "double" is no reference to a node type'),
+        ("hfg: 1\nnodes:\n  a: {type: double}", '3: "a": "double" is not a reference to a node type'),
         ("hfg: 1\nnodes:\n  a: {type: 'os:system'}", '3: "a": "os:system" is '),
         ("hfg: 1\nevents: {rang: int}", '2: "rang": a whole graph has no events, only a subgraph has'),
         ("hfg: 1\nedges:\n - start -> stop:\n     through: [reactivex.operators:no]", '3: "start -> stop": '),
@@ -201,7 +201,7 @@ BOX = "hfg: 1\nnodes:\n  b:\n    graph:\n      parameters:\n        p: "
         ("hfg: 1\ninputs: {a: wave.Wave_read}", '2: "a": module "wave" is not one that this file may import'),
         (BOX + "{type: int, default: 1, choices: [1], labels: [a, b]}", '6: "b.p": labels are what to call the ch'),
         (BOX + "{type: int, default: 1, shown_if: {q: {gtt: 3}}}", '6: "b.p": "gtt" is no limit; there are gt, ge'),
-        (BOX + "{type: int, default: 1, shown_if: q}", 'parameter "p" is shown by "q", which is no parameter'),
+        (BOX + "{type: int, default: 1, shown_if: q}", 'parameter "p" is shown by "q", which is not a parameter'),
         (BOX + "{type: int, default: 1, shown_if: 3}", "shown_if names parameters of the same node and what they must"),
         (BOX + "{type: int, default: 1, step: 0}", 'parameter "p" has a step of 0'),
         ("hfg: 1\nname: " + "9" * 5000, "2: this number has 5000 digits"),

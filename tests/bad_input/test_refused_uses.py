@@ -413,9 +413,9 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "set a value": (running(lambda run, g: run.set(g["count"].limit, 4)), 'node.ports.parameters["name"], got 3'),
     "set what is read-only": (
         running(lambda run, g: run.set(hfg.Graph().add(Draws()).ports.parameters["done"], 0.5)),
-        'parameter "draws.done" is read-only: its node alone sets it; read node.done, or connect node.ports.parameters',
+        'parameter "draws.done" is read-only: only its node sets it; read node.done, or connect node.ports.parameters',
     ),
-    "give what is read-only": (lambda: Draws(done=0.5), 'parameter "draws.done" is read-only: its node alone sets it'),
+    "give what is read-only": (lambda: Draws(done=0.5), 'parameter "draws.done" is read-only: only its node sets it'),
     "lead into what is read-only": (
         lambda: _into_read_only(),
         '"draws.band" cannot lead into the parameter "draws.done"',
@@ -433,7 +433,7 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: Draws(frame=hfg.Colour(0, 0, 256)),
         "must have red, green and blue from 0 to 2",
     ),
-    "read no colour": (lambda: hfg.Colour.of("red"), '\'red\' is no colour; write "#rrggbb", as in "#ff8000"'),
+    "read no colour": (lambda: hfg.Colour.of("red"), '\'red\' is not a colour; write "#rrggbb", as in "#ff8000"'),
     "give another kind of file": (
         lambda: Draws(store=Path("a.gif")),
         "must be a file name like *.png, got 'a.gi",
@@ -458,7 +458,7 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "declare shown by nobody": (
         lambda: _declares(shown_if="other"),
-        'is shown by "other", which is no parameter with a',
+        'is shown by "other", which is not a parameter with a',
     ),
     "declare shown by code": (
         lambda: _declares(shown_if={"other": bool}),
@@ -632,7 +632,7 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "code that gives a text": (inside(gives_text), "TypeError: output \"node.out\" is declared int, got str: 'text'"),
     "code that gives a generator": (inside(gives_a_generator), 'output "node.out" is declared int, got generator'),
     "code that runs another": (inside(runs_another), "write `report = await hfg.run_async(graph)`"),
-    "code of a node in no graph": (inside(asks_its_place), "is in no graph, so it has no place: add it first"),
+    "code of a node in no graph": (inside(asks_its_place), "is not in a graph, so it has no place: add it first"),
     "code that sends twice": (inside(Twice), 'output "node.out" was written twice in one firing: it takes one token'),
     "code that sends and gives": (inside(SendsAndGives), '"node.out" was written twice in one firing: return or send'),
     "code that sends in a slot": (inside(SendsInASlot), 'output "node.out" was written in a slot handler: outputs bel'),

@@ -54,7 +54,7 @@ async def yields_async() -> AsyncIterator[None]:
 def test_a_value_without_an_output_is_an_error_of_the_firing(node: Any, debug: bool, fast: bool) -> None:
     name = node._type.name
     assert sentence(one(node()), fast, debug=debug) == (
-        f'node "node" failed in firing 1: TypeError: {name} has no output but gave back 1; '
+        f'node "node" failed in firing 1: TypeError: {name} has no output but returned 1; '
         "declare an output (annotate the result), or return nothing"
     )
 
@@ -64,7 +64,7 @@ def test_a_value_without_an_output_is_an_error_of_the_firing(node: Any, debug: b
 def test_a_source_without_an_output_yields_nothing_but_none(node: Any, fast: bool) -> None:
     graph = hfg.Graph()
     graph.add(node())
-    assert "has no output but gave back 1" in sentence(graph, fast)
+    assert "has no output but returned 1" in sentence(graph, fast)
 
 
 @pytest.mark.rule("F3", "X1")
@@ -76,7 +76,7 @@ def test_a_value_without_an_output_follows_the_policy_like_other_failures(fast: 
 def test_a_value_without_an_output_in_a_thread_is_an_error_too() -> None:
     graph = one(counts(), group="work")
     graph.group("work", threads=1)
-    assert "counts has no output but gave back 1" in sentence(graph, True)
+    assert "counts has no output but returned 1" in sentence(graph, True)
 
 
 @pytest.mark.rule("F4", "X1")

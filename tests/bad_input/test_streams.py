@@ -20,7 +20,7 @@ def test_a_subgraph_has_no_sent_of_its_own() -> None:
     box, ear = graph.add(Box()), graph.add(Ear())
     with pytest.raises(
         hfg.errors.UsageError,
-        match=r'^subgraph "box" has no event "out\.sent", for its outputs only pass on; declare an event',
+        match=r'^subgraph "box" has no event "out\.sent": outputs of a subgraph only forward tokens; declare a',
     ):
         graph.connect(box.out.sent, ear.hear)
     assert graph.edges == []
@@ -77,5 +77,5 @@ def test_a_slot_for_the_error_alone_is_refused_with_both_types() -> None:
 
 
 def test_elapsed_outside_a_run_names_what_to_ask() -> None:
-    with pytest.raises(hfg.errors.NotRunning, match=r"call it in a node, or ask the run itself, run\.elapsed\(\)$"):
+    with pytest.raises(hfg.errors.NotRunning, match=r"call it in a node, or use run\.elapsed\(\)$"):
         hfg.elapsed()

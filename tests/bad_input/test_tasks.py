@@ -67,11 +67,15 @@ def graph_of(node: hfg.Node, **options: Any) -> hfg.Graph:
 
 def test_before_the_run_and_after_it() -> None:
     node = Calls(what=lambda node: None)
-    with pytest.raises(NotRunning, match=r'^"calls" cannot start_soon\(work\(\.\.\.\)\), for nobody runs it; do it in'):
+    with pytest.raises(
+        NotRunning, match=r'^"calls" cannot start_soon\(work\(\.\.\.\)\) because it is not part of a run; call it in'
+    ):
         node.start_soon(work())
     graph = graph_of(node)
     for _ in range(2):
-        with pytest.raises(NotRunning, match=r'^"node" cannot start_soon\(work\(\.\.\.\)\), for nobody runs it; do it'):
+        with pytest.raises(
+            NotRunning, match=r'^"node" cannot start_soon\(work\(\.\.\.\)\) because it is not part of a run; call it'
+        ):
             node.start_soon(work())
         run(graph)
 
@@ -120,7 +124,7 @@ NO_COROUTINES: list[Callable[[], Any]] = [lambda: work, lambda: None, lambda: 3,
 def test_what_is_no_coroutine(what: Callable[[], Any]) -> None:
     graph = graph_of(Calls(what=lambda node: node.start_soon(what())))
     with pytest.raises(
-        NodeError, match=r'start_soon of "node" takes a coroutine, got .*; call what makes one: self\.st'
+        NodeError, match=r'start_soon of "node" takes a coroutine, got .*; call the function that makes it: self\.st'
     ):
         run(graph)
 
@@ -129,8 +133,8 @@ def test_on_a_subgraph_and_in_a_single_firing() -> None:
     graph = hfg.Graph()
     box = graph.add(Box())
     with pytest.raises(
-        UsageError, match=r'^"box" cannot start_soon\(work\(\.\.\.\)\), for a subgraph runs no code of its'
+        UsageError, match=r'^"box" cannot start_soon\(work\(\.\.\.\)\) because a subgraph runs no code of its'
     ):
         box.start_soon(work())
-    with pytest.raises(NotRunning, match=r'"calls" cannot start_soon\(work\(\.\.\.\)\), for nobody runs it'):
+    with pytest.raises(NotRunning, match=r'"calls" cannot start_soon.* because it is not part of a run'):
         fire(Calls(what=lambda node: node.start_soon(work())), value=1)

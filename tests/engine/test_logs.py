@@ -222,7 +222,7 @@ def test_a_log_handler_that_raises_costs_its_record_and_not_the_run(
     assert (report.outcome, keep.values, report.nodes["says"].failed) == ("done", [1, 3], 0)
     errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("hfg: a log handler")]
     assert (
-        'hfg: a log handler raised OSError: disk full; a record of "hfg.node.fail_on" is lost, and the run goes on'
+        'hfg: a log handler raised OSError: disk full; a record of "hfg.node.fail_on" is lost, and the run continues'
         in errors
     )
     assert len(errors) == 5

@@ -713,7 +713,7 @@ REFUSED = [
     (c.Rename("first", "second"), 'graph "chain" has a node "second" already; choose another name'),
     (c.Rename("first", "a/b"), '"/" separates the parts of a path'),
     (c.Copy("first", "sink/x"), '"sink" is no subgraph, so nothing is inside it'),
-    (c.Add("no_such_module:x", "x"), 'node "x": node type "no_such_module:x": module "no_such_module" cannot be found'),
+    (c.Add("no_such_module:x", "x"), 'node "x": node type "no_such_module:x": no module named "no_such_module"'),
     (c.Add("hfg.testing.nodes:doubel", "x"), 'module "hfg.testing.nodes" has no "doubel"'),
     (c.Add("hfg.testing.nodes:double", "x", {"size": 3}), 'node "x": double has no parameter "size"'),
     (c.Add("hfg.testing.nodes:double", "x", {}, {"rate": 3}), "options are those of graph.add"),

@@ -94,7 +94,7 @@ def test_build_that_raises_leaves_nothing(graph: Graph) -> None:
     assert [edge.label for edge in graph.edges] == ["start -> plan.enable"]
     assert list(graph.groups) == ["loop"]
     for node in (broken, broken.kept):
-        with pytest.raises(UsageError, match="is in no graph"):
+        with pytest.raises(UsageError, match="is not in a graph"):
             _ = node.place
     with pytest.raises(UsageError, match="has no graph yet"):
         _ = broken.graph

@@ -447,7 +447,7 @@ def test_edges_between_kinds_that_never_fit_are_refused() -> None:
     assert compatible(cv.cvt_color._type.outputs["out"].type, cv.canny._type.inputs["image"].type)
     graph = hfg.Graph("pictures")
     edges, root = graph.add(cv.canny()), graph.add(cv.sqrt())
-    with pytest.raises(hfg.errors.ConnectionError, match="an array of uint8 is no array of"):
+    with pytest.raises(hfg.errors.ConnectionError, match="an array of uint8 is not an array of"):
         graph.connect(edges.out, root.ports.inputs["src"])
 
 

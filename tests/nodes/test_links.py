@@ -543,11 +543,13 @@ def test_what_is_no_name_is_refused_when_it_is_said(name: str) -> None:
 
 
 def test_ports_that_are_none_or_in_no_graph_are_refused() -> None:
-    with pytest.raises(hfg.errors.UsageError, match="belongs to no graph yet; add its node with graph.add"):
+    with pytest.raises(hfg.errors.UsageError, match="does not belong to a graph yet; add its node with graph.add"):
         hfg.publish("camera", numbers().out)
-    with pytest.raises(hfg.errors.UsageError, match="is no port; add its node"):
+    with pytest.raises(hfg.errors.UsageError, match="is not a port; add its node"):
         hfg.publish("camera", 3)  # type: ignore[arg-type]
-    with pytest.raises(hfg.errors.UsageError, match="subscribed to for no port: give the ports that its values go to"):
+    with pytest.raises(
+        hfg.errors.UsageError, match="subscribed to without a port: pass the ports that receive the values"
+    ):
         hfg.subscribe("camera")
 
 

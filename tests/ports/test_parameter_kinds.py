@@ -143,7 +143,7 @@ def test_help_comes_from_the_declaration_or_the_docstring() -> None:
         ("offset", np.zeros(4), "must be of type Array[float64] and shape 3, got an array of float64, 4"),
         ("offset", np.zeros(3, int), "must be of type Array[float64] and shape 3"),
         ("points", np.zeros((2, 2)), "must be of type Array[float64] and shape anyx3"),
-        ("done", 0.5, "is read-only: its node alone sets it; read node.done"),
+        ("done", 0.5, "is read-only: only its node sets it; read node.done"),
     ],
 )
 def test_what_a_kind_does_not_take_is_refused_and_changes_nothing(name: str, given: Any, wrong: str) -> None:
@@ -270,7 +270,7 @@ def test_nothing_leads_into_what_is_read_only_but_from_there() -> None:
         EdgeRefused, match=r'"other\.threshold" cannot lead into the parameter "node\.done", which is r'
     ):
         graph.connect(other.ports.parameters["threshold"], node.ports.parameters["done"])
-    with pytest.raises(GraphError, match=r'parameter "node\.done" is read-only: its node alone sets it'):
+    with pytest.raises(GraphError, match=r'parameter "node\.done" is read-only: only its node sets it'):
         graph.edit(hfg.commands.SetParameter("node.done", 0.5))
     node.done = 0.25  # as its own code does
     with pytest.raises(ValueError, match=r"must be <= 1, got 2\.0"):
@@ -300,7 +300,10 @@ def declared(**body: Any) -> type:
             r"has the pattern ' '; a pattern matches file names,",
         ),
         (lambda: declared(a=hfg.Parameter(1, unit=3)), r'has unit=3; write a string, as in unit="\.\.\."'),  # type: ignore[call-overload]
-        (lambda: declared(a=hfg.Parameter(1, shown_if="b")), r'"a" is shown by "b", which is no parameter with a val'),
+        (
+            lambda: declared(a=hfg.Parameter(1, shown_if="b")),
+            r'"a" is shown by "b", which is not a parameter with a val',
+        ),
         (
             lambda: declared(a=hfg.Parameter(1, shown_if="a")),
             r"depends on its own value to be shown, so it could be hidden forever;",
@@ -312,13 +315,14 @@ def declared(**body: Any) -> type:
         ),
         (
             lambda: declared(a=hfg.Parameter(1, shown_if={"b": "z"}), b=hfg.Parameter("x", choices=("x", "y"))),
-            r"\"a\" is shown if \"b\" is what that can never be: it must be one of 'x', 'y', got 'z'",
+            r"\"a\" is shown if \"b\" has a value that it can never have: it must be one of 'x', 'y', got 'z'",
         ),
         (
             lambda: declared(
                 a=hfg.Parameter(1, shown_if="b"), b=hfg.Parameter(1, shown_if="c"), c=hfg.Parameter(1, shown_if="a")
             ),
-            'parameters are shown by each other, "a" by "b" by "c" by "a", so that all could hide for ever; let one of',
+            'parameters depend on each other to be shown, "a" by "b" by "c" by "a", so all of them could be '
+            "hidden forever; always show one of",
         ),
         (lambda: declared(a=hfg.Parameter(trigger=True, choices=(1, 2))), "is a trigger and has no value"),  # type: ignore[call-overload]
         (lambda: declared(a=hfg.Parameter(read_only=True)), "is read-only and has no default to start with"),  # type: ignore[call-overload]

@@ -161,7 +161,7 @@ def test_an_automatic_slot_cannot_be_called() -> None:
 def test_a_subgraph_has_only_the_automatic_ports_that_make_sense() -> None:
     box = Box()
     assert [box.activated.name, box.timeout.name, box.enable.name, box.reset.name]
-    with pytest.raises(UsageError, match=r'subgraph "box" has no slot "activate", for it does not fire itself'):
+    with pytest.raises(UsageError, match=r'subgraph "box" has no slot "activate" because it does not fire itself'):
         _ = box.activate
     with pytest.raises(UsageError, match='has no event "processed"'):
         _ = box.processed

@@ -128,7 +128,7 @@ def test_a_handler_without_annotation_is_refused() -> None:
 
 
 def test_a_handler_of_two_arguments_is_refused() -> None:
-    with pytest.raises(DeclarationError, match=r"needs 2 arguments \(a, b\), but a signal has one value"):
+    with pytest.raises(DeclarationError, match=r"takes 2 arguments \(a, b\), but a signal carries one value"):
 
         class Broken(hfg.Node):
             @hfg.slot  # type: ignore[arg-type]

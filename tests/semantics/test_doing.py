@@ -540,7 +540,7 @@ def test_retries_are_about_firings_and_it_takes_none_from_them() -> None:
 
 @pytest.mark.rule("A15")
 def test_one_that_is_not_async_or_of_a_subgraph_is_refused() -> None:
-    with pytest.raises(hfg.errors.DeclarationError, match=r"has to be `async def do\(self\)`"):
+    with pytest.raises(hfg.errors.DeclarationError, match=r"node, which must be `async def do\(self\)`"):
         type("Plain", (hfg.Node,), {"do": lambda self: None})
 
     async def do(self: Any) -> None: ...

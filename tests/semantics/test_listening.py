@@ -213,5 +213,5 @@ def test_random_graphs_of_listening_nodes_do_what_the_oracle_permits(block: int)
 
 
 def test_a_subgraph_only_passes_on() -> None:
-    with pytest.raises(DeclarationError, match="while_active means nothing"):
+    with pytest.raises(DeclarationError, match="while_active has no effect"):
         type("Box", (hfg.Subgraph,), {"go": hfg.slot(type=int, while_active=True), "build": lambda self, graph: None})

@@ -269,9 +269,9 @@ def test_what_a_node_sets_alone_is_refused_to_everybody_else() -> None:
                 lambda: Works(done=0.5),
             ]
             for attempt in attempts:
-                with pytest.raises(ValueError, match=r'^parameter "works\.done" is read-only: its node alone sets it'):
+                with pytest.raises(ValueError, match=r'^parameter "works\.done" is read-only: only its node sets it'):
                     attempt()
-            with pytest.raises(GraphError, match=r'parameter "works\.done" is read-only: its node alone sets it'):
+            with pytest.raises(GraphError, match=r'parameter "works\.done" is read-only: only its node sets it'):
                 await run.edit(c.SetParameter("works.done", 0.5))
 
     drive(main)

@@ -326,7 +326,7 @@ def test_what_ends_the_program_is_no_error_that_a_policy_gets_over_and_the_end_b
 
     graph, _, _ = starting(leaves, on_error="skip")
     if isinstance(error, SystemExit):
-        with pytest.raises(hfg.errors.NodeError, match='^node "node" failed in task "leaves".*: it left the program'):
+        with pytest.raises(hfg.errors.NodeError, match='^node "node" failed in task "leaves".*: it called sys.exit'):
             run(graph)
     else:
         (sentence,) = run(graph).errors

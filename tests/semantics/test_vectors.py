@@ -306,12 +306,12 @@ def test_the_vector_itself_is_no_end_of_an_edge() -> None:
 def test_a_size_never_changes() -> None:
     merge = hfg.Graph().add(Merge(values=2))
     assert "values" not in merge.ports.parameters
-    with pytest.raises(ValueError, match=r'"merge.values" is a vector of 2 ports, and a node keeps its ports'):
+    with pytest.raises(ValueError, match=r'"merge.values" is a vector of 2 ports, and the ports of a node are fixed:'):
         merge._set_parameter("values", 3)
 
 
 def test_the_size_of_another_must_be_one() -> None:
-    with pytest.raises(hfg.errors.DeclarationError, match='should have the size of "other", which is no vector'):
+    with pytest.raises(hfg.errors.DeclarationError, match='should have the size of "other", which is not a vector'):
 
         class Broken(hfg.Node):
             values = hfg.Inputs(int, "other")
