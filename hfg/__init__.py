@@ -12,27 +12,35 @@ Which floor stands on which; imports go down only, and asyncio begins on floor 5
     0  errors  types  <-  base  <-  encoding  images  trace
 
 A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
+So `import hfg` imports nearly nothing: each name is imported when it is first used.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from hfg.base import starting as starting  # before all that takes its time to import
 
 # isort: split
-from hfg import composing as composing  # what stands high and is called from below
-from hfg import errors
-from hfg.activity import StateMachine
-from hfg.base.clock import elapsed, now
-from hfg.base.logs import log
-from hfg.base.token import END, NO_MESSAGE, Token
-from hfg.base.values import Colour, Span
-from hfg.engine import PunctualLoop, Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
-from hfg.errors import EndOfStream, Failure
-from hfg.files import load, save
-from hfg.graph import Graph, Subgraph, commands, operator
-from hfg.nodetypes.functions import node
-from hfg.nodetypes.node import Node
-from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
-from hfg.pubsub import publish, subscribe
-from hfg.registry import reference_of
+from hfg import composing as composing  # gives lower layers the functions that upper layers provide
+from hfg.base.lazy import on_demand
+
+if TYPE_CHECKING:
+    from hfg import errors
+    from hfg.activity import StateMachine
+    from hfg.base.clock import elapsed, now
+    from hfg.base.logs import log
+    from hfg.base.token import END, NO_MESSAGE, Token
+    from hfg.base.values import Colour, Span
+    from hfg.engine import PunctualLoop, Report, Run, Statistics, VirtualTimeLoop, run, run_async, running
+    from hfg.errors import EndOfStream, Failure
+    from hfg.files import load, save
+    from hfg.graph import Graph, Subgraph, commands, operator
+    from hfg.nodetypes.functions import node
+    from hfg.nodetypes.node import Node
+    from hfg.ports import Event, Events, Input, Inputs, Output, Outputs, Parameter, Slots, State, slot
+    from hfg.pubsub import publish, subscribe
+    from hfg.registry import reference_of
 
 __all__ = [
     "END",
@@ -77,6 +85,28 @@ __all__ = [
     "slot",
     "subscribe",
 ]
+
+
+if not TYPE_CHECKING:
+    __getattr__ = on_demand(
+        __name__,
+        {
+            "activity": ("StateMachine",),
+            "base.clock": ("elapsed", "now"),
+            "base.logs": ("log",),
+            "base.token": ("END", "NO_MESSAGE", "Token"),
+            "base.values": ("Colour", "Span"),
+            "engine": ("PunctualLoop", "Report", "Run", "Statistics", "VirtualTimeLoop", "run", "run_async", "running"),
+            "errors": ("EndOfStream", "Failure"),
+            "files": ("load", "save"),
+            "graph": ("Graph", "Subgraph", "commands", "operator"),
+            "nodetypes.functions": ("node",),
+            "nodetypes.node": ("Node",),
+            "ports": ("Event", "Events", "Input", "Inputs", "Output", "Outputs", "Parameter", "Slots", "State", "slot"),
+            "pubsub": ("publish", "subscribe"),
+            "registry": ("reference_of",),
+        },
+    )
 
 
 def __dir__() -> list[str]:

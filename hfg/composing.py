@@ -1,6 +1,6 @@
 """Functions of a higher layer that a lower layer calls: registered here, imported on first use.
 
-`run.record` and `run.report_page` belong to a run, but their implementation depends on the engine. Depends on both.
+`import hfg` imports this module, so it must not import much. Depends on `hooks`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hfg.engine import Run
-from hfg.engine.face.composition import Composition
-from hfg.graph import Graph
-from hfg.graph.editing.commands import Rule
-from hfg.graph.flat import FlatGraph
+from hfg.base.hooks import hooks
 
 if TYPE_CHECKING:
+    from hfg.graph import Graph
+    from hfg.graph.flat import FlatGraph
     from hfg.parts.distribution import Distribution
 
 __all__: list[str] = []
@@ -39,7 +37,7 @@ def _report_page(*arguments: Any, **options: Any) -> Any:
 def _distribute(
     graph: Graph, flat: FlatGraph, options: Mapping[str, Any], virtual: bool, settings: str | None
 ) -> Distribution:
-    """Implement `Composition.distribute`; its dependencies are imported only if there are processes."""
+    """Implement `hooks.distribute`; its dependencies are imported only if there are processes."""
     from hfg.parts.distribution import distribute
 
     return distribute(graph, flat, options, virtual=virtual, settings=settings)
@@ -48,7 +46,7 @@ def _distribute(
 def _refusal(
     references: Iterable[str], values: Iterable[str], types: Iterable[str], allow: Iterable[str]
 ) -> str | None:
-    """Implement `commands.Rule`: return why a graph file in the working directory could not use these."""
+    """Implement `hooks.refusal`: return why a graph file in the working directory could not use these."""
     from hfg.encoding import find_reference
     from hfg.errors import EncodingError
     from hfg.files.allowed import Allowed
@@ -75,7 +73,7 @@ def _refusal(
     return next(filter(None, found), None)
 
 
-Rule.refusal = staticmethod(_refusal)
-Composition.distribute = staticmethod(_distribute)
-Run._recorder = staticmethod(_record)
-Run._reporter = staticmethod(_report_page)
+hooks.refusal = _refusal
+hooks.distribute = _distribute
+hooks.record = _record
+hooks.report_page = _report_page

@@ -6,6 +6,7 @@ import ast
 import importlib
 import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -52,13 +53,18 @@ def test_public_definitions_are_in_all(module: str) -> None:
 
 
 def test_the_face_is_complete() -> None:
-    """What `import hfg` shows is what `hfg.__all__` lists, and the other way round."""
-    shown = {
-        name for name, value in vars(hfg).items() if not name.startswith("_") and not isinstance(value, ModuleType)
-    }
-    shown -= {"annotations"}
-    listed = {name for name in hfg.__all__ if not isinstance(getattr(hfg, name), ModuleType)}
-    assert shown == listed
+    """Type checkers read the imports, Python finds the same objects on demand, and `hfg.__all__` lists them."""
+    imports = [
+        one
+        for block in tree("hfg").body
+        if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
+        for one in block.body
+        if isinstance(one, ast.ImportFrom)
+    ]
+    names = [(one.module, alias.name) for one in imports for alias in one.names]
+    assert sorted(name for _, name in names) == sorted(hfg.__all__)
+    for module, name in names:
+        assert getattr(hfg, name) is getattr(loaded(str(module)), name), name
 
 
 def test_the_face_defines_nothing() -> None:
@@ -68,7 +74,29 @@ def test_the_face_defines_nothing() -> None:
         is_all = isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == "__all__"
         is_import = isinstance(statement, ast.Import | ast.ImportFrom)
         is_dir = isinstance(statement, ast.FunctionDef) and statement.name == "__dir__"
-        assert is_docstring or is_all or is_import or is_dir, f"hfg/__init__.py:{statement.lineno} defines something"
+        is_about_imports = isinstance(statement, ast.If) and "TYPE_CHECKING" in ast.unparse(statement.test)
+        assert is_docstring or is_all or is_import or is_dir or is_about_imports, (
+            f"hfg/__init__.py:{statement.lineno} defines something"
+        )
+
+
+def test_a_name_that_hfg_does_not_have_is_refused_as_by_any_module() -> None:
+    with pytest.raises(AttributeError, match=r"^module 'hfg' has no attribute 'Grpah'$"):
+        _ = getattr(hfg, "Grpah")  # noqa: B009 - type checkers refuse it too
+    assert hfg.encoding.Limits is loaded("hfg.encoding").Limits
+
+
+def test_a_module_that_cannot_be_imported_says_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An attribute that only seems to be missing would hide it."""
+    (tmp_path / "lazily").mkdir()
+    (tmp_path / "lazily" / "__init__.py").write_text(
+        "from hfg.base.lazy import on_demand\n__getattr__ = on_demand(__name__, {'broken': ['name']})\n"
+    )
+    (tmp_path / "lazily" / "broken.py").write_text("import no_such_module_at_all\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in ("name", "broken"):
+        with pytest.raises(ModuleNotFoundError, match="no_such_module_at_all"):
+            getattr(loaded("lazily"), name)
 
 
 def test_completion_shows_the_public_names_only() -> None:
@@ -82,11 +110,21 @@ def test_no_module_is_named_like_a_public_function() -> None:
     assert not clashes
 
 
-def test_import_hfg_brings_neither_command_line_nor_test_tools() -> None:
+def test_import_hfg_brings_next_to_nothing() -> None:
+    """So the command line shows its help, and searches nodes, without the engine; whoever uses a name pays for it."""
     code = "import sys, hfg; print(*sorted(name for name in sys.modules))"
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     unwanted = {"hfg.cli", "hfg.testing", "hfg_transports", "typer", "rich", "hypothesis", "pytest", "cv2"}
+    unwanted |= {"numpy", "reactivex", "anyio", "asyncio", "hfg.graph", "hfg.engine", "hfg.ports"}
     assert not unwanted & set(names)
+
+
+def test_all_of_hfg_brings_neither_command_line_nor_test_tools() -> None:
+    code = "import sys; from hfg import *; print(*sorted(name for name in sys.modules))"
+    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    unwanted = {"hfg.cli", "hfg.testing", "hfg_transports", "typer", "rich", "hypothesis", "pytest", "cv2"}
+    assert not unwanted & set(names)
+    assert "hfg.engine" in names
 
 
 def test_virtual_time_is_at_the_door() -> None:

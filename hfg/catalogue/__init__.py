@@ -15,18 +15,23 @@ module.
 
 from __future__ import annotations
 
-from hfg.catalogue.describing import (
-    ErrorDescription,
-    ParameterDescription,
-    PortDescription,
-    TypeDescription,
-    describe_type,
-    undocumented,
-)
-from hfg.catalogue.finding import Catalogue, installed, types_of
-from hfg.catalogue.keeping import Kept, installed_index
-from hfg.catalogue.offers import Offer, offers
-from hfg.catalogue.searching import Entry, Index, categories, index_of, named, near_words, ranked, search
+from typing import TYPE_CHECKING
+
+from hfg.base.lazy import on_demand
+from hfg.catalogue.offers import Offer, offers  # now: a module and its function have the same name
+
+if TYPE_CHECKING:
+    from hfg.catalogue.describing import (
+        ErrorDescription,
+        ParameterDescription,
+        PortDescription,
+        TypeDescription,
+        describe_type,
+        undocumented,
+    )
+    from hfg.catalogue.finding import Catalogue, installed, types_of
+    from hfg.catalogue.keeping import Kept, installed_index
+    from hfg.catalogue.searching import Entry, Index, categories, index_of, named, near_words, ranked, search
 
 __all__ = [
     "Catalogue",
@@ -51,3 +56,21 @@ __all__ = [
     "types_of",
     "undocumented",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = on_demand(
+        __name__,
+        {
+            "describing": (
+                "ErrorDescription",
+                "ParameterDescription",
+                "PortDescription",
+                "TypeDescription",
+                "describe_type",
+                "undocumented",
+            ),
+            "finding": ("Catalogue", "installed", "types_of"),
+            "keeping": ("Kept", "installed_index"),
+            "searching": ("Entry", "Index", "categories", "index_of", "named", "near_words", "ranked", "search"),
+        },
+    )

@@ -2,15 +2,18 @@
 
 The file belongs to a fingerprint of everything that the catalogue is made from: the versions of hfg and Python, all
 installed distributions, and name, size and time of each file of the packages that offer node types. If any of it
-changes, the types are imported again. A catalogue with problems is not kept. Depends on `finding` and `searching`.
+changes, the types are imported again. The same happens if another user could have written the file. A catalogue with
+problems is not kept. Depends on `finding` and `searching`.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import importlib.util
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -20,7 +23,6 @@ from typing import Final
 
 import msgspec
 
-from hfg.catalogue.finding import installed
 from hfg.catalogue.offers import Offer, offers
 from hfg.catalogue.searching import Index, index_of
 
@@ -28,6 +30,7 @@ __all__ = ["Kept", "installed_index"]
 
 _FORMAT: Final = "1"
 _INSTALLED: Final = (".dist-info", ".egg-info", ".egg-link", ".pth")
+_WRITTEN_BY_OTHERS: Final = stat.S_IWGRP | stat.S_IWOTH
 _MOST: Final = 64 << 20  # bytes: the library's own index has less than one
 
 
@@ -47,13 +50,31 @@ def installed_index(folder: Path | None = None) -> Kept:
     places = offers()
     path = (folder or _folder()) / f"catalogue-{_fingerprint(places)}.json"
     with contextlib.suppress(OSError, msgspec.DecodeError):
-        if path.stat().st_size <= _MOST:
-            return Kept(msgspec.json.decode(path.read_bytes(), type=Index))
+        return Kept(msgspec.json.decode(_read_own(path), type=Index))
+    from hfg.catalogue.finding import installed  # imports the graph layer, which a stored index makes unnecessary
+
     found = installed(places)
     index = index_of(found.types)
     if not found.problems:
         _keep(path, index)
     return Kept(index, found.problems)
+
+
+def _read_own(path: Path) -> bytes:
+    """Return what a file contains that only this user can have written: it says which code a node type imports.
+
+    Raises:
+      OSError: there is no such file, it is too large, or another user could have written it.
+    """
+    with open(path, "rb", opener=_without_links) as file:
+        found = os.fstat(file.fileno())
+        if found.st_size > _MOST or found.st_uid != os.geteuid() or found.st_mode & _WRITTEN_BY_OTHERS:
+            raise PermissionError(errno.EPERM, "not a file of this user alone", str(path))
+        return file.read()
+
+
+def _without_links(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_CLOEXEC)
 
 
 def _folder() -> Path:

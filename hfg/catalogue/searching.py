@@ -13,11 +13,12 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.resources import files
-from typing import Final, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, TypeVar
 
 import msgspec
 
-from hfg.catalogue.describing import TypeDescription
+if TYPE_CHECKING:  # a search of the stored index needs no description
+    from hfg.catalogue.describing import TypeDescription
 
 __all__ = ["Entry", "Index", "categories", "index_of", "named", "near_words", "ranked", "search"]
 

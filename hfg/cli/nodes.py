@@ -13,19 +13,20 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
 from hfg import catalogue
-from hfg.catalogue import Catalogue, Entry, Index, ParameterDescription, TypeDescription
 from hfg.cli import show
-from hfg.cli.target import import_from_here, load_module
 from hfg.errors import TargetError
+
+if TYPE_CHECKING:
+    from hfg.catalogue import Catalogue, Entry, Index, ParameterDescription, TypeDescription
 
 __all__ = ["nodes"]
 
-Listed = TypeVar("Listed", Entry, TypeDescription)
+Listed = TypeVar("Listed", "Entry", "TypeDescription")
 
 _LIBRARY = "hfg.nodes"
 _WIDEST_NAME = 30
@@ -107,10 +108,12 @@ def _meant(what: str | None) -> tuple[Catalogue, bool]:
     """Give the types that are meant, and whether somebody asks for a type of that name."""
     if what is None:
         return catalogue.installed(), False
+    from hfg.cli import target  # imports the graph layer, which a search does without
+
     place, colon, name = what.rpartition(":")
     if colon and not ("/" in name or "\\" in name):
         return _only_named(_in(place), what, name), True
-    import_from_here()
+    target.import_from_here()
     if (
         what.endswith(".py")
         or "/" in what
@@ -130,7 +133,9 @@ def _meant(what: str | None) -> tuple[Catalogue, bool]:
 
 
 def _in(place: str) -> Catalogue:
-    return catalogue.types_of(load_module(f"{_LIBRARY}.{place}" if _is_family(place) else place))
+    from hfg.cli import target
+
+    return catalogue.types_of(target.load_module(f"{_LIBRARY}.{place}" if _is_family(place) else place))
 
 
 def _is_family(name: str) -> bool:
@@ -161,7 +166,7 @@ def _only_named(found: Catalogue, what: str, name: str) -> Catalogue:
         near = difflib.get_close_matches(name.rpartition(".")[2], sorted(known), n=3)
         hint = f"; is {' or '.join(near)} meant?" if near else "; hfg nodes lists what there is"
         raise TargetError(f'there is no module, family or node type "{what}" here or installed{hint}')
-    return Catalogue(tuple(types))
+    return catalogue.Catalogue(tuple(types))
 
 
 def _of_category(types: Iterable[Listed], category: str) -> list[Listed]:

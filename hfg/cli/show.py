@@ -11,16 +11,17 @@ import sys
 import traceback
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from hfg.base.clock import current_elapsed
 from hfg.base.controls import escaped
 from hfg.base.frames import is_machinery, is_standard
-from hfg.engine.observing.encoding import encode
-from hfg.engine.observing.report import Report
 from hfg.errors import EngineInternalError, FileError, NodeError, TeardownError
+
+if TYPE_CHECKING:
+    from hfg.engine.observing.report import Report
 
 __all__ = [
     "Records",
@@ -178,6 +179,8 @@ def _is_empty(shown: traceback.TracebackException) -> bool:
 
 def json(value: Any) -> None:
     """Write JSON to standard output, indented for people."""
+    from hfg.engine.observing.encoding import encode
+
     write(msgspec.json.format(encode(value), indent=2).decode() + "\n")
 
 

@@ -12,24 +12,14 @@ describes it. `from_module` makes node types of the functions of any module.
 
 from __future__ import annotations
 
-from importlib import import_module
 from pkgutil import iter_modules
-from typing import Any
+
+from hfg.base.lazy import on_demand
 
 __all__: list[str] = []  # families are found by their names, see __getattr__
 
 
-def __getattr__(name: str) -> Any:
-    if name == "from_module":
-        return import_module(f"{__name__}.modules").from_module
-    family = f"{__name__}.{name}"
-    if not name.startswith("_"):
-        try:
-            return import_module(family)
-        except ModuleNotFoundError as error:
-            if error.name != family:  # the family is there, what it stands on is not
-                raise
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = on_demand(__name__, {"modules": ["from_module"]})
 
 
 def __dir__() -> list[str]:

@@ -21,9 +21,9 @@ Sees all of hfg; nothing of hfg sees it. What needs hypothesis is imported when 
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from hfg.base.lazy import on_demand
 from hfg.testing import diagrams, invariants
 from hfg.testing.conformance import Divergence, Replay, replay
 from hfg.testing.exploring import Exploration, ScheduleFailure, explore
@@ -61,19 +61,13 @@ __all__ = [
     "values_of",
 ]
 
-
-_NEED_HYPOTHESIS = {
-    "graphs": "strategies",
-    "schedules": "strategies",
-    "tokens": "strategies",
-    "values_of": "values",
-    "try_type": "trying",
-    "NotUsable": "trying",
-    "Trial": "trying",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _NEED_HYPOTHESIS:
-        return getattr(import_module(f"{__name__}.{_NEED_HYPOTHESIS[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+# what needs hypothesis
+if not TYPE_CHECKING:
+    __getattr__ = on_demand(
+        __name__,
+        {
+            "strategies": ("graphs", "schedules", "tokens"),
+            "trying": ("NotUsable", "Trial", "try_type"),
+            "values": ("values_of",),
+        },
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ import hfg
 from hfg.catalogue import (
     Index,
     describe_type,
+    finding,
     index_of,
     installed,
     installed_index,
@@ -185,7 +187,7 @@ def test_a_changed_file_a_new_one_or_an_installation_is_noticed(
     titles(tmp_path)
     (plugin.parent / "opencv-9.9.dist-info").mkdir()
     monkeypatch.setattr(
-        keeping, "installed", lambda places: pytest.fail("imported") if not places else installed(places)
+        finding, "installed", lambda places: pytest.fail("imported") if not places else installed(places)
     )
     titles(tmp_path)
     assert len(list(tmp_path.glob("catalogue-*.json"))) == 1  # those of earlier versions are gone
@@ -197,6 +199,25 @@ def test_a_broken_file_is_written_anew(plugin: Path, tmp_path: Path) -> None:
     for broken in (b"", b"{", b'{"entries": 3}', b"\xff" * 100):
         kept.write_bytes(broken)
         assert titles(tmp_path) == ["polish"]
+
+
+@pytest.mark.parametrize("how", ["group", "link", "other"])
+def test_a_file_that_another_user_could_have_written_is_not_read(
+    plugin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    """It says which code a node type imports."""
+    titles(tmp_path)
+    kept = next(tmp_path.glob("catalogue-*.json"))
+    kept.write_bytes(kept.read_bytes().replace(b"polish", b"poison"))
+    assert titles(tmp_path) == ["poison"]
+    if how == "group":
+        kept.chmod(0o620)
+    elif how == "link":
+        kept.rename(tmp_path / "elsewhere.json")
+        kept.symlink_to(tmp_path / "elsewhere.json")
+    else:
+        monkeypatch.setattr(os, "geteuid", lambda: kept.stat().st_uid + 1)
+    assert titles(tmp_path) == ["polish"]
 
 
 def test_without_a_place_for_it_a_search_imports_each_time(plugin: Path, tmp_path: Path) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 from hfg.engine.editing.edits import Edits
 from hfg.engine.editing.pausing import Pausing
@@ -65,10 +64,6 @@ class Composition:
       taps: who looks at ports and edges.
       outputs: what came out of the graph's own outputs, where nobody reads them.
     """
-
-    distribute: ClassVar[
-        Callable[[Graph, FlatGraph, Mapping[str, Any], bool, str | None], Others]
-    ]  # see `hfg.composing`
 
     def __init__(self, flat: FlatGraph, settings: Settings, others: Others | None = None) -> None:
         self.others = others

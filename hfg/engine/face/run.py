@@ -10,8 +10,9 @@ import os
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from functools import partial
 from types import ModuleType
-from typing import Any, ClassVar, Literal, TypeVar, overload
+from typing import Any, Literal, TypeVar, overload
 
+from hfg.base.hooks import hooks
 from hfg.base.token import Token
 from hfg.engine.editing.pausing import Breakpoint, Step
 from hfg.engine.editing.setting import set_parameter
@@ -48,10 +49,6 @@ T = TypeVar("T")
 
 class Run:
     """A graph that runs; made by `running`."""
-
-    # What records and what writes pages stand above, and are put in by the package itself.
-    _recorder: ClassVar[Callable[..., Any]]
-    _reporter: ClassVar[Callable[..., Any]]
 
     def __init__(self, graph: Graph, parts: Composition) -> None:
         self.graph = graph
@@ -220,7 +217,7 @@ class Run:
           UsageError: no port fits, values of one cannot be recorded, or the file is there already or cannot be made.
           NotRunning: the run is over.
         """
-        recording: RunRecording = self._recorder(
+        recording: RunRecording = hooks.record(
             self, file, select=select, lossless=lossless, images=images, pickle=pickle, force=force
         )
         return recording
@@ -246,7 +243,7 @@ class Run:
           NotRunning: the run is over.
         """
         self._need_running("there is nothing left to see for a page")
-        page: RunPage = self._reporter(self, file, pictures=pictures, picture_size=picture_size)
+        page: RunPage = hooks.report_page(self, file, pictures=pictures, picture_size=picture_size)
         return page
 
     @overload

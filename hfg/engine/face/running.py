@@ -13,6 +13,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, NoReturn, Unpack
 
+from hfg.base.hooks import hooks
 from hfg.base.logs import Log
 from hfg.engine.executing.punctual import PunctualLoop
 from hfg.engine.executing.virtual import VirtualTimeLoop
@@ -89,7 +90,7 @@ def _prepare(graph: Graph, clock: Clock, settings: Settings) -> tuple[Run, Compo
     others = None
     if settings.settings is not None or any(group.process for group in flat.groups.values()):
         said = {name: getattr(settings, name) for name in ("debug", "policy", "seed", "fast", "block_warning_s")}
-        others = Composition.distribute(graph, flat, said, is_virtual, settings.settings)
+        others = hooks.distribute(graph, flat, said, is_virtual, settings.settings)
     parts = Composition(flat if others is None else others.flat, settings, others)
     run: Run = Run(graph, parts) if others is None else others.face(graph)
     level.whole.begin_run(run)

@@ -6,11 +6,12 @@ A command can be logged, sent over a wire and carried out again: `encode` and `d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import msgspec
 
+from hfg.base.hooks import hooks
 from hfg.encoding import TAG
 from hfg.errors import GraphError
 from hfg.graph.structure.options import DEFAULT_CAPACITY, Overflow, Policy
@@ -41,7 +42,6 @@ __all__ = [
     "RemoveGroup",
     "Rename",
     "Replace",
-    "Rule",
     "SetEdge",
     "SetParameter",
     "Ungate",
@@ -376,16 +376,6 @@ def encode(commands: Iterable[Command]) -> str:
         raise GraphError(f"commands are plain data, and these hold something else: {error}") from error
 
 
-class Rule:
-    """What commands may have imported. It is that of graph files, which stands on an upper floor: see composing."""
-
-    refusal: Callable[[Iterable[str], Iterable[str], Iterable[str], Iterable[str]], str | None]
-    """Of node types and operators, of what values refer to, of types as texts, and what is allowed beside.
-
-    Says why one must not be imported or had, or None.
-    """
-
-
 def decode(data: str | bytes, *, allow: Iterable[str] = ()) -> Sequence[AnyCommand]:
     """Read commands that `encode` wrote, or somebody else.
 
@@ -403,7 +393,7 @@ def decode(data: str | bytes, *, allow: Iterable[str] = ()) -> Sequence[AnyComma
     references = [one for command in commands for one in _references(command)]
     values = [one for command in commands for one in _in_values(command)]
     types = [text for command in commands for text in _types(command)]
-    why = Rule.refusal(references, values, types, allow)
+    why = hooks.refusal(references, values, types, allow)
     if why is not None:
         raise GraphError(f"these commands are refused: {why}")
     return commands

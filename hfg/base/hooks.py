@@ -1,0 +1,31 @@
+"""Functions that a lower layer calls and only an upper layer can provide.
+
+`hfg.composing` provides them when hfg is imported. Depends on nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+__all__ = ["hooks"]
+
+
+class _Hooks:
+    """The functions by name; the ones they stand for are documented there.
+
+    Attributes:
+      record: `hfg.recording.record`, for `Run.record`.
+      report_page: `hfg.reporting.report_page`, for `Run.report_page`.
+      distribute: `hfg.parts.distribution.distribute`, for runs with groups in other processes.
+      refusal: why a graph file may not name these references of node types and operators, references in values, or
+        types, given which packages are allowed in addition; None if it may.
+    """
+
+    record: Callable[..., Any]
+    report_page: Callable[..., Any]
+    distribute: Callable[..., Any]
+    refusal: Callable[[Iterable[str], Iterable[str], Iterable[str], Iterable[str]], str | None]
+
+
+hooks = _Hooks()
