@@ -1,16 +1,15 @@
-"""The catalogue: which node types there are, and what each of them is.
+"""The catalogue: the available node types, and a description of each.
 
     documentation   reads the docstring of a node type
     describing      a node type in words and plain data: ports, parameters, errors, names in CS::APEX
     offers          where node types may be: the standard library, installed packages, the project
-    finding         imports those places and lists their types; what is broken is told and stops nobody
+    finding         imports those places and lists their types; reports broken ones and continues
     searching       by words, by name, by category
-    keeping         the index of what is installed, in a file, so that a search imports nothing
+    keeping         the index of installed types, in a file, so that a search imports nothing
     page            docs/nodes, written from the catalogue
 
-Stands on the node types' floor; knows neither graphs, runs nor the command line. Nothing is imported before it is asked
-for: `installed()` imports every place, `installed_index()` only if something has changed, and `hfg.registry.find` one
-module.
+Depends on node types, not on graphs, runs or the command line. Everything is imported on demand: `installed()` imports
+every place, `installed_index()` only if something has changed, and `hfg.registry.find` one module.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A node type in words and plain data: what a list, a page, an editor or another program wants to know of it.
+"""A node type in words and plain data, for lists, pages, editors and other programs.
 
-Stands on node types and `documentation`.
+Depends on node types and `documentation`.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ class PortDescription(msgspec.Struct, frozen=True):
 
     Attributes:
       type: its type hint as text; "" for an event or a slot without a value.
-      doc: what it means, with its unit and range.
+      doc: its meaning, with unit and range.
       optional: the node fires without it.
-      default: what it is then.
-      while_active: a slot that listens only while its node is active.
-      vector: it stands for several ports of this kind, "values[0]", "values[1]" ...; the parameter of its name says how
-        many.
+      default: its value in this case.
+      while_active: a slot that accepts signals only while its node is active.
+      vector: it represents several ports of this kind, "values[0]", "values[1]" ...; the parameter of its name has
+        their number.
     """
 
     name: str
@@ -70,20 +70,20 @@ class ParameterDescription(msgspec.Struct, frozen=True):
 
     Attributes:
       kind: what an editor shows for it: "int", "choice", "colour" ...
-      required: it has no default, so it is given when a node is made.
+      required: it has no default, so a value is required to make a node.
       limits: by name: "gt", "ge", "lt", "le", "multiple_of", "min_length", "max_length", "predicate".
       choices: the only allowed values, or members of them, or None.
-      labels: what to call the choices.
-      unit: "m/s"; "1" of a number without one, "of the value" of one that has the unit of what comes in.
-      step: by how much an editor moves the value.
-      group: what it is shown with.
+      labels: labels of the choices.
+      unit: "m/s"; "1" for a number without a unit, "of the value" for one with the unit of the input.
+      step: how much an editor changes the value per step.
+      group: the group in which it is shown.
       shown_if: when it is shown, in words, as in "mode is 'custom'".
-      read_only: its node alone sets it.
-      pattern: which names of files fit.
-      directory: the path is that of a directory.
-      save: the path is one to write to.
+      read_only: only its node sets it.
+      pattern: the file names that it accepts.
+      directory: the path must be a directory.
+      save: the path is written to.
       trigger: no value, but a slot and an event.
-      size: how many ports a vector of this name has.
+      size: the number of ports of a vector of this name.
     """
 
     name: str
@@ -92,7 +92,7 @@ class ParameterDescription(msgspec.Struct, frozen=True):
     doc: str
     default: Any = None
     required: bool = False
-    limits: dict[str, Any] = {}  # a struct copies it for each
+    limits: dict[str, Any] = {}  # a struct copies it for each instance
     choices: tuple[Any, ...] | None = None
     labels: tuple[str, ...] = ()
     unit: str | None = None
@@ -107,14 +107,14 @@ class ParameterDescription(msgspec.Struct, frozen=True):
     size: bool = False
 
     def limits_in_words(self) -> list[str]:
-        """Say what its values must be: ">= 0", "one of 3, 5, 7"."""
+        """Return the limits of its values in words: ">= 0", "one of 3, 5, 7"."""
         said = [_LIMITS[name].format(limit) for name, limit in self.limits.items()]
-        if self.choices is not None and not self.type.startswith("Literal"):  # which says it already
+        if self.choices is not None and not self.type.startswith("Literal"):  # the type shows the choices
             said.append(f"one of {', '.join(map(repr, self.choices))}")
         return said
 
     def facts(self) -> list[str]:
-        """Say what goes for it beside its meaning: limits, the unit, when it is shown."""
+        """Return facts besides its meaning: limits, the unit, when it is shown."""
         said = [*self.limits_in_words(), *([_unit_in_words(self.unit)] if self.unit else [])]
         return said + ([f"shown if {' and '.join(self.shown_if)}"] if self.shown_if else [])
 
@@ -126,7 +126,7 @@ def _unit_in_words(unit: str) -> str:
 
 
 class ErrorDescription(msgspec.Struct, frozen=True):
-    """What a firing may raise as part of its contract."""
+    """An exception that a firing may raise as part of its contract."""
 
     name: str
     when: str
@@ -136,17 +136,17 @@ class TypeDescription(msgspec.Struct, frozen=True):
     """A node type.
 
     Attributes:
-      reference: "module:name", as graph files have it.
+      reference: "module:name", as in graph files.
       name: in snake case, the default name of its nodes.
-      title: the name by which it is used in code.
-      category: its family in the standard library; else what its docstring or its module says, or the package.
+      title: its name in code.
+      category: its family in the standard library; otherwise from its docstring or module, or the package.
       summary: one line.
-      text: how it behaves, in whole.
-      doc: the docstring as it stands.
+      text: the complete description of its behaviour.
+      doc: the unchanged docstring.
       source: it fires without inputs.
       subgraph: it is made of other nodes.
-      errors: what a firing may raise as part of its contract.
-      apex: names of the CS::APEX nodes that it stands for.
+      errors: exceptions that a firing may raise as part of its contract.
+      apex: names of the CS::APEX nodes that it replaces.
     """
 
     reference: str
@@ -168,7 +168,7 @@ class TypeDescription(msgspec.Struct, frozen=True):
     apex: tuple[str, ...] = ()
 
     def ports(self) -> Iterator[tuple[str, PortDescription]]:
-        """Give every port with its kind, in the order in which people read them."""
+        """Yield every port with its kind, in the order for reading."""
         for kind, ports in (
             ("input", self.inputs),
             ("output", self.outputs),
@@ -184,7 +184,7 @@ def describe_type(of: NodeType | type[Node] | NodeFunction[..., Any], *, offered
 
     Args:
       of: the type.
-      offered_by: the module whose category it has, if that is not its own.
+      offered_by: the module whose category it has, if not its own.
 
     Examples:
       >>> import hfg
@@ -231,21 +231,21 @@ def _completed(kind: NodeType, read: Documentation) -> tuple[PortDescription, ..
     if "do" not in kind.hooks:
         return ()
     (made,) = _ports([EventSpec("completed", kind.completes)], kind, read)
-    words = made.doc or "The do-activity has returned; with the returned value."
+    words = made.doc or "The do-activity has returned; with its result."
     return (msgspec.structs.replace(made, doc=words),)
 
 
 def undocumented(described: TypeDescription) -> list[str]:
-    """Say what the docstring of a type leaves out: its first line, a port, a parameter; nothing is fine."""
+    """Return what the docstring of a type lacks: its first line, a port, a parameter; empty if it is complete."""
     where = described.reference
     found = [] if described.summary else [f"{where} has no docstring: say in one line what it does"]
     if described.summary and not described.summary.endswith((".", "!", "?")):
-        found.append(f'{where}: the first line of its docstring, "{described.summary}", is no whole sentence')
+        found.append(f'{where}: the first line of its docstring, "{described.summary}", is not a complete sentence')
     places = [(kind, port.name, port.doc) for kind, port in described.ports()]
     places += [("parameter", one.name, one.doc) for one in described.parameters]
     section = "Args" if described.title[:1].islower() else "Attributes"
     found += [
-        f'{where}: nothing is said of its {kind} "{name}"; add an entry to {section}: in its docstring'
+        f'{where}: its {kind} "{name}" is not documented; add an entry to {section}: in its docstring'
         for kind, name, doc in places
         if not doc
     ]
@@ -281,10 +281,13 @@ def _ports(specs: Iterable[Any], kind: NodeType, read: Documentation) -> Iterato
 
 
 def _said_of_port(name: str, kind: NodeType, read: Documentation) -> str:
-    """Take what the docstring has; of the only output what it returns, of a slot the first line of its handler."""
+    """Return the docstring's text about a port.
+
+    An only output may have the text of `Returns:`, a slot the first line of its handler.
+    """
     said = read.entries.get(name)
     if not said and name in kind.outputs and len(kind.outputs) == 1:
-        # of a function the first line says what it gives
+        # the first line of a function's docstring describes its result
         said = read.result or (read.summary if kind.is_function and name == "out" else "")
     if not said and name in kind.slots:
         handler = getattr(kind.declared.get(name), "handler", None)
@@ -318,7 +321,7 @@ def _parameter(spec: ParameterSpec, kind: NodeType, read: Documentation) -> Para
 
 
 def _limit(limit: Any) -> tuple[str, Any]:
-    """Name a constraint of annotated-types and give its bound."""
+    """Return the name of a constraint of annotated-types, and its bound."""
     match limit:
         case annotated_types.Gt(bound):
             return "gt", bound

@@ -1,8 +1,8 @@
 """Reads the docstring of a node type: summary, text, an entry for each port and parameter, errors, older names.
 
-The form is Google's. `Args:`, `Attributes:` and `Returns:` speak of ports and parameters; `Raises:` of what a firing
-may raise as part of its contract; the lines `CS::APEX: csapex::Delay.` and `Category: filters.` are our own. Stands on
-docstring-parser; knows no node types.
+The form is Google's. `Args:`, `Attributes:` and `Returns:` describe ports and parameters; `Raises:` lists exceptions
+that a firing may raise as part of its contract; the lines `CS::APEX: csapex::Delay.` and `Category: filters.` are our
+own. Depends on docstring-parser, not on node types.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ _ENTRY: Final = re.compile(r"^(\w+):\s+(.*)$")
 
 @dataclass(frozen=True, slots=True)
 class Documentation:
-    """What a docstring says.
+    """The contents of a docstring.
 
     Attributes:
       summary: the first line.
-      text: what follows, without the sections.
-      entries: what is said of ports and parameters, by name.
-      result: what `Returns:` or `Yields:` says of the only output.
+      text: the text after it, without the sections.
+      entries: descriptions of ports and parameters, by name.
+      result: the text of `Returns:` or `Yields:`, for the only output.
       errors: name of an exception, and when it is raised.
-      apex: names of CS::APEX nodes that it stands for.
-      category: as the line `Category:` has it, or "".
+      apex: names of the CS::APEX nodes that it replaces.
+      category: the text of the line `Category:`, or "".
     """
 
     summary: str = ""
@@ -46,7 +46,7 @@ class Documentation:
 
 
 def read_documentation(doc: str) -> Documentation:
-    r"""Read a docstring; what is no Google form is left in its text.
+    r"""Read a docstring; parts that are not in Google form stay in its text.
 
     Examples:
       >>> read = read_documentation("Hold back.\n\nArgs:\n  seconds: how long.\n\nCS::APEX: csapex::Delay.")
@@ -63,7 +63,7 @@ def read_documentation(doc: str) -> Documentation:
     plain = inspect.cleandoc(_OWN_LINES.sub("", doc))
     try:
         read = GoogleParser().parse(plain)
-    except ParseError:  # an entry without a colon: then nothing can be known of the sections
+    except ParseError:  # an entry without a colon: then the sections cannot be read
         summary, _, text = plain.partition("\n")
         return Documentation(summary, text.strip(), {}, "", (), tuple(apex), category)
     entries: dict[str, str] = {}
@@ -76,7 +76,7 @@ def read_documentation(doc: str) -> Documentation:
         elif isinstance(meta, DocstringRaises):
             errors += [(name.strip(), said) for name in (meta.type_name or "").split(",")]
         elif isinstance(meta, DocstringReturns) and meta.type_name:
-            # docstring-parser takes the first of several entries for the type of one result
+            # docstring-parser reads the first of several entries as the type of a single result
             entries.update(_entries(f"{meta.type_name}: {meta.description or ''}"))
             result = result or said
         elif isinstance(meta, DocstringReturns):
@@ -93,7 +93,7 @@ def read_documentation(doc: str) -> Documentation:
 
 
 def _entries(text: str) -> dict[str, str]:
-    """Read "name: what it is" lines; a line that begins otherwise belongs to the one before."""
+    """Read "name: description" lines; a line that starts differently continues the previous one."""
     found: dict[str, str] = {}
     name = ""
     for line in text.splitlines():

@@ -1,9 +1,8 @@
-"""Imports the places and lists the node types in them; what is broken is told in a sentence and stops nobody.
+"""Imports the places and lists the node types in them; reports each broken place in one message and continues.
 
-A module offers the node types that it declares under public names, and those that its `__all__` lists. One that makes
-its types when they are asked for, or wants to offer others than those, has a function `__node_types__()` that gives
-them. Packages are walked; modules whose names begin with an underscore, and tests, are not. Stands on `offers` and
-`describing`.
+A module offers the node types that it declares under public names, and those that its `__all__` lists. A module that
+makes its types on demand, or wants to offer others, has a function `__node_types__()` that returns them. Packages are
+walked, except modules whose names begin with an underscore, and tests. Depends on `offers` and `describing`.
 """
 
 from __future__ import annotations
@@ -34,11 +33,11 @@ _TESTS: Final = ("test", "tests", "conftest")
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """Node types that were found.
+    """The node types that were found.
 
     Attributes:
       types: each once, in the order of their places.
-      problems: a sentence for each place that is broken.
+      problems: a message for each broken place.
     """
 
     types: tuple[TypeDescription, ...] = ()
@@ -46,10 +45,10 @@ class Catalogue:
 
 
 def installed(of: Iterable[Offer] | None = None) -> Catalogue:
-    """List what the standard library and all installed distributions offer; this imports them.
+    """Import the standard library and all installed distributions, and list the node types that they offer.
 
     Args:
-      of: other places than those.
+      of: other places instead of those.
     """
     search = _Search()
     for offer in offers() if of is None else of:
@@ -61,7 +60,7 @@ def types_of(module: ModuleType | str) -> Catalogue:
     """List the node types of a module, or of a package and the modules in it.
 
     Args:
-      module: if it is a name, it is imported; if that fails the catalogue is empty and says why.
+      module: a module or a name; a name is imported. If this fails, the catalogue is empty and has the reason.
     """
     search = _Search()
     if isinstance(module, str):
@@ -72,7 +71,7 @@ def types_of(module: ModuleType | str) -> Catalogue:
 
 
 class _Search:
-    """Goes from offer to offer; a type that several offer is listed where it is found first."""
+    """Goes from offer to offer; a type with several offers is listed where it is found first."""
 
     def __init__(self) -> None:
         self.found: list[TypeDescription] = []
@@ -98,8 +97,8 @@ class _Search:
         elif isinstance(value, ModuleType):
             self.module(value)
         else:
-            said = "has no such name" if value is None else "is no node type and no module"
-            self.problems.append(f"{offer.origin} names {offer.module}:{offer.name}, which {said}: mend its value")
+            said = "has no such name" if value is None else "is neither a node type nor a module"
+            self.problems.append(f"{offer.origin} names {offer.module}:{offer.name}, which {said}: correct its value")
 
     def module(self, module: ModuleType) -> None:
         """List the types of a module, then those of the modules in it."""
@@ -118,13 +117,13 @@ class _Search:
                 self.found.append(describe_type(kind, offered_by=module))
 
     def _attempt(self, name: str, origin: str, action: Callable[[], Any]) -> Any:
-        """Run code of somebody's; None and a sentence if it fails, whatever it raises."""
+        """Run a user's code. Return its result; None if it fails, whatever it raises, and record a message."""
         try:
             return action()
         except Exception as error:
             self.problems.append(_sentence(name, origin, error))
         except SystemExit:
-            told = f"{name}{_by(origin)} left the program as it was imported"
+            told = f"{name}{_by(origin)} called sys.exit when it was imported"
             self.problems.append(f'{told}; put what it runs under if __name__ == "__main__":')
         return None
 
@@ -149,12 +148,12 @@ def _offered(offered: Callable[[], Iterable[Any]]) -> Iterator[NodeType]:
     for value in offered():
         kind = _type_in(value)
         if kind is None:
-            raise TypeError(f"__node_types__() gives {value!r:.80}, which is no node type")
+            raise TypeError(f"__node_types__() returned {value!r:.80}, which is not a node type")
         yield kind
 
 
 def _declared(module: ModuleType) -> Iterator[NodeType]:
-    """Give the types that a module, or a package and what lies in it, declares or lists, in order."""
+    """Yield the types that a module, or a package and its modules, declares or lists, in order."""
     listed = getattr(module, "__all__", ())
     for name, value in list(vars(module).items()):
         kind = None if name.startswith("_") else _type_in(value)
@@ -163,7 +162,7 @@ def _declared(module: ModuleType) -> Iterator[NodeType]:
 
 
 def _type_in(value: Any) -> NodeType | None:
-    """Give the type of a node function or a class of nodes; None for all else."""
+    """Return the type of a node function or a class of nodes; None for anything else."""
     if isinstance(value, NodeFunction) or (
         inspect.isclass(value) and issubclass(value, Node) and value not in _BASES and not inspect.isabstract(value)
     ):
@@ -173,7 +172,7 @@ def _type_in(value: Any) -> NodeType | None:
 
 
 def submodules(package: ModuleType) -> list[str]:
-    """Name the modules in a package, one level deep."""
+    """Return the names of the modules in a package, one level deep."""
     path = getattr(package, "__path__", ())
     return [
         f"{package.__name__}.{one.name}"

@@ -35,7 +35,7 @@ _MOST: Final = 64 << 20  # bytes: the library's own index has less than one
 
 
 class Kept(msgspec.Struct, frozen=True):
-    """An index, and a sentence for each place that is broken."""
+    """An index, and a message for each broken place."""
 
     index: Index
     problems: tuple[str, ...] = ()

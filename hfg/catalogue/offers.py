@@ -1,7 +1,7 @@
-"""Where node types may be: the standard library, what installed distributions offer, and the project's own folder.
+"""Where node types may be: the standard library, installed distributions, and the project's own folder.
 
-A distribution offers node types by an entry point in the group `hfg.nodes`, whose value names a module, a package (then
-all in it counts) or one node type, "package.module:Name". Stands on importlib; imports none of those places.
+A distribution offers node types by an entry point in the group `hfg.nodes`, whose value names a module, a package (with
+all its modules) or one node type, "package.module:Name". Depends on importlib; imports none of those places.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ import msgspec
 __all__ = ["LIBRARY", "Offer", "offers"]
 
 LIBRARY: Final = "hfg.nodes"
-"""The package of the standard library, and the name of the group of entry points."""
+"""The package of the standard library, and the group name of the entry points."""
 
 
 class Offer(msgspec.Struct, frozen=True):
     """A module or package with node types.
 
     Attributes:
-      module: its name, or as the entry point has it.
-      name: of one node type in it, or "" for all of them.
-      origin: who says so, for messages: "" for the standard library, else the entry point and its distribution.
+      module: its name, or the name in the entry point.
+      name: name of one node type in it, or "" for all of them.
+      origin: where it is declared, for messages: "" for the standard library, otherwise the entry point and its
+        distribution.
     """
 
     module: str
@@ -33,7 +34,7 @@ class Offer(msgspec.Struct, frozen=True):
 
 
 def offers() -> tuple[Offer, ...]:
-    """Give the standard library first, then what is installed, by the names of the entry points."""
+    """Return the standard library first, then installed distributions, by the names of their entry points."""
     return (Offer(LIBRARY), *_installed())
 
 
@@ -42,7 +43,7 @@ def _installed() -> Iterator[Offer]:
     seen: set[tuple[str, str]] = set()
     for entry in found:
         module, _, name = (part.strip() for part in entry.value.partition("[")[0].partition(":"))
-        if (module, name) not in seen:  # an editable installation beside another one gives each twice
+        if (module, name) not in seen:  # an editable installation next to another one yields each twice
             seen.add((module, name))
             yield Offer(module, name, _origin(entry))
 

@@ -1,7 +1,8 @@
 """docs/nodes, written from the library itself: `python -m hfg.catalogue.page [FOLDER]`, or `make docs-nodes`.
 
-One page for each family, with all that the catalogue knows of its types, and an index. A family that is generated, with
-hundreds of types, has a page of tables. The same library gives the same pages. Stands on the catalogue; knows no run.
+There is one page per family, with everything that the catalogue has about its types, and an index. A generated family
+with hundreds of types has a page of tables. The same library yields the same pages. Depends on the catalogue, not on
+runs.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ from hfg.catalogue.searching import categories
 
 __all__ = ["DISTRIBUTIONS", "made_with", "main", "pages"]
 
-_MOST_IN_WHOLE: Final = 150  # types of one family; more are shown as tables
+_MOST_IN_WHOLE: Final = 150  # types of one family; larger families are shown as tables
 _NOTE: Final = "<!-- Written by `make docs-nodes` from the docstrings of the library: change those. -->"
 
 DISTRIBUTIONS: Final = {"cv": "opencv-python-headless"}
-"""Families that are generated from another distribution: their page is that of its version."""
+"""Families that are generated from another distribution: their page depends on its version."""
 
 
 def pages() -> dict[str, str]:
-    """Give the text of each page by its name, the index first.
+    """Return the text of each page by name, the index first.
 
     Raises:
-      RuntimeError: a family cannot be imported; it says why.
+      RuntimeError: a family cannot be imported; the message has the reason.
     """
     families: dict[str, list[TypeDescription]] = {}
     for module in submodules(importlib.import_module(LIBRARY)):
@@ -88,7 +89,7 @@ def _family(name: str, types: Sequence[TypeDescription]) -> Iterator[str]:
 
 
 def made_with(family: str) -> str:
-    """Say from what a generated family was made."""
+    """Return what a generated family was made from."""
     try:
         return f"Made with {DISTRIBUTIONS[family]} {version(DISTRIBUTIONS[family])}."
     except PackageNotFoundError:
@@ -155,8 +156,8 @@ def _default(each: ParameterDescription) -> str:
 
 
 def _plain(value: Any) -> str:
-    """Write a value so that it looks the same each time."""
-    if isinstance(value, frozenset | set) and value:  # whose own order is another in each process
+    """Return a value as text that is the same each time."""
+    if isinstance(value, frozenset | set) and value:  # its own order differs from process to process
         return "{" + ", ".join(sorted(map(repr, value))) + "}"
     plain = str(value) if isinstance(value, PurePath) else value
     return re.sub(r" at 0x[0-9a-f]+", "", " ".join(repr(plain).split()))
@@ -179,7 +180,7 @@ def _cell(text: str) -> str:
 
 
 def _prose(text: str) -> str:
-    """Let a text be itself in Markdown: what looks like a tag, or like a link, is none."""
+    """Escape Markdown in a text: anything that looks like a tag or a link."""
     parts = re.split(r"(`[^`]*`)", text)
     return "".join(
         part if part.startswith("`") else re.sub(r"\]\(", "]&#40;", part.replace("<", "&lt;").replace("*", "\\*"))
@@ -188,7 +189,7 @@ def _prose(text: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the pages into a folder, docs/nodes if none is named; pages of families that are gone are removed."""
+    """Write the pages into a folder, by default docs/nodes, and remove pages of families that are gone."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     folder = Path(given[0] if given else "docs/nodes")
     written = pages()

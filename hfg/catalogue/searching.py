@@ -28,7 +28,7 @@ _IDLE_WORDS: Final = (
     "that the them then there this to use using what when where which with without you"
 )
 _IDLE: Final = frozenset(_IDLE_WORDS.split())
-"""Words that say nothing by themselves; they count if there are no others."""
+"""Words without meaning for a search; they count only if there are no others."""
 
 _NAME, _KIND, _SUMMARY, _PORT, _TEXT = 10.0, 5.0, 4.0, 1.2, 1.0
 _ALIKE: Final = 0.75
@@ -163,7 +163,7 @@ class _Found(NamedTuple):
 
 
 def ranked(index: Index, words: str) -> list[int]:
-    """Return the numbers of the entries that words describe, best first."""
+    """Return the numbers of the entries that the words describe, best first."""
     wanted = _wanted(words)
     found = [_found(index, wanted, place) for place in range(len(wanted))]
     for start, length, others in _meanings(wanted):
@@ -187,7 +187,7 @@ def _wanted(words: str) -> list[str]:
 
 
 def _share_of_name(index: Index, number: int, wanted: Sequence[str]) -> float:
-    """Say how much of an entry's name is said by the words: "blur" is all of "blur", and half of "median_blur"."""
+    """Return which share of an entry's name the words cover: "blur" is all of "blur", and half of "median_blur"."""
     named = sum(1 for stem in set(wanted) if index.weights.get(stem, {}).get(number, 0.0) >= _NAME)
     return min(1.0, named / max(1, index.lengths[number]))
 
@@ -201,7 +201,7 @@ def _found(index: Index, wanted: Sequence[str], place: int) -> _Found:
     for other in _relatives(index, stem):
         _add(scores, _scored(index, other), _RELATED)
     if not scores:
-        weight = math.log(1 + len(index.entries))  # a word that nobody knows matters as much as the rarest
+        weight = math.log(1 + len(index.entries))  # an unknown word weighs as much as the rarest
     return _Found(scores, weight)
 
 
@@ -289,9 +289,9 @@ def _lines() -> list[str]:
 
 
 def named(types: Iterable[TypeDescription], name: str) -> list[TypeDescription]:
-    """Give the types that somebody may mean by a name: a reference, "flow:delay", "flow.delay", "delay", "Delay".
+    """Return the types that a name may mean: a reference, "flow:delay", "flow.delay", "delay", "Delay".
 
-    Those that are spelled exactly so come alone; else those that differ by upper and lower case or by underscores.
+    If there are exact matches, returns only these; otherwise the types whose names differ in case or underscores.
     """
     wanted = name.strip()
     every = list(types)

@@ -1,13 +1,13 @@
 """Values as data: plain data for files and people, bytes between processes.
 
-    data         any value as what YAML and JSON hold, and back by its declared type; what parameters and files use
-    codecs       what a value of a type consists of, compiled once for each type
+    data         any value as YAML and JSON hold it, and back by its declared type; used by parameters and files
+    codecs       how the values of a type are composed, compiled once per type
     arrays       which arrays travel as raw bytes
     descriptions what two ends compare before the first value
-    plain        JSON of anybody, within bounds
+    plain        JSON from an unknown source, within bounds
     wire         tokens as bytes and back
 
-Whoever wants a value in a file takes `encode` and `decode`; whoever sends tokens takes `TokenCodec`.
+To store a value in a file, use `encode` and `decode`; to send tokens, use `TokenCodec`.
 """
 
 from hfg.encoding.arrays import ArrayHead, Lease

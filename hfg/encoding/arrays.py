@@ -1,7 +1,7 @@
-"""Which arrays travel as raw bytes, and what is said of one beside them.
+"""Which arrays travel as raw bytes, and their description in a frame.
 
-Only numbers, truth values, texts of fixed width and times have bytes that mean the same elsewhere and can do no harm
-when a stranger has chosen them. Stands on numpy and msgspec.
+Only numbers, booleans, strings of fixed width and times qualify: their bytes mean the same on every machine, and do no
+harm if an attacker chose them. Depends on numpy and msgspec.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["ArrayHead", "Lease", "array_problem", "bytes_of", "dtype_of", "unsaf
 _NUMBERS: Final = frozenset(
     ["b1"] + [f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8)] + ["f2", "f4", "f8", "c8", "c16"]
 )
-"""Not those of long doubles, which differ from machine to machine."""
+"""Without long doubles, which differ from machine to machine."""
 _TEXT: Final = re.compile(r"[<>|]([SU])([1-9][0-9]{0,4})")
 _TIME: Final = re.compile(r"[<>|][mM]8(\[([1-9][0-9]{0,5})?(Y|M|W|D|h|m|s|ms|us|ns|ps|fs|as)\])?")
 _MOST_AXES: Final = 32
@@ -28,13 +28,13 @@ _LAST_CHARACTER: Final = 0x10FFFF
 
 
 class Lease(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
-    """Where in shared memory the bytes of an array lie.
+    """The place of an array's bytes in shared memory.
 
     Attributes:
       segment: name of the segment.
       slot: number of the slot in it.
-      generation: how often the slot had been given away; what is older is gone.
-      offset: where in the slot the array begins.
+      generation: how often the slot had been reused; leases with an older number are invalid.
+      offset: offset of the array in the slot.
     """
 
     segment: str
@@ -44,12 +44,12 @@ class Lease(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fields=
 
 
 class ArrayHead(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
-    """What a frame says of one array.
+    """The description of one array in a frame.
 
     Attributes:
       dtype: as numpy writes it, "<f8".
       shape: length of each axis.
-      lease: where its bytes are; without one they are in the frame.
+      lease: the place of its bytes; without a lease they are in the frame.
     """
 
     dtype: str
@@ -58,7 +58,7 @@ class ArrayHead(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fie
 
 
 def array_problem(dtype: np.dtype[Any]) -> str | None:
-    """Say why arrays of a dtype cannot travel, or None if they can."""
+    """Return why arrays of a dtype cannot travel, or None if they can."""
     return None if _is_safe(dtype.str) and dtype.fields is None and dtype.subdtype is None else f"{dtype} has no bytes"
 
 
@@ -70,13 +70,13 @@ def _is_safe(text: str) -> bool:
 
 
 def dtype_of(text: str) -> np.dtype[Any]:
-    """Give the dtype that a frame names.
+    """Return the dtype with the name in a frame.
 
     Raises:
-      ValueError: it is none that travels.
+      ValueError: it is not a dtype that can be sent.
     """
     if len(text) > 24 or not _is_safe(text):
-        raise ValueError(f"an array of {text!r:.40} is none that travels")
+        raise ValueError(f"an array of {text!r:.40} cannot be sent")
     return _dtype(text)
 
 
@@ -86,25 +86,25 @@ def _dtype(text: str) -> np.dtype[Any]:
 
 
 def bytes_of(head: ArrayHead, most: int) -> int:
-    """Give how many bytes an array has.
+    """Return the size of an array in bytes.
 
     Raises:
-      ValueError: it cannot be, or these are more than `most`.
+      ValueError: the shape is impossible, or the size is larger than `most`.
     """
     size = dtype_of(head.dtype).itemsize
     if len(head.shape) > _MOST_AXES or not all(0 <= axis <= _LONGEST_AXIS for axis in head.shape):
-        raise ValueError(f"no array has the shape {head.shape!r:.80}")
+        raise ValueError(f"no array can have the shape {head.shape!r:.80}")
     size *= math.prod(head.shape)
     if size > most or math.prod(axis or 1 for axis in head.shape) > _LONGEST_AXIS:
-        raise ValueError(f"an array of the shape {head.shape!r:.80} is larger than what can be here, {most} bytes")
+        raise ValueError(f"an array of the shape {head.shape!r:.80} is larger than the {most} bytes that can be here")
     return size
 
 
 def view_of(head: ArrayHead, buffer: Any, offset: int) -> np.ndarray[Any, Any]:
-    """Give the array whose bytes lie in a buffer, read-only.
+    """Return a read-only view of the array in a buffer.
 
     Raises:
-      ValueError: the bytes are none of an array of this dtype.
+      ValueError: the bytes are not valid for this dtype.
     """
     dtype = dtype_of(head.dtype)
     if 0 in head.shape:
@@ -119,12 +119,12 @@ def view_of(head: ArrayHead, buffer: Any, offset: int) -> np.ndarray[Any, Any]:
 
 
 def unsafe_content(array: np.ndarray[Any, Any]) -> str | None:
-    """Say which bytes numpy must not see: it counts truth values by adding them up, and trusts its characters."""
+    """Return which bytes numpy must not see: it counts booleans by adding them up, and does not check characters."""
     kind = array.dtype.kind
     if kind == "b" and array.size and array.view(np.uint8).max() > 1:
-        return "an array of truth values holds others than 0 and 1"
+        return "an array of booleans holds values other than 0 and 1"
     if kind == "U" and array.size:
         characters = array.reshape(-1).view(array.dtype.byteorder + "u4")
         if characters.max() > _LAST_CHARACTER:
-            return "an array of texts holds what is no character"
+            return "an array of strings holds an invalid character"
     return None

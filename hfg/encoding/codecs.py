@@ -1,12 +1,12 @@
-"""How the values of a type become data that msgspec writes, and back: compiled once for each type.
+"""Converts values of a type to data that msgspec writes, and back; compiled once per type.
 
-One idea: a type is *carried* by a simpler one, down to what msgspec writes by itself. A dataclass is carried by the
-tuple of its fields, an enum by a number, a fraction by two integers, an array by its place among the frame's arrays.
-Numbers and texts are leaves, which cost nothing but a look at their class, and msgspec reads all of it back by the
-declared type, so what arrives is of that type or is refused. No class is named in the data: both ends have the type.
+The idea: each type is *carried* by a simpler one, down to types that msgspec writes itself. A dataclass is carried by
+the tuple of its fields, an enum by a number, a fraction by two integers, an array by its index among the frame's
+arrays. Numbers and strings are leaves, which cost only a check of their class. Msgspec reads everything back by the
+declared type, so a value arrives with that type or is refused. The data names no classes: both ends have the type.
 
-What arrives is of the same class as what was sent, or nothing is sent: of a value's class nothing is guessed. Where a
-type allows several (a union, a Sequence), the number of the one that it was goes along. Stands on `arrays` and types.
+A value arrives with the class that it was sent with, or it is not sent; its class is never guessed. Where a type allows
+several classes (a union, a Sequence), the number of the actual one is sent, too. Depends on `arrays` and types.
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ __all__ = ["Codec", "Unfit", "codec_for", "wire_problem"]
 
 Arrays = list["np.ndarray[Any, Any]"]
 Lower = Callable[[Any, Arrays], Any]
-"""Gives what carries a value, and puts its arrays with the others of the frame."""
+"""Returns the carrier of a value, and adds its arrays to those of the frame."""
 Lift = Callable[[Any, Arrays], Any]
-"""Gives the value that is carried."""
+"""Returns the value that is carried."""
 
 _NONE: Final = type(None)
-_LONGEST_NUMBER: Final = 2**16  # bytes of an integer beyond 64 bits: arithmetic on longer ones takes for ever
+_LONGEST_NUMBER: Final = 2**16  # bytes of an integer beyond 64 bits: arithmetic on longer ones takes too long
 _REMEMBERED: Final = 64
 
 
 class Unfit(Exception):
-    """A value is not exactly of a type; `where` grows on its way out of the value."""
+    """A value does not exactly match its type; `where` grows while the error travels out of the value."""
 
     def __init__(self, value: Any, hint: Any, why: str = "") -> None:
         super().__init__()
@@ -63,12 +63,12 @@ class Unfit(Exception):
         self.where = ""
 
     def inside(self, place: str) -> Unfit:
-        """Say in which part of a value it is."""
+        """Add the part of a value in which the error occurred."""
         self.where = place + self.where
         return self
 
     def sentence(self, what: str) -> str:
-        """Say it to those who sent it."""
+        """Return the message for the sender."""
         found = f"expected {describe(self.hint)}, found {describe_value(self.value)}"
         why = self.why or (
             "it would arrive as another class: send exactly the declared one"
@@ -79,7 +79,7 @@ class Unfit(Exception):
 
 
 class _CannotCross(Exception):
-    """A type says too little of its values, or allows some that are no data."""
+    """A type does not describe its values well enough, or allows values that are not data."""
 
     def __init__(self, hint: Any, why: str) -> None:
         super().__init__()
@@ -88,24 +88,24 @@ class _CannotCross(Exception):
         self.where: str | None = None
 
     def sentence(self, whole: Any) -> str:
-        """Say it of the type that the port declares."""
+        """Return the message about the port's declared type."""
         part = describe(self.hint)
-        where = f"{describe(whole)} cannot cross to another process"
+        where = f"{describe(whole)} cannot be sent to another process"
         if self.where is not None:
             return f"{where}: its part {self.where} is {part}, which {self.why}"
         return f"{where}: {part if part != describe(whole) else 'it'} {self.why}"
 
 
 class Codec(NamedTuple):
-    """How values of one type travel.
+    """Converts the values of one type.
 
     Attributes:
       hint: the type.
-      form: plain data that says all that two ends must agree on.
+      form: plain data with everything that two ends must agree on.
       wire: the type that carries it, which msgspec writes and reads.
-      exact: classes whose values are what carries them; empty unless the type is a leaf.
-      lower: checks a value and gives what carries it.
-      lift: gives the value; None where it is what carries it.
+      exact: classes whose values are their own carrier; empty unless the type is a leaf.
+      lower: checks a value and returns its carrier.
+      lift: returns the value of a carrier; None if they are the same.
     """
 
     hint: Any
@@ -117,14 +117,14 @@ class Codec(NamedTuple):
 
 
 def codec_for(hint: Any, *, wide: bool = False) -> Codec:
-    """Give the codec of a type.
+    """Return the codec of a type.
 
     Args:
       hint: the declared type.
-      wide: integers have any size, which costs more; both ends must say the same.
+      wide: integers have any size, which costs more; both ends must use the same setting.
 
     Raises:
-      EncodingError: values of this type cannot cross; the message names the part that cannot.
+      EncodingError: values of this type cannot be sent to another process; the message names the part.
     """
     try:
         return _codec_for(hint, wide)
@@ -143,17 +143,17 @@ def _compiled(hint: Any, wide: bool) -> Codec:
     except _CannotCross as problem:
         raise EncodingError(problem.sentence(hint)) from None
     except RecursionError:
-        raise EncodingError(f"{describe(hint)} cannot cross to another process: it is nested too deep") from None
+        raise EncodingError(f"{describe(hint)} cannot be sent to another process: it is nested too deep") from None
 
 
 def wire_problem(hint: Any) -> str | None:
-    """Say what of a type cannot cross to another process and why, or None if all its values can.
+    """Return which part of a type cannot be sent to another process and why, or None if all its values can.
 
     Examples:
       >>> print(wire_problem(dict[str, list[int | None]]))
       None
       >>> print(wire_problem(list[Any]))
-      list[Any] cannot cross to another process: Any says nothing of its values; name their type
+      list[Any] cannot be sent to another process: Any does not describe its values; name their type
     """
     try:
         codec_for(hint)
@@ -166,7 +166,7 @@ def wire_problem(hint: Any) -> str | None:
 
 
 class _Carried(NamedTuple):
-    """Values of a class are carried by values of a type: those of nobody's own that hfg knows."""
+    """A class that hfg knows, whose values are carried by values of a type."""
 
     by: Any
     lower: Callable[[Any], Any]
@@ -178,7 +178,7 @@ def _zone_of(value: datetime.datetime) -> tuple[str, str | None]:
     if isinstance(zone, zoneinfo.ZoneInfo) and zone.key:
         return f"{value.fold}{value.replace(tzinfo=None).isoformat()}", zone.key
     if zone is not None and type(zone) is not datetime.timezone:
-        raise ValueError("its time zone is none that has a name; use datetime.timezone or zoneinfo.ZoneInfo")
+        raise ValueError("its time zone has no name; use datetime.timezone or zoneinfo.ZoneInfo")
     return f"{value.fold}{value.isoformat()}", None
 
 
@@ -220,12 +220,12 @@ _CARRIED: Final[dict[type, _Carried]] = {
     ),
 }
 
-_CODE: Final = "is code, and no code crosses; send data that says what to do"
+_CODE: Final = "is code, and code cannot be sent; send data that describes what to do"
 _NO_DATA: Final = (
-    "is no data that hfg can carry; use numbers, texts, arrays, enums, dataclasses, structs, named tuples, "
+    "is not data that hfg can send; use numbers, strings, arrays, enums, dataclasses, structs, named tuples, "
     "and containers of them"
 )
-_SAYS_NOTHING: Final = "says nothing of its values; name their type"
+_SAYS_NOTHING: Final = "does not describe its values; name their type"
 
 _SEQUENCES: Final = (abc.Sequence, abc.MutableSequence, abc.Collection, abc.Iterable, abc.Reversible, abc.Container)
 _SETS: Final = (abc.Set, abc.MutableSet)
@@ -247,7 +247,7 @@ _NUMBERS: Final[dict[Any, Any]] = {
 
 
 class _Compiler:
-    """Makes the codec of one type; a method for each manner of types."""
+    """Makes the codec of one type; has a method for each family of types."""
 
     def __init__(self, wide: bool) -> None:
         self._wide = wide
@@ -319,7 +319,7 @@ class _Compiler:
         return None
 
     def _number(self, cls: type) -> Codec:
-        """Integers, which are numbers of any kind, too (PEP 484); beyond 64 bits they are bytes."""
+        """Return the codec of integers, which any number type accepts (PEP 484); beyond 64 bits they are bytes."""
         exact = frozenset({int, bool} if cls is int else {float, int, bool})
         if not self._wide:
             return _leaf(cls, cls.__name__, int | bool if cls is int else float | int | bool, *exact)
@@ -373,7 +373,7 @@ class _Compiler:
         return self._chosen(hint, ordered, form, {type(one) for one in values})
 
     def _chosen(self, hint: Any, members: list[Any], form: Any, kinds: set[Any]) -> Codec:
-        """One of a few values: its number."""
+        """Return the codec of one of a few values, which is carried by its number."""
         if not members:
             raise _CannotCross(hint, "has no values")
         index = {(type(one), one.name if isinstance(one, enum.Enum) else one): i for i, one in enumerate(members)}
@@ -393,7 +393,7 @@ class _Compiler:
     def _path(self, hint: Any, cls: Any) -> Codec:
         text = _Carried(str, str, cls)
         concrete = [one for one in _PATHS if issubclass(one, cls)] if cls is not os.PathLike else list(_PATHS)
-        if cls is pathlib.Path:  # the path of this system, whichever that is
+        if cls is pathlib.Path:  # a path of this system, whichever that is
             return self._carried(type(pathlib.Path()), _Carried(str, str, pathlib.Path), "Path")
         if cls in (pathlib.PurePath, os.PathLike):
             return self._union(hint, [self.compile(one) for one in concrete])
@@ -406,7 +406,7 @@ class _Compiler:
         except TypeError:
             problem = "is of several kinds"
         if problem is not None:
-            raise _CannotCross(cls, "is of no one size; name a type like numpy.float64")
+            raise _CannotCross(cls, "has no fixed size; name a type like numpy.float64")
 
         def lower(value: Any, arrays: Arrays) -> Any:
             if type(value) is not cls:
@@ -416,7 +416,7 @@ class _Compiler:
         def lift(data: Any, arrays: Arrays) -> Any:
             made = np.frombuffer(data, dtype)
             if made.size != 1 or unsafe_content(made) is not None:
-                raise ValueError(f"these bytes are no {cls.__name__}")
+                raise ValueError(f"these bytes are not {cls.__name__}")
             return cls(made.astype(dtype.newbyteorder("="))[0])
 
         return Codec(cls, [cls.__name__], bytes, frozenset(), lower, lift)
@@ -449,9 +449,10 @@ class _Compiler:
     # --- several types in one ---
 
     def _union(self, hint: Any, members: list[Codec]) -> Codec:
-        """One of several types, with the number of the one that it is, unless msgspec sees that by itself.
+        """Return the codec of a union. It sends the number of the member, unless msgspec can tell the members apart.
 
-        `int | str` and `str | int` are equal and must be the same on both ends, so the order is that of the forms.
+        `int | str` and `str | int` are equal and must have the same codec on both ends, so the members are sorted by
+        form.
         """
         by_form = {json.dumps(member.form): member for member in members}
         members = [by_form[form] for form in sorted(by_form)]
@@ -490,7 +491,7 @@ class _Compiler:
 
     def _part(self, hint: Any, arguments: tuple[Any, ...], number: int) -> Codec:
         if len(arguments) <= number:
-            raise _CannotCross(hint, f"does not say what it holds; write {describe(hint)}[...] with a type")
+            raise _CannotCross(hint, f"does not declare its items; write {describe(hint)}[...] with a type")
         return self.compile(arguments[number])
 
     def _sequence(self, hint: Any, cls: type, part: Codec) -> Codec:
@@ -536,7 +537,7 @@ class _Compiler:
         if cls is collections.deque:
             wire = _generic(tuple, int | None, _generic(list, part.wire))
             return Codec(hint, form, wire, frozenset(), lower_deque, lift_deque)
-        if exact:  # msgspec makes the container by itself
+        if exact:  # msgspec makes the container itself
             wire = _generic(tuple, part.wire, ...) if cls is tuple else _generic(cls, part.wire)
             return Codec(hint, form, wire, frozenset(), lower, None)
         return Codec(hint, form, _generic(list, part.wire), frozenset(), lower, lift)
@@ -545,7 +546,7 @@ class _Compiler:
         if len(arguments) == 2 and arguments[1] is ...:
             return self._items(hint, tuple, self.compile(arguments[0]))
         if not arguments and hint in (tuple, typing.Tuple):  # noqa: UP006
-            raise _CannotCross(hint, "does not say what it holds; write tuple[...] with types")
+            raise _CannotCross(hint, "does not declare its items; write tuple[...] with types")
         parts = [self.compile(one) for one in arguments if one != ()]
 
         def lower(value: Any, arrays: Arrays) -> Any:
@@ -614,15 +615,15 @@ class _Compiler:
                 data = lift_parts(data, arrays)
             try:
                 return make(data)
-            except Exception as error:  # of users, who check what they hold
-                raise ValueError(f"it is no {cls.__name__} ({type(error).__name__}: {error})") from error
+            except Exception as error:  # classes of users check their fields and may raise anything
+                raise ValueError(f"it is not {cls.__name__} ({type(error).__name__}: {error})") from error
 
         form = ["class", cls.__name__, [[name, part.form] for name, part in zip(fields, parts, strict=True)]]
         wire = _generic(tuple, *[part.wire for part in parts])
         return Codec(hint, form, wire, frozenset(), lower, lift)
 
     def _keyed(self, hint: Any, fields: dict[str, Any]) -> Codec:
-        """A dict with known keys; each is a list of one value, or of none where the key is missing."""
+        """Return the codec of a dict with known keys; each is a list of one value, empty if the key is missing."""
         parts = {name: self._field(hint, name, one) for name, one in fields.items()}
         required = _required_keys(hint)
 
@@ -638,7 +639,7 @@ class _Compiler:
             made = {}
             for (name, part), found in zip(parts.items(), data, strict=True):
                 if len(found) > 1 or (not found and name in required):
-                    raise ValueError(f'the key "{name}" stands {len(found)} times')
+                    raise ValueError(f'the key "{name}" occurs {len(found)} times')
                 for one in found:
                     made[name] = one if part.lift is None else part.lift(one, arrays)
             return made
@@ -650,13 +651,13 @@ class _Compiler:
 
 _PATHS: Final = (type(pathlib.Path()), pathlib.PurePosixPath, pathlib.PureWindowsPath)
 _TOLD_APART: Final = frozenset({_NONE, bool, int, float, str, bytes})
-"""Classes that msgspec tells apart by what is written, but not texts from bytes."""
+"""Classes that msgspec can tell apart from the data; it cannot tell strings from bytes."""
 _KEYS: Final = frozenset({bool, int, str})
-"""Classes of keys that msgspec writes as such."""
+"""Classes of keys that msgspec writes directly."""
 
 
 class _Later:
-    """The codec of a type that contains itself, while it is made: what it carries is read in a second step."""
+    """The codec of a recursive type while it is made: its carrier is read in a second step."""
 
     def __init__(self, hint: Any, name: str) -> None:
         self.made: Codec | None = None
@@ -677,7 +678,7 @@ def _generic(cls: Any, *parts: Any) -> Any:
 
 
 def _or_none(wire: Any) -> Any:
-    """Give the type that carries None, too."""
+    """Return the type of a carrier that may be None, too."""
     return None if wire is None else wire | None
 
 
@@ -695,7 +696,7 @@ def _leaf(hint: Any, form: Any, wire: Any, *classes: type) -> Codec:
     def lower(value: Any, arrays: Arrays) -> Any:
         if type(value) in exact:
             return value
-        if isinstance(value, np.generic):  # a number that numpy has made is the same number
+        if isinstance(value, np.generic):  # a numpy number is the same number
             item = value.item()
             if type(item) in exact:
                 return item
@@ -721,7 +722,8 @@ def _tagged(hint: Any, form: Any, members: list[Codec], may_be_none: bool) -> Co
         msgspec.defstruct(f"Box{number}", [("value", member.wire)], tag=number, array_like=True, frozen=True)
         for number, member in enumerate(members)
     ]
-    first: dict[type, int] = {}  # of a class, the member that took one last: most often it takes the next one too
+    # for each class, the member that took its last value: most often it takes the next one, too
+    first: dict[type, int] = {}
 
     def lower(value: Any, arrays: Arrays) -> Any:
         if value is None and may_be_none:
@@ -775,7 +777,7 @@ def _each_pair(value: Any, lower_key: Lower, lower_item: Lower, arrays: Arrays) 
 def _lower_parts(parts: Sequence[Codec], places: Sequence[str]) -> Lower:
     """Lower a tuple of values of different types.
 
-    A tuple of classes that has been right for the leaves among them is right again: one look for all of these.
+    A tuple of classes that was right for the leaves is right again, so one lookup checks all of them.
     """
     leaves = [number for number, part in enumerate(parts) if part.exact]
     others = [(number, part.lower) for number, part in enumerate(parts) if not part.exact]
@@ -821,20 +823,22 @@ def _lift_parts(parts: Sequence[Codec]) -> Callable[[Any, Arrays], list[Any]] | 
 
 
 def _fields_of(cls: Any, arguments: tuple[Any, ...]) -> dict[str, Any] | None:
-    """Give the fields of a class with their types; None if it has none."""
+    """Return the fields of a class with their types; None if it has no fields."""
     is_struct, is_data = issubclass(cls, msgspec.Struct), dataclasses.is_dataclass(cls)
     is_named = issubclass(cls, tuple) and hasattr(cls, "_fields")
     if not (is_struct or is_data or is_named or typing.is_typeddict(cls)):
         return None
     try:
         hints = typing.get_type_hints(cls, include_extras=True)
-    except Exception as error:  # names that exist for type checkers alone
-        raise _CannotCross(cls, f"has fields whose types cannot be found ({error}); import them where it is") from None
+    except Exception as error:  # names that exist only for type checkers
+        raise _CannotCross(
+            cls, f"has fields whose types cannot be resolved ({error}); import them at module level"
+        ) from None
     if is_struct:
         names: Sequence[str] = cls.__struct_fields__
     elif is_data:
         if any(isinstance(one, dataclasses.InitVar) for one in hints.values()):
-            raise _CannotCross(cls, "takes arguments that it does not keep (InitVar), so it cannot be made again")
+            raise _CannotCross(cls, "takes arguments that it does not keep (InitVar), so it cannot be rebuilt")
         names = [one.name for one in dataclasses.fields(cls)]
     elif is_named:
         names = cls._fields
@@ -845,7 +849,7 @@ def _fields_of(cls: Any, arguments: tuple[Any, ...]) -> dict[str, Any] | None:
 
 
 def _required_keys(cls: Any) -> frozenset[str]:
-    """Give the keys that must be there; of annotations that are texts the class itself does not know it."""
+    """Return the keys that are required. With quoted annotations, the class itself does not know them."""
     hints = typing.get_type_hints(cls, include_extras=True)
     marked = {name: typing.get_origin(hint) for name, hint in hints.items()}
     required = {name for name in cls.__required_keys__ if marked.get(name) is not typing.NotRequired}
@@ -853,7 +857,7 @@ def _required_keys(cls: Any) -> frozenset[str]:
 
 
 def _filled(hint: Any, known: dict[Any, Any]) -> Any:
-    """Put the types of a generic class's parameters into the type of a field."""
+    """Replace the parameters of a generic class in the type of a field."""
     if isinstance(hint, typing.TypeVar):
         return known.get(hint, hint)
     unknown = getattr(hint, "__parameters__", ())
@@ -872,7 +876,7 @@ def _giver(cls: Any, names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]
 
 
 def _maker(cls: Any, names: tuple[str, ...]) -> Callable[[Any], Any]:
-    """Make an object of its fields by its class, whose own checks then hold, and what it derives is derived."""
+    """Make an object from its fields by calling its class, so that its checks run and derived fields are computed."""
     if issubclass(cls, tuple):
         return lambda items: cls._make(items)
     arguments = inspect.signature(cls).parameters
@@ -882,7 +886,7 @@ def _maker(cls: Any, names: tuple[str, ...]) -> Callable[[Any], Any]:
         return lambda items: cls(**dict(zip(names, items, strict=True)))
     finish = getattr(cls, "__post_init__", None)
 
-    def make(items: Sequence[Any]) -> Any:  # fields that the class makes by itself, or an __init__ of its own
+    def make(items: Sequence[Any]) -> Any:  # fields that the class computes itself, or a custom __init__
         made = object.__new__(cls)
         for name, item in zip(names, items, strict=True):
             object.__setattr__(made, name, item)

@@ -1,10 +1,10 @@
-"""Any value as plain data, what YAML and JSON hold, and back by its declared type.
+"""Converts any value to plain data, as YAML and JSON hold it, and back by its declared type.
 
-What the type tells is not written: an enum is its name, a path its text, a colour "#rrggbb", an array a nested list, a
-set a sorted list, a dataclass or struct its fields, a function or class "module:name". Where the type does not tell,
-`Any` or a union, the data does: `{"$type": "path", "value": "a.png"}`. What was encoded is decoded as the same value,
-or not encoded at all. Stands on types and values; knows no parameter, and runs no code but that of the modules that are
-named, which `find` imports or refuses to.
+Information that the declared type has is not written: an enum is its name, a path its text, a colour "#rrggbb", an
+array a nested list, a set a sorted list, a dataclass or struct its fields, a function or class "module:name". If the
+type is `Any` or a union, the data has the type: `{"$type": "path", "value": "a.png"}`. A value is decoded as the same
+value, or not encoded at all. Depends on types and values, not on parameters. It runs no code except that of the modules
+that are named, which `find` imports or refuses.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 TAG: Final = "$type"
-"""The key of data that says of itself what it is."""
+"""The key in data that states its own type."""
 
 _TEXTS: Final = (
     datetime.datetime,
@@ -58,28 +58,28 @@ _TEXTS: Final = (
     decimal.Decimal,
     uuid.UUID,
 )
-"""What is written as a text that msgspec reads."""
+"""Types written as a string that msgspec reads."""
 
 _AS_LIST: Final = (list, abc.Sequence, abc.MutableSequence, abc.Collection, abc.Iterable)
 _AS_SET: Final = {set: set, abc.MutableSet: set, frozenset: frozenset, abc.Set: frozenset}
 _AS_DICT: Final = (dict, abc.Mapping, abc.MutableMapping)
 _CODE: Final = (types.FunctionType, types.BuiltinFunctionType, type, abc.Callable, Callable)
 _INEXACT: Final = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
-_LONGEST_ITEM: Final = 2**16  # bytes of one text in an array: what asks for more means harm
+_LONGEST_ITEM: Final = 2**16  # bytes of one string in an array: input that asks for more is an attack
 _WORDS: Final = {"true": True, "false": False, "none": None, "null": None}
 
 Find = Callable[[str], Any]
 
 
 def encode(value: Any, hint: Any = Any) -> Any:
-    """Give a value as plain data: None, booleans, numbers, texts, lists, and dicts with texts as keys.
+    """Return a value as plain data: None, booleans, numbers, strings, lists, and dicts with strings as keys.
 
     Args:
-      value: anything that is data.
-      hint: its declared type, with which it will be decoded.
+      value: any value that can be represented as data.
+      hint: its declared type, which must also be used to decode it.
 
     Raises:
-      EncodingError: it is no data, or would come back as another value.
+      EncodingError: it cannot be represented as data, or would be decoded as another value.
 
     Examples:
       >>> encode({"path": Path("a/b.png"), "frame": Colour(255, 128, 0)}, dict[str, Path | Colour])
@@ -95,8 +95,8 @@ def encode(value: Any, hint: Any = Any) -> Any:
     except RecursionError:
         raise EncodingError("a value that contains itself, or is nested too deep, cannot be stored") from None
     if not accepts(value, hint):
-        raise EncodingError(f"{describe_value(value)} is no {describe(hint)}, so it cannot be stored as one")
-    raise EncodingError(f"{describe_value(value)} cannot be stored: read again it would be another value")
+        raise EncodingError(f"{describe_value(value)} is not {describe(hint)}, so it cannot be stored as one")
+    raise EncodingError(f"{describe_value(value)} cannot be stored: it would be read back as another value")
 
 
 def _comes_back(data: Any, hint: Any, value: Any) -> bool:
@@ -107,16 +107,17 @@ def _comes_back(data: Any, hint: Any, value: Any) -> bool:
 
 
 def decode(data: Any, hint: Any = Any, *, where: str = "the value", find: Find | None = None) -> Any:
-    """Give the value of a type that plain data stands for; data that is such a value already is what it is.
+    """Return the value that plain data represents; data that is already such a value is returned unchanged.
 
     Args:
-      data: as `encode` gave it, or a person wrote it; tuples stand for lists.
+      data: the result of `encode`, or data that a person wrote; tuples count as lists.
       hint: the declared type.
-      where: what messages call it.
-      find: gives what "module:name" stands for, by default importing the module; raises what it likes to refuse that.
+      where: the name of the value in messages.
+      find: returns the object for "module:name", by default by importing the module; raises any exception to refuse.
 
     Raises:
-      EncodingError: it is none; the message says which part, what was expected and found.
+      EncodingError: it does not represent a value of the type; the message has the part, the expected and the found
+        value.
 
     Examples:
       >>> decode(["a.png", "b.png"], tuple[Path, ...])[1].suffix
@@ -132,19 +133,19 @@ def decode(data: Any, hint: Any = Any, *, where: str = "the value", find: Find |
 
 
 def has_tag(data: Any) -> bool:
-    """Say whether data says of itself, somewhere in it, what it is."""
+    """Return whether some part of the data states its own type."""
     if isinstance(data, dict):
         return TAG in data or any(map(has_tag, data.values()))
     return isinstance(data, list | tuple) and any(map(has_tag, data))
 
 
 def read_text(text: str, hint: Any = Any, *, where: str = "the value", find: Find | None = None) -> Any:
-    """Give the value that somebody means who writes a text for it, as on the command line.
+    """Return the value that a string represents, as typed on the command line.
 
-    It is read as a Python literal, as true, false or none, as the text itself, or as a list with commas in it.
+    It is read as a Python literal, as true, false or none, as the string itself, or as a list separated by commas.
 
     Raises:
-      EncodingError: it is none of the type.
+      EncodingError: it does not represent a value of the type.
 
     Examples:
       >>> read_text("0.2, 0.8", Span[float]), read_text("a, b", list[str]), read_text("3", str)
@@ -176,7 +177,7 @@ def _readings(text: str, hint: Any) -> Iterable[Any]:
 
 
 def reference_to(value: Any) -> str | None:
-    """Give "module:name" of a function or class; None for what cannot be found by that."""
+    """Return "module:name" of a function or class; None if it cannot be found by that name."""
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if module is None and isinstance(name, str) and hasattr(value, "__name__"):  # functions of C libraries
         return None
@@ -186,17 +187,17 @@ def reference_to(value: Any) -> str | None:
 
 
 def find_reference(reference: str) -> Any:
-    """Import the module and give what "module:name" stands for.
+    """Import the module and return the object for "module:name".
 
     Raises:
-      EncodingError: there is none.
+      EncodingError: there is no such object.
     """
     module, colon, name = reference.partition(":")
     if not (module and colon and name):
-        raise EncodingError(f'{reference!r:.80} is no reference; write "module:name", as in "my_robot.types:Pose"')
+        raise EncodingError(f'{reference!r:.80} is not a reference; write "module:name", as in "my_robot.types:Pose"')
     try:
         importlib.import_module(module)
-    except Exception as error:  # a module may raise what it likes
+    except Exception as error:  # a module may raise anything
         raise EncodingError(f'"{reference}": importing "{module}" failed ({type(error).__name__}: {error})') from error
     return _already_imported(reference)
 
@@ -212,7 +213,7 @@ def _already_imported(reference: str) -> Any:
 def _found(module: str, name: str) -> Any:
     first, *nested = name.split(".")
     found: Any = getattr(sys.modules.get(module), first, None)
-    for part in nested:  # classes in classes, never what the module has imported itself
+    for part in nested:  # classes in classes, never names that the module has itself imported
         found = getattr(found, part, None) if isinstance(found, type) else None
     return None if isinstance(found, types.ModuleType) else found
 
@@ -221,7 +222,7 @@ def _found(module: str, name: str) -> Any:
 
 
 def _plain(value: Any, tagged: bool) -> Any:
-    """Give data; `tagged`: what is not plain says what it is."""
+    """Return a value as data; `tagged`: data that is not plain states its type."""
     kind = type(value)
     if value is None or kind in (bool, int, str):
         return value
@@ -271,7 +272,7 @@ def _plain_object(value: Any, tagged: bool) -> Any:
             return _tag("reference", reference, tagged)
         raise EncodingError(f"{value!r:.80} cannot be found by a name, so it cannot be stored; define it in a module")
     raise EncodingError(
-        f"{describe_value(value)} is no data that can be stored; use plain values, arrays, dataclasses or structs"
+        f"{describe_value(value)} is not data that can be stored; use plain values, arrays, dataclasses or structs"
     )
 
 
@@ -284,7 +285,7 @@ def _tag_of(kind: type, data: Any, tagged: bool) -> Any:
         return data
     reference = reference_to(kind)
     if reference is None:
-        raise EncodingError(f"{kind.__qualname__} cannot be found by a name, so no value of it can be stored")
+        raise EncodingError(f"{kind.__qualname__} cannot be found by a name, so its values cannot be stored")
     return {TAG: reference, "value": data}
 
 
@@ -294,7 +295,7 @@ def _inexact(value: float) -> str:
 
 def _hex(value: Colour) -> str:
     if not all(type(part) is int and 0 <= part <= 255 for part in value):
-        raise EncodingError(f"{value!r} is no colour: red, green and blue are from 0 to 255")
+        raise EncodingError(f"{value!r} is not a colour: red, green and blue are from 0 to 255")
     return value.hex
 
 
@@ -305,7 +306,7 @@ def _order(data: Any) -> tuple[str, Any]:
 
 def _plain_array(value: np.ndarray[Any, Any], tagged: bool) -> Any:
     if value.dtype.kind not in "biufcSU":
-        raise EncodingError(f"{describe_value(value)} cannot be stored; numbers, truth values and texts can")
+        raise EncodingError(f"{describe_value(value)} cannot be stored; numbers, booleans and strings can")
     items = value.astype(str) if value.dtype.kind == "S" else value
     data = items.tolist() if value.dtype.kind in "biuSU" else _numbers(items.tolist())
     if not tagged:
@@ -315,7 +316,7 @@ def _plain_array(value: np.ndarray[Any, Any], tagged: bool) -> Any:
 
 
 def _numbers(data: Any) -> Any:
-    """Write those that JSON has no number for as texts."""
+    """Write numbers that JSON lacks as strings."""
     if isinstance(data, list):
         return [_numbers(one) for one in data]
     if isinstance(data, complex):
@@ -324,7 +325,7 @@ def _numbers(data: Any) -> Any:
 
 
 def _fields_of(kind: Any) -> tuple[str, ...] | None:
-    """Give the names of what a dataclass, struct or named tuple is made of; None of others."""
+    """Return the field names of a dataclass, struct or named tuple; None for other classes."""
     if not isinstance(kind, type):
         return None
     if issubclass(kind, msgspec.Struct):
@@ -353,10 +354,10 @@ def _refusal(where: str, hint: Any, data: Any) -> EncodingError:
 
 
 def _untagged(data: dict[str, Any], where: str, find: Find) -> Any:
-    """Give what data says that it is."""
+    """Return the value of data that states its own type."""
     name = data[TAG]
     if not isinstance(name, str) or "value" not in data:
-        raise EncodingError(f'{where} has "{TAG}" but does not say of which type which "value" is, got {data!r:.80}')
+        raise EncodingError(f'{where} has "{TAG}" but does not state the type of its "value", got {data!r:.80}')
     inner = data["value"]
     if name == "array":
         return _array(data, where)
@@ -364,7 +365,7 @@ def _untagged(data: dict[str, Any], where: str, find: Find) -> Any:
     if hint is None:
         hint = find(name)
         if not is_data_type(hint):
-            raise EncodingError(f'{where} is of type "{name}", which is no type of data')
+            raise EncodingError(f'{where} is of type "{name}", which is not a type of data')
     elif name == "dict":
         return _pairs(inner, Any, Any, where, find)
     return _decode(inner, hint, where, find)
@@ -386,7 +387,7 @@ _TAGGED: Final[dict[str, Any]] = {
 
 
 def is_data_type(kind: Any) -> bool:
-    """Whether values of a class are made of data alone, so that reading one runs none but its own checks."""
+    """Return whether the values of a class consist only of data, so that reading one runs only its own checks."""
     return isinstance(kind, type) and (issubclass(kind, (enum.Enum, *_TEXTS)) or _fields_of(kind) is not None)
 
 
@@ -394,11 +395,11 @@ def _array(data: dict[str, Any], where: str) -> Any:
     try:
         dtype = np.dtype(data.get("dtype", "float64"))
         if dtype.kind not in "biufcSU" or dtype.itemsize > _LONGEST_ITEM:
-            raise ValueError(f"an array of {dtype} is no data")
+            raise ValueError(f"an array of {dtype} is not data")
         made = np.array(data["value"], dtype=dtype)
         return made.reshape(data["shape"]) if "shape" in data else made
     except (ValueError, TypeError, OverflowError) as error:
-        raise EncodingError(f"{where} is no array ({error})") from None
+        raise EncodingError(f"{where} is not an array ({error})") from None
 
 
 def _pairs(data: Any, key: Any, item: Any, where: str, find: Find) -> dict[Any, Any]:
@@ -411,8 +412,8 @@ def _pairs(data: Any, key: Any, item: Any, where: str, find: Find) -> dict[Any, 
             _decode(one, key, f"{where}, key {one!r:.40}", find): _decode(other, item, f"{where}[{one!r:.40}]", find)
             for one, other in data
         }
-    except TypeError as error:  # a key that cannot be one
-        raise EncodingError(f"{where} has a key that cannot be one ({error})") from None
+    except TypeError as error:  # a key that cannot be hashed
+        raise EncodingError(f"{where} has an invalid key ({error})") from None
 
 
 def _is_list(data: Any) -> bool:
@@ -420,7 +421,7 @@ def _is_list(data: Any) -> bool:
 
 
 class _Decoder:
-    """Reads data as one type; a method for each manner of types."""
+    """Reads data as one type; has a method for each family of types."""
 
     def __init__(self, where: str, find: Find, hint: Any) -> None:
         self.where = where
@@ -469,7 +470,7 @@ class _Decoder:
         try:
             return cls(items)
         except TypeError as error:
-            raise EncodingError(f"{self.where} has a member that cannot be one ({error})") from None
+            raise EncodingError(f"{self.where} has an invalid member ({error})") from None
 
     def untyped(self, data: Any) -> Any:
         if type(data) is list:
@@ -479,7 +480,7 @@ class _Decoder:
         return data
 
     def union(self, data: Any, members: tuple[Any, ...]) -> Any:
-        """What the data is as it stands, if a member is that; else the first that it can be."""
+        """Return the data itself if it is a value of a member; otherwise decode it as the first member that fits."""
         found: list[Any] = []
         for member in members:
             try:
@@ -541,7 +542,7 @@ class _Decoder:
         return self.find(data)
 
     def instance(self, data: Any, cls: Any) -> Any:
-        """One of a class that is no container."""
+        """Decode an instance of a class that is not a container."""
         if not isinstance(cls, type):
             return data
         if issubclass(cls, enum.Enum):
@@ -553,18 +554,18 @@ class _Decoder:
         if cls is Colour:
             return self.colour(data)
         if issubclass(cls, os.PathLike) and isinstance(data, str):
-            return typing.cast(Any, cls)(data)  # paths are made of texts
+            return typing.cast(Any, cls)(data)  # paths are made from strings
         if cls in (bytes, complex) and isinstance(data, str):
             return self.made_of_text(cls, data)
         if _fields_of(cls) is not None:
             return self.fields(data, cls)
         try:
             return msgspec.convert(data, cls)
-        except Exception:  # types of users raise what they like
+        except Exception:  # types of users may raise anything
             raise self.refuse(data) from None
 
     def member(self, data: Any, cls: Any) -> Any:
-        """By name; a flag by several; else by value, as people write it."""
+        """Decode an enum member by name, a flag by several names; otherwise by value, as people write it."""
         if (
             issubclass(cls, enum.Flag)
             and _is_list(data)
@@ -611,15 +612,15 @@ class _Decoder:
             )
         try:
             hints = typing.get_type_hints(cls, include_extras=True)
-        except Exception:  # names that exist for type checkers alone
+        except Exception:  # names that exist only for type checkers
             hints = {}
         values = {
             name: _decode(one, hints.get(name, Any), f"{self.where}.{name}", self.find) for name, one in data.items()
         }
         try:
             return cls(**values)
-        except Exception as error:  # of users, who check what they hold
-            raise EncodingError(f"{self.where} is no {describe(cls)} ({type(error).__name__}: {error})") from error
+        except Exception as error:  # classes of users check their fields and may raise anything
+            raise EncodingError(f"{self.where} is not {describe(cls)} ({type(error).__name__}: {error})") from error
 
 
 def _is_instance(data: Any, cls: type) -> bool:
@@ -629,7 +630,7 @@ def _is_instance(data: Any, cls: type) -> bool:
 
 
 def _is_open(scalar: type) -> bool:
-    """Whether a scalar class stands for several dtypes."""
+    """Return whether a scalar class represents several dtypes."""
     try:
         return np.dtype(scalar).type is not scalar
     except TypeError:

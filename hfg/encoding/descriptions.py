@@ -1,7 +1,7 @@
-"""What two ends compare before the first value: their types, as plain data, as a fingerprint, and in words.
+"""What two ends compare before the first value: their types as plain data, as a fingerprint, and in words.
 
-Where a class is defined does not count, for a program of one's own is `__main__` to itself: its name, its fields and
-their types do. Stands on `codecs`.
+The module of a class is ignored, because a program's own module is `__main__` to itself. Its name, its fields and their
+types count. Depends on `codecs`.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ _LONGEST: Final = 2**20
 
 
 def description_of(hint: Any) -> str:
-    """Give all that both ends must agree on, as a text to send before the first value.
+    """Return everything that both ends must agree on, as a string to send before the first value.
 
     Raises:
-      EncodingError: values of this type cannot cross.
+      EncodingError: values of this type cannot be sent to another process.
     """
     return msgspec.json.encode(codec_for(hint).form).decode()
 
 
 def type_fingerprint(hint: Any) -> str:
-    """Give 16 digits that are equal where types are, in every process and version of Python.
+    """Return 16 digits that are equal where types are, in every process and version of Python.
 
     Raises:
-      EncodingError: values of this type cannot cross.
+      EncodingError: values of this type cannot be sent to another process.
 
     Examples:
       >>> type_fingerprint(int | str) == type_fingerprint(str | int), type_fingerprint(int) == type_fingerprint(float)
@@ -42,14 +42,14 @@ def type_fingerprint(hint: Any) -> str:
 
 
 def difference(hint: Any, theirs: str) -> str | None:
-    """Say how the other end's type differs from one's own, or None if it does not.
+    """Return how the other end's type differs from this end's, or None if it does not.
 
     Args:
       hint: the type of this end.
-      theirs: what `description_of` gave at the other end.
+      theirs: the result of `description_of` at the other end.
 
     Raises:
-      EncodingError: that is no description of a type.
+      EncodingError: `theirs` is not a description of a type.
 
     Examples:
       >>> print(difference(dict[str, float], description_of(dict[str, list[float]])))
@@ -61,14 +61,14 @@ def difference(hint: Any, theirs: str) -> str | None:
         other = msgspec.json.decode(theirs, type=list)
         return _difference(codec_for(hint).form, other, "")
     except (ValueError, RecursionError, UnicodeEncodeError) as error:
-        raise EncodingError(f"the other end does not say its type in a way that can be read ({error})") from None
+        raise EncodingError(f"cannot read the other end's description of its type ({error})") from None
 
 
 def _difference(mine: Any, theirs: Any, where: str) -> str | None:
     if mine == theirs:
         return None
     if not (isinstance(theirs, list) and theirs and isinstance(theirs[0], str)):
-        raise ValueError(f"{theirs!r:.40} is no type")
+        raise ValueError(f"{theirs!r:.40} is not a type")
     if mine[0] != theirs[0] or len(mine) != len(theirs):
         return _unlike(mine, theirs, where)
     match mine[0]:
@@ -97,7 +97,7 @@ def _of_fields(mine: Any, theirs: Any, where: str) -> str | None:
     if not isinstance(theirs[2], list) or not all(
         isinstance(one, list) and len(one) > 1 and isinstance(one[0], str) for one in theirs[2]
     ):
-        raise ValueError(f"{theirs!r:.40} is no class")
+        raise ValueError(f"{theirs!r:.40} is not a class")
     here, there = ({one[0]: one[1:] for one in form[2]} for form in (mine, theirs))
     only_here = [name for name in here if name not in there]
     only_there = [name for name in there if name not in here]

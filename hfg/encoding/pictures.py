@@ -1,8 +1,8 @@
-"""How large a picture is, by the first bytes of its file, and whether it may be decoded (rule L4).
+"""Reads the size of a picture from the first bytes of its file, to decide whether to decode it (rule L4).
 
-OpenCV allocates what a header asks for: a file of 124 kB can ask for gigabytes. Its own limit is eight times ours, and
-cannot be set for hfg alone. So the size is looked at first; of a kind that OpenCV knows a header that says none is
-refused, and where a file could say several, the largest counts. Stands on bounds; knows no OpenCV.
+OpenCV allocates as much as a header asks for: a file of 124 kB can ask for gigabytes. OpenCV's own limit is eight times
+ours and cannot be set for hfg only. So the size is read first. In formats that OpenCV supports, a header without a size
+is refused, and if a file could have several sizes, the largest counts. Depends on bounds, not on OpenCV.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hfg.base.bounds import PICTURE_PIXELS
 __all__ = ["need_fair_size", "pixels_problem", "size_of"]
 
 _Size = tuple[int, int]
-_TEXT: Final = 8192  # bytes in which formats whose header is a text have it
+_TEXT: Final = 8192  # bytes in which formats with a text header have it
 _MOST_TAGS: Final = 4096
 _NONE: Final = (0, 0)
 
@@ -26,29 +26,29 @@ def need_fair_size(data: bytes, what: str) -> None:
     """Refuse a picture that is too large to be decoded.
 
     Args:
-      data: the whole of its file.
-      what: it is, for the message.
+      data: the complete file.
+      what: what it is, for the message.
 
     Raises:
-      ValueError: it has more pixels than are allowed, or does not say how many.
+      ValueError: it has too many pixels, or its header does not state its size.
     """
     size = size_of(data)
     if size == _NONE:
-        raise ValueError(f"{what} does not say how large it is: its header is damaged")
+        raise ValueError(f"{what} does not state its size: its header is damaged")
     problem = None if size is None else pixels_problem(*size)
     if problem is not None:
         raise ValueError(f"{what} {problem}")
 
 
 def pixels_problem(width: int, height: int) -> str | None:
-    """Say why a picture of this size is refused, behind what it is; None if it is not."""
+    """Return the second half of a message about a picture that is too large; None if it is not."""
     if width * height <= PICTURE_PIXELS.most:
         return None
     return f"has {width:,} x {height:,} pixels, {PICTURE_PIXELS.remedy}"
 
 
 def size_of(data: bytes) -> _Size | None:
-    """Give width and height, as the header says; zeros if that is damaged, None if the kind is unknown."""
+    """Return width and height from the header; zeros if it is damaged, None if the format is unknown."""
     for kind in _KINDS:
         if kind.begins.match(data):
             try:
@@ -60,7 +60,7 @@ def size_of(data: bytes) -> _Size | None:
 
 
 def _fixed(form: str, at: int) -> Callable[[bytes], _Size]:
-    """Two numbers at a place that is always the same."""
+    """Read two numbers at a fixed offset."""
 
     def size(data: bytes) -> _Size:
         width, height = struct.unpack_from(form, data, at)
@@ -70,7 +70,7 @@ def _fixed(form: str, at: int) -> Callable[[bytes], _Size]:
 
 
 def _written(width: bytes, height: bytes) -> Callable[[bytes], _Size]:
-    """The largest of the numbers in a header that is a text."""
+    """Return the largest numbers in a text header."""
 
     def size(data: bytes) -> _Size:
         text = data[:_TEXT]
@@ -80,7 +80,7 @@ def _written(width: bytes, height: bytes) -> Callable[[bytes], _Size]:
 
 
 def _largest(pattern: bytes, form: str, further: int, size: Callable[..., _Size]) -> Callable[[bytes], _Size]:
-    """The largest of the sizes that stand behind a mark; a mark within other data may mislead, which costs nothing."""
+    """Return the largest of the sizes after a marker. A marker inside other data may mislead, which does no harm."""
 
     def largest(data: bytes) -> _Size:
         length = struct.calcsize(form)
@@ -102,7 +102,7 @@ def _jpeg(data: bytes) -> _Size:
         marker, kind, length = struct.unpack_from(">BBH", data, at)
         if marker != 0xFF:
             raise ValueError
-        if kind == 0xFF:  # filled up
+        if kind == 0xFF:  # padding
             at += 1
         elif 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):
             height, width = struct.unpack_from(">HH", data, at + 5)
@@ -124,7 +124,7 @@ def _webp(data: bytes) -> _Size:
 
 
 def _tiff(data: bytes) -> _Size:
-    """Of its first directory, the one that is read: tags 256 and 257, of TIFF or BigTIFF."""
+    """Read the first directory, the one that is decoded: tags 256 and 257, of TIFF or BigTIFF."""
     order = "<" if data[:2] == b"II" else ">"
     big = struct.unpack_from(f"{order}H", data, 2)[0] == 43
     where, count, entry = ("Q", "Q", 20) if big else ("I", "H", 12)

@@ -1,7 +1,7 @@
-"""Reads JSON of which nobody knows who wrote it (rule L4).
+"""Reads JSON from an unknown source (rule L4).
 
-Two bytes, `[]`, become a list of eighty: so not only the size of a text is limited, but how many values it has. Stands
-on bounds and msgspec.
+Two bytes, `[]`, become a list of eighty bytes. So the number of values is limited as well as the size of the text.
+Depends on bounds and msgspec.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from hfg.base.bounds import JSON_VALUES
 __all__ = ["json_value"]
 
 _TEXT: Final = re.compile(rb'"(?:[^"\\]|\\.)*+"', re.DOTALL)
-_MARKS: Final = (b"[", b"{", b":", b",")  # each comes before one value at most
+_MARKS: Final = (b"[", b"{", b":", b",")  # each precedes at most one value
 
 
 def json_value(data: bytes) -> Any:
     """Read a value.
 
     Raises:
-      ValueError: it is no JSON (`msgspec.DecodeError` is one), or has more values than any may have.
+      ValueError: it is not JSON (`msgspec.DecodeError` is a ValueError), or has too many values.
       RecursionError: it has too many levels.
     """
     most = JSON_VALUES.most

@@ -1,12 +1,12 @@
-"""Tokens as bytes, for links: what is small about a token, and its value by its declared type.
+"""Tokens as bytes, for links: the small parts of a token, and its value by its declared type.
 
     metadata   msgpack: kind, modifier, stamp, number
     value      msgpack; or, with arrays in it:
-               length of the head, 4 bytes | head: value and what is said of its arrays | gap | array | gap | array ...
+               length of the head, 4 bytes | head: value and descriptions of its arrays | gap | array | gap | array ...
 
-Every array begins at a multiple of 64 and their order is that of the head, so where one lies is never read but
-computed, and none can lie outside or on another. Everything is checked before it is used: what arrives may come from
-anybody. No pickle, and no name of a class is read (rule L4). Stands on `codecs`, `arrays` and tokens.
+Every array starts at a multiple of 64, in the order of the head. So offsets are never read but computed, and no array
+can be outside the frame or overlap another. Everything is checked before it is used because any program may have sent
+it. There is no pickle, and no class is looked up by name (rule L4). Depends on `codecs`, `arrays` and tokens.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ __all__ = ["Limits", "Place", "TokenCodec", "View"]
 T = TypeVar("T")
 
 Place = Callable[["np.ndarray[Any, Any]"], Lease | None]
-"""Puts an array into shared memory and says where, or None: then its bytes go with the value."""
+"""Puts an array into shared memory and returns its place; None: its bytes are sent with the value."""
 
 View = Callable[[ArrayHead], "np.ndarray[Any, Any]"]
-"""Gives an array in shared memory by its lease; raises ValueError if it cannot."""
+"""Returns an array in shared memory by its lease; raises ValueError if it cannot."""
 
 _PLAIN: Final = 0
 _ARRAYS: Final = 1
-_WIDE: Final = 2  # integers beyond 64 bits; may stand with _ARRAYS
+_WIDE: Final = 2  # integers beyond 64 bits; can be combined with _ARRAYS
 _SILENT: Final[dict[Any, int]] = {None: 4, NO_MESSAGE: 5, END: 6}
 _WITHOUT_VALUE: Final = {kind: value for value, kind in _SILENT.items()}
 _LENGTH: Final = struct.Struct("<I")
@@ -44,7 +44,7 @@ _encode: Final = msgspec.msgpack.Encoder().encode
 
 
 class _Small(msgspec.Struct, array_like=True, gc=False, forbid_unknown_fields=True):
-    """What is small about a token."""
+    """The small parts of a token."""
 
     kind: Annotated[int, msgspec.Meta(ge=0, le=6)]
     activity: Annotated[int, msgspec.Meta(ge=-1, le=1)]
@@ -56,11 +56,11 @@ _decode_small: Final = msgspec.msgpack.Decoder(_Small).decode
 
 
 class Limits(NamedTuple):
-    """What a value may have at most on its way; more is refused before anything is made of it.
+    """Limits of a value in transit; a value that exceeds one is refused before it is decoded.
 
     Attributes:
-      size: bytes of all of it, and of an array in shared memory.
-      arrays: arrays in it.
+      size: bytes of the whole value, and of an array in shared memory.
+      arrays: number of arrays in it.
     """
 
     size: int = 2**28
@@ -68,15 +68,15 @@ class Limits(NamedTuple):
 
 
 class TokenCodec(Generic[T]):
-    """Makes bytes of tokens of one type, and tokens of bytes.
+    """Converts tokens of one type to bytes, and bytes to tokens.
 
     Args:
-      hint: the declared type of the values; None is always one, for events may have no value (rule T2).
-      what: what messages call a value, as in 'the value of "camera.image"'.
+      hint: the declared type of the values; None is always allowed because events may have no value (rule T2).
+      what: the name of a value in messages, as in 'the value of "camera.image"'.
       limits: of every value.
 
     Raises:
-      EncodingError: values of this type cannot cross to another process.
+      EncodingError: values of this type cannot be sent to another process.
 
     Examples:
       >>> codec = TokenCodec(dict[str, float])
@@ -96,14 +96,14 @@ class TokenCodec(Generic[T]):
 
     @property
     def holds_arrays(self) -> bool:
-        """Whether a value of the type may have arrays in it, as far as the type says."""
+        """Whether values of the type may contain arrays, according to the type."""
         return not self._exact
 
     def encode(self, token: Token[T], *, place: Place | None = None) -> tuple[bytes, bytes]:
-        """Give metadata and value, as links take them.
+        """Return metadata and value in the form that links take.
 
         Args:
-          token: what to send.
+          token: the token to send.
           place: puts arrays into shared memory, for consumers of this host.
 
         Raises:
@@ -128,7 +128,9 @@ class TokenCodec(Generic[T]):
         except Unfit as problem:
             raise EncodingError(problem.sentence(self.what)) from None
         except UnicodeEncodeError as error:
-            raise EncodingError(f"{self.what} cannot be sent: a text in it is no Unicode ({error.reason})") from None
+            raise EncodingError(
+                f"{self.what} cannot be sent: a string in it is not valid Unicode ({error.reason})"
+            ) from None
         except RecursionError:
             raise EncodingError(f"{self.what} cannot be sent: it contains itself, or is nested too deep") from None
         if len(data) > self.limits.size:
@@ -138,7 +140,7 @@ class TokenCodec(Generic[T]):
         return _encode((kind, token.activity, token.stamp, token.sequence)), data
 
     def _reader(self, kind: int) -> tuple[Codec, Callable[[Any], Any]]:
-        """Give the codec of a kind of data, and what reads it; few ports need more than the plain one."""
+        """Return the codec for a kind of data, and its reader; few ports need more than the plain kind."""
         found = self._readers.get(kind)
         if found is None:
             codec = codec_for(self.hint, wide=bool(kind & _WIDE))
@@ -181,15 +183,15 @@ class TokenCodec(Generic[T]):
         return b"".join(parts)
 
     def decode(self, metadata: Any, value: Any, *, view: View | None = None) -> Token[T]:
-        """Give the token; its arrays are read-only views of the bytes of the value, which must not change any more.
+        """Return the token; its arrays are read-only views of the value's bytes, which must no longer change.
 
         Args:
-          metadata: what `encode` gave first, in anything that has bytes.
-          value: what it gave second.
-          view: gives arrays that are in shared memory; without it such a value is refused.
+          metadata: the first result of `encode`, in any bytes-like object.
+          value: the second result of `encode`.
+          view: returns arrays in shared memory; without it, such values are refused.
 
         Raises:
-          EncodingError: it is no token of this type; nothing of it was used.
+          EncodingError: it is not a token of this type; nothing of it was used.
         """
         try:
             if len(value) > self.limits.size:
@@ -214,7 +216,7 @@ class TokenCodec(Generic[T]):
     def _without_value(self, small: _Small, value: Any) -> Any:
         found = _WITHOUT_VALUE[small.kind]
         if len(value) or (found is NO_MESSAGE and small.activity):
-            raise ValueError("a marker has a value, or silence a modifier")
+            raise ValueError("a marker has a value, or a silence has a modifier")
         return found
 
     def _unusual(self, kind: int, value: memoryview, view: View | None) -> Any:
@@ -249,5 +251,5 @@ class TokenCodec(Generic[T]):
             made.append(view_of(head, value, offset))
             begin = offset + size
         if begin != len(value):
-            raise ValueError(f"{len(value) - begin} of its bytes belong to nothing")
+            raise ValueError(f"{len(value) - begin} of its bytes belong to no array")
         return made

@@ -1,8 +1,8 @@
-"""A run as a page to look at: one file with the drawing, who was active when, counts, errors and pictures.
+"""A report page for a run: one file with the drawing, activity over time, counts, errors and pictures.
 
-pages       the page of a run under way, and its file     observing     what is kept of a run, within bounds
-html        the page as text                              pictures      pixels as PNG
-sections    what users add to it
+pages       the page of a run in progress, and its file    observing     data kept of a run, within bounds
+html        the page as text                               pictures      pixels as PNG
+sections    contents that users add to it
 """
 
 from hfg.reporting.pages import ReportPage, report_page

@@ -1,7 +1,7 @@
-"""A report as text: HTML with everything in it, so that the file is the whole of it.
+"""A report as text: one HTML file that contains everything.
 
-What users have named is text everywhere, never markup: it is escaped here, and the script sets it as text. The page
-says itself that it loads nothing from anywhere. Stands on `observing`, the engine's reports and the drawing.
+Names chosen by users are always text, never markup: they are escaped here, and the script sets them as text. The page's
+content policy forbids it to load anything. Depends on `observing`, the engine's reports and the drawing.
 """
 
 from __future__ import annotations
@@ -24,39 +24,39 @@ from hfg.reporting.pictures import png
 
 __all__ = ["Page", "drawing"]
 
-_MOST_ROWS: Final = 2000  # of a table
-_MOST_DRAWN: Final = 600  # nodes; of a larger graph the subgraphs are folded
+_MOST_ROWS: Final = 2000  # rows of a table
+_MOST_DRAWN: Final = 600  # nodes; in a larger graph, subgraphs are collapsed
 _RULES: Final = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; media-src data:"
 )
 
 
 def drawing(graph: Graph) -> tuple[str, str]:
-    """Draw a graph as a page shows it: nobody is active; and say what the drawing leaves out, if anything."""
+    """Draw a graph for a page, with no node active. Return the drawing, and what it leaves out, if anything."""
     nodes = [one for _, one in picture(graph).items if isinstance(one, Shape) and one.look == "node"]
     if len(nodes) <= _MOST_DRAWN:
         return graph.draw(format="svg", active=()), ""
     top = sum(1 for _ in graph.nodes)
     if top > _MOST_DRAWN:
-        return "", f"the drawing, for the graph has {top:,} nodes; graph.draw makes it"
+        return "", f"the drawing, because the graph has {top:,} nodes; graph.draw makes it"
     return graph.draw(
         format="svg", depth=0, active=()
-    ), f"what lies in subgraphs, for it is {len(nodes):,} nodes in all"
+    ), f"the insides of subgraphs, because there are {len(nodes):,} nodes in all"
 
 
 class Page:
-    """The page of a run, which is written once.
+    """The page of a run; written once.
 
     Args:
-      graph: as it is now.
-      drawn: what `drawing` gives.
-      observed: what was kept of the run.
-      report: how the run went.
+      graph: the graph in its current state.
+      drawn: the result of `drawing`.
+      observed: the observations of the run.
+      report: the run's report.
       statistics: times and depths.
-      error: what the run failed with.
-      outcome: how it ended; None if it goes on.
-      when: seconds since 1970 at its begin; None in virtual time, where equal runs give equal pages.
-      own: the sections that users have added, as HTML.
+      error: the error that the run failed with.
+      outcome: how it ended; None while it runs.
+      when: seconds since 1970 at its start; None in virtual time, so that equal runs have equal pages.
+      own: sections that users have added, as HTML.
     """
 
     def __init__(
@@ -76,10 +76,10 @@ class Page:
         self.error, self.when = error, when
         self.outcome = outcome or "still running"
         self.begun_at = observed.begun_at or 0.0
-        self.notes: list[str] = []  # what was left out
+        self.notes: list[str] = []  # what the page leaves out
 
     def text(self) -> str:
-        """Write it."""
+        """Return the page as HTML."""
         return "".join(self._pieces())
 
     def _pieces(self) -> Iterator[str]:
@@ -131,7 +131,7 @@ class Page:
 
     def _errors(self) -> Iterator[str]:
         errors = self.observed.errors
-        shown = [said for _, _, said in errors]  # most of what the report says is in the table already
+        shown = [said for _, _, said in errors]  # the table already has most of the report's text
         told = [one for one in self.report.errors[:_MOST_ROWS] if not any(said in one for said in shown)]
         if not errors and not told:
             return
@@ -140,7 +140,7 @@ class Page:
         if rows:
             yield from _table("errors", ("time", "node", "what"), rows)
         if self.observed.more_errors:
-            self.notes.append(f"{self.observed.more_errors:,} more errors behind the first {len(errors)}")
+            self.notes.append(f"{self.observed.more_errors:,} more errors after the first {len(errors)}")
         for sentence in told:
             yield f"<pre>{escaped(sentence)}</pre>\n"
         yield "</section>\n"
@@ -159,7 +159,7 @@ class Page:
         if self.observed.edits:
             count = self.observed.edits
             times = "once" if count == 1 else f"{count:,} times"
-            self.notes.append(f"the graph was changed {times}; the drawing shows it as it was in the end")
+            self.notes.append(f"the graph was changed {times}; the drawing shows its final state")
         yield '<section id="drawing"><h2>The graph</h2>\n<div class="bar">'
         yield '<span class="right"><button type="button" id="fit">fit</button> '
         yield '<button type="button" id="smaller">-</button> <button type="button" id="larger">+</button>'
@@ -170,7 +170,7 @@ class Page:
     def _timeline(self) -> Iterator[str]:
         joined = sum(times.joined for times in self.observed.times.values())
         if joined:
-            self.notes.append(f"{joined:,} times of activity are shown together with the one before them")
+            self.notes.append(f"{joined:,} times of activity are merged with the preceding ones")
         for what, kept in (("active", self.observed.times), ("at work", self.observed.rows.counts)):
             if len(kept) >= MOST_NODES:
                 self.notes.append(f"when further nodes were {what}: only {MOST_NODES:,} are kept")
@@ -294,13 +294,13 @@ def _file(name: str) -> str:
 
 
 def _json(data: object) -> str:
-    """Give data as a script element takes it: nothing in a text may end the element."""
+    """Return data for a script element, escaped so that no text in it can end the element."""
     text = msgspec.json.encode(_sound(data)).decode()
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _sound(data: Any) -> Any:
-    """JSON has no lone surrogates; names may."""
+    """Replace lone surrogates, which names may have and JSON may not."""
     if isinstance(data, str):
         return data.encode("utf-8", "replace").decode()
     if isinstance(data, dict):
@@ -311,7 +311,7 @@ def _sound(data: Any) -> Any:
 
 
 Cell = tuple[Any, str]
-"""What a cell is sorted by, and what it shows."""
+"""A cell: the value to sort by, and the text to show."""
 
 
 def _table(name: str, heads: Sequence[str], rows: Iterable[Sequence[Cell]]) -> Iterator[str]:
@@ -334,7 +334,7 @@ def _table(name: str, heads: Sequence[str], rows: Iterable[Sequence[Cell]]) -> I
 
 
 def _seconds(duration: float) -> str:
-    """Give a time in the unit in which it can be read."""
+    """Return a duration in a readable unit."""
     if duration >= 100:
         return f"{duration:,.0f} s"
     if duration >= 0.1 or duration == 0:

@@ -1,8 +1,8 @@
-"""What a report keeps of a run, within bounds however long that is.
+"""Collects data about a run for a report, within bounds, however long the run is.
 
-Firings are counted in a few hundred spans of time, which grow with the run. Times of activity and pictures are thinned
-out evenly when there are too many, errors are kept from the beginning on; what was left out is counted and told. Stands
-on `trace`.
+Firings are counted in a few hundred time spans, which grow with the run. When there are too many times of activity or
+pictures, they are thinned out evenly; only the first errors are kept. Omissions are counted and reported. Depends on
+`trace`.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from hfg.trace import (
 
 __all__ = ["MOST_ERRORS", "MOST_TIMES", "SPANS", "Gallery", "Observed", "Rows", "Times"]
 
-SPANS: Final = 240  # in which firings are counted, twice as many at most
-MOST_TIMES: Final = 1000  # of activity, for each node
-MOST_NODES: Final = 2000  # whose times are kept: what is edited while it runs can have any number
+SPANS: Final = 240  # time spans for counting firings; at most twice as many
+MOST_TIMES: Final = 1000  # times of activity per node
+MOST_NODES: Final = 2000  # nodes whose times are kept: a graph that is edited while it runs can have any number
 MOST_ERRORS: Final = 100
 LONGEST_ERROR: Final = 2000  # characters
 _FIRST_SPAN_S: Final = 0.001
@@ -41,9 +41,9 @@ class Times:
     """When a node was active.
 
     Attributes:
-      spans: begin and end of each time.
-      joined: how many were joined with the one before them, for there were too many.
-      total_s: how long it was active, exactly.
+      spans: start and end of each time.
+      joined: how many were merged with the preceding one because there were too many.
+      total_s: its exact total time of activity, in seconds.
     """
 
     __slots__ = ("_since", "joined", "spans", "total_s")
@@ -55,12 +55,12 @@ class Times:
         self._since: float | None = None
 
     def begin(self, now: float) -> None:
-        """It becomes active."""
+        """The node becomes active."""
         if self._since is None:
             self._since = now
 
     def end(self, now: float) -> None:
-        """It becomes inactive."""
+        """The node becomes inactive."""
         if self._since is None:
             return
         self.spans.append((self._since, now))
@@ -70,19 +70,19 @@ class Times:
             self._join()
 
     def until(self, now: float) -> list[tuple[float, float]]:
-        """Give the times up to now."""
+        """Return the times up to now."""
         return self.spans if self._since is None else [*self.spans, (self._since, now)]
 
     def total_until(self, now: float) -> float:
-        """Say how long it was active up to now."""
+        """Return the total time of activity up to now."""
         return self.total_s + (0.0 if self._since is None else now - self._since)
 
     def _join(self) -> None:
-        """Join times that are nearest to each other, until half of them are left."""
+        """Merge the times that are nearest to each other, until half of them are left."""
         gaps = sorted(after[0] - before[1] for before, after in zip(self.spans, self.spans[1:], strict=False))
         widest = gaps[len(gaps) // 2]
         found = [self.spans[0]]
-        spare = len(self.spans) // 2  # of equal gaps no more are closed than have to be
+        spare = len(self.spans) // 2  # of equally long gaps, close no more than necessary
         for begin, end in self.spans[1:]:
             if spare and begin - found[-1][1] <= widest:
                 found[-1] = (found[-1][0], end)
@@ -94,10 +94,10 @@ class Times:
 
 
 class Rows:
-    """How often nodes fired, in spans of equal length from the start on.
+    """How often nodes fired, in time spans of equal length from the start.
 
     Attributes:
-      span_s: how long each is; it doubles when the run has become twice as long.
+      span_s: length of each; doubled whenever the run has become twice as long.
     """
 
     def __init__(self) -> None:
@@ -105,7 +105,7 @@ class Rows:
         self.counts: dict[str, array[int]] = {}
 
     def add(self, node: str, since_start: float) -> None:
-        """One more firing or call."""
+        """Count one more firing or call."""
         index = int(since_start / self.span_s)
         while index >= 2 * SPANS:
             self._double()
@@ -125,25 +125,25 @@ class Rows:
 
 
 class Gallery:
-    """A few of the pictures that passed, evenly over the run.
+    """A few of the pictures that were sent, evenly spread over the run.
 
     Attributes:
       by_port: path of the port, then time and pixels of each that is kept.
-      seen: how many passed each port.
-      left_out: ports whose pictures found no room at all.
+      seen: number of pictures per port.
+      left_out: ports without any kept picture.
     """
 
     def __init__(self, most: int, longest: int) -> None:
         self._most = most
         self._longest = longest
-        self._edge_of: dict[str, str] = {}  # a port's pictures are counted on one of its edges
+        self._edge_of: dict[str, str] = {}  # pictures of a port are counted on one of its edges
         self._every: dict[str, int] = {}
         self.by_port: dict[str, list[tuple[float, np.ndarray[Any, Any]]]] = {}
         self.seen: dict[str, int] = {}
         self.left_out: set[str] = set()
 
     def take(self, edge: str, value: object, now: float) -> None:
-        """Look at what was sent."""
+        """Look at a value that was sent."""
         if not is_picture(value):
             return
         assert isinstance(value, np.ndarray)
@@ -171,14 +171,14 @@ class Gallery:
 
 
 class Observed:
-    """A consumer of the trace that keeps what a report shows.
+    """A consumer of the trace that collects the data of a report.
 
     Attributes:
-      begun_at: on the run's clock.
-      errors: time, node and what was said.
-      more_errors: how many came behind those.
-      dropped: how many tokens were, by reason.
-      edits: how often the graph was changed.
+      begun_at: start, on the run's clock.
+      errors: time, node and message of each.
+      more_errors: number of errors after those.
+      dropped: number of dropped tokens, by reason.
+      edits: number of changes of the graph.
     """
 
     def __init__(self, pictures: int, longest: int) -> None:
@@ -199,12 +199,12 @@ class Observed:
             TokenDropped: self._drop,
             StructureChanged: self._edit,
             RunStarted: self._begin,
-            RunEnded: lambda _event: None,  # it says until when
+            RunEnded: lambda _event: None,  # its time is the end
             **({TokenSent: self._sent} if pictures else {}),
         }
 
     def __call__(self, event: TraceEvent) -> None:
-        """Take one event of the run."""
+        """Process one event of the run."""
         take = self._takes.get(type(event))
         if take is None:
             return

@@ -1,6 +1,6 @@
-"""The page of a run under way: it listens from the beginning, and writes its file when the run is over.
+"""The page of a run in progress: it observes the run from its start, and writes its file when the run is over.
 
-Stands on `observing`, `html` and the engine.
+Depends on `observing`, `html` and the engine.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class ReportPage(Sections):
     """A page about a run; `run.report_page` makes it.
 
     Attributes:
-      path: of the file.
-      error: why the file could not be written in the end; None if all is well.
+      path: path of the file.
+      error: why the file could not be written at the end; None if it was written.
     """
 
     def __init__(self, run: Run, path: Path, observed: Observed, say_when: bool) -> None:
@@ -41,20 +41,23 @@ class ReportPage(Sections):
         self._run = run
         self._observed = observed
         self._when = time.time() if say_when else None
-        # Made now: a run that is interrupted has no time for it in the end.
+        # Drawn now: when a run is interrupted, there is no time for it at the end.
         self._drawing = drawing(run.graph)
         self._edits = 0
         self._outcome: str | None = None
 
     def __call__(self, event: TraceEvent) -> None:
-        """Take one event of the run."""
+        """Process one event of the run."""
         self._observed(event)
         if isinstance(event, RunEnded):
             self._outcome = event.outcome
             self.write()
 
     def write(self) -> None:
-        """Write the page as far as the run has come; its end does it, too. A disk that is full is logged and kept."""
+        """Write the page with the run so far. Also called at the end of the run.
+
+        A full disk is logged and recorded in `error`.
+        """
         try:
             write_whole(self.path, lambda file: file.write(self.text().encode(errors="replace")))
             self.error = None
@@ -63,7 +66,7 @@ class ReportPage(Sections):
             _LOG.error('the report "%s" cannot be written: %s', self.path, error.strerror)
 
     def text(self) -> str:
-        """Give the page as far as the run has come."""
+        """Return the page with the run so far."""
         run, observed = self._run, self._observed
         if observed.edits != self._edits:
             self._edits, self._drawing = observed.edits, drawing(run.graph)
@@ -73,21 +76,21 @@ class ReportPage(Sections):
 
 
 def report_page(run: Run, file: str | os.PathLike[str], *, pictures: int, picture_size: int) -> ReportPage:
-    """Stand behind `Run.report_page`, which says what it takes."""
+    """Implement `Run.report_page`, which documents the arguments."""
     title = f'the report of graph "{run.graph.name}"'
     if not isinstance(file, str | os.PathLike):
-        raise UsageError(f'{title} goes into a file, as in run.report_page("run.html"), got {file!r:.80}')
+        raise UsageError(f'{title} needs a file, as in run.report_page("run.html"), got {file!r:.80}')
     path = Path(file)
     _need_whole(title, "pictures", pictures, 0, _MOST_PICTURES)
     _need_whole(title, "picture_size", picture_size, 16, _LONGEST_SIDE)
     try:
-        need_writable(path)  # which is better known now than when the run is over
+        need_writable(path)  # better reported now than when the run is over
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else error
         raise UsageError(
             f'{title} cannot be written to "{path}": {said}; name a file in a folder that you can write to'
         ) from error
-    run.statistics()  # from now on times are measured
+    run.statistics()  # starts the measuring of times
     made = ReportPage(run, path, Observed(pictures, picture_size), say_when=not _is_virtual(run))
     run.trace(made)
     return made
@@ -100,4 +103,4 @@ def _is_virtual(run: Run) -> bool:
 
 def _need_whole(title: str, name: str, value: object, least: int, most: int) -> None:
     if type(value) is not int or not least <= value <= most:
-        raise UsageError(f"{title}: {name}= is a whole number from {least} to {most}, got {value!r}")
+        raise UsageError(f"{title}: {name}= must be an integer from {least} to {most}, got {value!r}")

@@ -1,6 +1,6 @@
-"""Pixels as PNG, smaller if they are large; by the standard library alone, so that any report can have pictures.
+"""Pixels as PNG, reduced if they are large. It needs no image library, so every report can have pictures.
 
-Stands on numpy.
+Depends on numpy and the standard library.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ __all__ = ["is_picture", "png", "smaller"]
 
 Pixels = npt.NDArray[Any]
 
-_LEAST: Final = 8  # pixels in either direction; what is smaller is a table of numbers
+_LEAST: Final = 8  # pixels in either direction; a smaller array is a table of numbers
 _KINDS: Final = {1: 0, 2: 4, 3: 2, 4: 6}  # PNG's colour types, by channels
 
 
 def is_picture(value: object) -> bool:
-    """Say whether a value looks like an image of 8 bits."""
+    """Return whether a value looks like an 8-bit image."""
     return (
         isinstance(value, np.ndarray)
         and value.dtype == np.uint8
@@ -32,7 +32,7 @@ def is_picture(value: object) -> bool:
 
 
 def smaller(image: Pixels, longest: int) -> Pixels:
-    """Give a copy whose longer side is not longer; each of its pixels is the mean of a square of the image's."""
+    """Return a copy whose longer side is at most `longest`; each of its pixels is the mean of a square of pixels."""
     step = -(-max(image.shape[:2]) // longest)
     if step == 1:
         return image.copy()
@@ -47,13 +47,13 @@ def smaller(image: Pixels, longest: int) -> Pixels:
 
 
 def png(image: Pixels) -> bytes:
-    """Encode an image of 8 bits; colours are in the order blue, green, red, as everywhere in hfg."""
+    """Encode an 8-bit image; colours are in the order blue, green, red, as everywhere in hfg."""
     channels = 1 if image.ndim == 2 else image.shape[2]
     if channels >= 3:
         image = image[..., [2, 1, 0, 3][:channels]]
     height, width = image.shape[:2]
     rows = np.ascontiguousarray(image).reshape(height, width * channels)
-    # Each row as its difference to the one above, which is small in pictures: PNG's filter 2.
+    # Each row is stored as its difference to the one above, which is small in pictures: PNG's filter 2.
     lines = np.empty((height, width * channels + 1), np.uint8)
     lines[:, 0] = 2
     lines[0, 1:] = rows[0]

@@ -1,7 +1,7 @@
-"""What users put on a page themselves: sections with text, tables, pictures, videos and drawings of their graphs.
+"""Contents that users add to a page: sections with text, tables, pictures, videos and drawings of their graphs.
 
-Everything is turned into HTML when it is added: what is wrong is told to whoever adds it, and a file may be gone
-afterwards. Names and texts are escaped; pictures and videos are data within the page. Stands on `pictures` and the
+Everything is turned into HTML when it is added. So errors are raised in the call that adds it, and files may be deleted
+afterwards. Names and texts are escaped; pictures and videos are embedded in the page. Depends on `pictures` and the
 drawing.
 """
 
@@ -25,30 +25,30 @@ __all__ = ["Sections"]
 
 _PICTURES: Final = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".gif": "gif", ".webp": "webp", ".svg": "svg+xml"}
 _VIDEOS: Final = {".webm": "webm", ".mp4": "mp4", ".ogv": "ogg"}
-_MOST_BYTES: Final = 64 * 2**20  # of a file: pages with more than that open slowly
+_MOST_BYTES: Final = 64 * 2**20  # bytes of a file: pages with more open slowly
 
 
 class Sections:
-    """Sections in the order in which they were first named; `RunPage` says what its methods take."""
+    """Sections in the order in which they were first named; `RunPage` documents the arguments of the methods."""
 
     def __init__(self, title: str) -> None:
-        """`title` says whose page it is, for errors."""
+        """`title` names the page, for error messages."""
         self._title = title
         self._parts: dict[str, list[str]] = {}
 
     def add_text(self, section: str, text: str) -> None:
-        """Add paragraphs, which are separated by empty lines."""
+        """Add paragraphs, separated by empty lines."""
         self._need_text("text", text)
         for paragraph in text.split("\n\n"):
             self._add(section, f"<p>{escaped(paragraph)}</p>\n")
 
     def add_table(self, section: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-        """Add a table that its reader can sort."""
+        """Add a table that readers can sort."""
         rows = [tuple(row) for row in rows]
         for row in rows:
             if len(row) != len(heads):
                 raise UsageError(
-                    f"{self._title}: a row has as many cells as the table has heads, {len(heads)}, got {row!r:.80}"
+                    f"{self._title}: a row needs as many cells as the table has heads, {len(heads)}, got {row!r:.80}"
                 )
         numbers = [all(_is_number(row[column]) for row in rows) and bool(rows) for column in range(len(heads))]
         text = ['<div class="table"><table><thead><tr>']
@@ -68,7 +68,7 @@ class Sections:
         self._add(section, "".join(text))
 
     def add_picture(self, section: str, picture: object, *, caption: str = "", at_s: float | None = None) -> None:
-        """Add pixels, the text of a drawing in SVG, or a file."""
+        """Add pixels, the text of an SVG drawing, or a file."""
         self._need_text("caption", caption)
         if isinstance(picture, str) and picture.lstrip().startswith("<"):
             kind, data = "svg+xml", picture.encode("utf-8", "replace")
@@ -81,7 +81,7 @@ class Sections:
                 f" of shape {picture.shape} and type {picture.dtype}" if isinstance(picture, np.ndarray) else ""
             )
             raise UsageError(
-                f"{self._title}: a picture is an image of 8 bits, the text of an SVG drawing or a file, got "
+                f"{self._title}: a picture must be an 8-bit image, the text of an SVG drawing or a file, got "
                 f"{type(picture).__name__}{kind_of_array}"
             )
         time = ""
@@ -104,12 +104,12 @@ class Sections:
         starts_s: float = 0.0,
         speed: float = 1.0,
     ) -> None:
-        """Add a video; the clock of the page and that of the video move each other."""
+        """Add a video. The page's clock and the video follow each other."""
         self._need_text("caption", caption)
         self._need_number("starts_s", starts_s)
         self._need_number("speed", speed)
         if speed <= 0:
-            raise UsageError(f"{self._title}: speed= of a video is above 0, got {speed!r}")
+            raise UsageError(f"{self._title}: speed= of a video must be above 0, got {speed!r}")
         kind, data = self._read(Path(file), _VIDEOS)
         says = escaped(caption)
         self._add(
@@ -122,13 +122,13 @@ class Sections:
     def add_drawing(
         self, section: str, graph: Graph, *, caption: str = "", depth: int | None = None, fold: Iterable[str] = ()
     ) -> None:
-        """Add the drawing of a graph, or of a subgraph's inside; who is active in it follows the clock of the page."""
+        """Add the drawing of a graph, or of a subgraph's inside; active nodes are marked as of the page's clock."""
         self._need_text("caption", caption)
         drawn = graph.draw(format="svg", active=(), depth=depth, fold=fold)
         self._add(section, f'<div class="picture">{drawn}</div>\n<p class="caption">{escaped(caption)}</p>\n')
 
     def sections(self) -> list[str]:
-        """Give them as HTML."""
+        """Return the sections as HTML."""
         found = []
         for name, parts in self._parts.items():
             found += [f'<section class="own"><h2>{escaped(name)}</h2>\n', *_in_galleries(parts), "</section>\n"]
@@ -150,22 +150,22 @@ class Sections:
             raise UsageError(f'{self._title}: "{file}" cannot be read: {said}') from error
         if size > _MOST_BYTES:
             raise UsageError(
-                f'{self._title}: "{file}" has {size / 2**20:.0f} MB, more than the {_MOST_BYTES // 2**20} that a page '
-                f"takes of one; name it in a text instead"
+                f'{self._title}: "{file}" has {size / 2**20:.0f} MB, but a page takes at most '
+                f"{_MOST_BYTES // 2**20} MB per file; mention its name in a text instead"
             )
         return kind, data
 
     def _need_text(self, name: str, value: object) -> None:
         if not isinstance(value, str):
-            raise UsageError(f"{self._title}: {name} is a text, got {value!r:.80}")
+            raise UsageError(f"{self._title}: {name} must be a string, got {value!r:.80}")
 
     def _need_number(self, name: str, value: object) -> None:
         if not _is_number(value) or not math.isfinite(value):
-            raise UsageError(f"{self._title}: {name}= is a number of seconds, got {value!r:.80}")
+            raise UsageError(f"{self._title}: {name}= must be a number of seconds, got {value!r:.80}")
 
 
 def _in_galleries(parts: list[str]) -> list[str]:
-    """Put pictures that follow one another side by side."""
+    """Put consecutive pictures side by side."""
     found, within = [], False
     for part in parts:
         picture = part.startswith(("<figure>", "<figure data-time"))

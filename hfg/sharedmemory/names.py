@@ -1,9 +1,9 @@
-"""What segments are called, how they are opened, and how those are found whose producer is dead. Stands on errors.
+"""Names of segments, how to open them, and how to find those whose producer is dead. Depends on errors.
 
-Segments are files in /dev/shm and no more: the standard library's `SharedMemory` has a process of its own that removes
-segments when a process ends that has only read them, and forgets them when all are killed. A producer holds a lock on
-its segment for as long as it lives; the kernel lets go of it, whatever has ended the process. So whoever can lock a
-segment knows that nobody needs it any more.
+Segments are plain files in /dev/shm. We do not use the standard library's `SharedMemory` because its tracker process
+removes segments when a process that has only read them ends, and forgets them when all processes are killed. A producer
+holds a lock on its segment for as long as it lives; the kernel releases it however the process ends. So a process that
+can lock a segment knows that its producer is dead.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LARGEST: Final = 2**36
 
 
 def unavailable() -> str | None:
-    """Say why there is no shared memory here, or None if there is."""
+    """Return why there is no shared memory here, or None if there is."""
     if sys.platform != "linux":
         return f"shared memory between processes needs Linux, and this is {sys.platform}: arrays are copied"
     if not os.access(_FOLDER, os.W_OK):
@@ -40,19 +40,19 @@ def unavailable() -> str | None:
 
 
 def segment_prefix(realm: str, agent: str, incarnation: int) -> str:
-    """Give how the names of all segments begin that processes of an agent's incarnation make.
+    """Return the common prefix of the names of all segments made by processes of an agent's incarnation.
 
     Raises:
-      SharedMemoryError: a part of it has other characters than letters, digits and "_".
+      SharedMemoryError: a part of it has characters other than letters, digits and "_".
     """
     return "-".join(["hfg", *(_part(one) for one in (realm, agent, str(incarnation)))]) + "-"
 
 
 def segment_name(realm: str, agent: str, incarnation: int, output: str) -> str:
-    """Give the name of the segment of one output.
+    """Return the name of the segment of one output.
 
     Raises:
-      SharedMemoryError: a part of it has other characters than letters, digits and "_".
+      SharedMemoryError: a part of it has characters other than letters, digits and "_".
 
     Examples:
       >>> segment_name("robots", "arm", 3, "camera_image")
@@ -71,12 +71,12 @@ def _part(text: str) -> str:
 
 def _path(name: str) -> Path:
     if not _NAME.fullmatch(name):
-        raise SharedMemoryError(f"{name!r:.120} is no name of shared memory of hfg, so it is not opened")
+        raise SharedMemoryError(f"{name!r:.120} is not a name of shared memory of hfg, so it is not opened")
     return _FOLDER / name
 
 
 def create(name: str, size: int) -> int:
-    """Make a segment of zeros that nobody else has, and lock it; give its descriptor.
+    """Make a new segment of zeros and lock it. Return its descriptor.
 
     Raises:
       SharedMemoryError: there is one of that name, or no room.
@@ -92,15 +92,15 @@ def create(name: str, size: int) -> int:
             file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
         except FileExistsError:
             raise SharedMemoryError(
-                f'there is shared memory named "{name}" already: each output of each incarnation needs its own name; '
-                "sweep what was left behind"
+                f'shared memory named "{name}" already exists: each output of each incarnation needs its own '
+                "name; sweep the remains of earlier runs"
             ) from None
-        fcntl.flock(file, fcntl.LOCK_EX)  # only who sweeps could hold it, and not for long
+        fcntl.flock(file, fcntl.LOCK_EX)  # only a sweep could hold it, and not for long
         if os.fstat(file).st_nlink:
             break
-        os.close(file)  # somebody swept it between the two lines above
+        os.close(file)  # a sweep removed it between the two lines above
     try:
-        os.posix_fallocate(file, 0, size)  # else a write would kill the process when there is no room
+        os.posix_fallocate(file, 0, size)  # without this, a write would kill the process when there is no room
     except OSError as error:
         os.close(file)
         remove(name)
@@ -118,12 +118,12 @@ def _full(name: str, size: int, room: int) -> SharedMemoryError:
 
 
 def open_existing(name: str, *, writable: bool) -> tuple[int, int]:
-    """Open a segment of this user's; give its descriptor and size.
+    """Open a segment of this user. Return its descriptor and size.
 
     Raises:
-      SharedMemoryError: there is none, or it is another's.
+      SharedMemoryError: it does not exist, or belongs to another user.
     """
-    # Without O_NONBLOCK, opening a FIFO that another user has made under this name would wait for ever.
+    # Without O_NONBLOCK, opening a FIFO that another user has made under this name would wait forever.
     flags = (os.O_RDWR if writable else os.O_RDONLY) | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
     try:
         file = os.open(_path(name), flags)
@@ -133,28 +133,28 @@ def open_existing(name: str, *, writable: bool) -> tuple[int, int]:
     found = os.fstat(file)
     if not stat.S_ISREG(found.st_mode) or found.st_uid != os.geteuid():
         os.close(file)
-        raise SharedMemoryError(f'shared memory "{name}" belongs to somebody else, so it is not opened')
+        raise SharedMemoryError(f'shared memory "{name}" belongs to another user, so it is not opened')
     return file, found.st_size
 
 
 def remove(name: str) -> None:
-    """Remove a segment's name; who has mapped it keeps it."""
+    """Remove a segment's name; processes that have mapped it keep it."""
     with contextlib.suppress(FileNotFoundError):
         _path(name).unlink()
 
 
 def sweep(prefix: str = "hfg-") -> list[str]:
-    """Remove the segments whose names begin so and whose producers are dead, however these ended; give the names.
+    """Remove the segments with this prefix whose producers are dead, however they ended. Return their names.
 
     Args:
-      prefix: what `segment_prefix` gives, or the beginning of it.
+      prefix: the result of `segment_prefix`, or the beginning of it.
 
     Raises:
-      SharedMemoryError: the prefix is not one of hfg's.
+      SharedMemoryError: it is not a prefix of hfg's names.
     """
     if not prefix.startswith("hfg-"):
         raise SharedMemoryError(
-            f'{prefix!r:.60} is no prefix of names of shared memory of hfg, which begin with "hfg-"'
+            f'{prefix!r:.60} is not a prefix of names of shared memory of hfg, which begin with "hfg-"'
         )
     if unavailable() is not None:
         return []

@@ -1,6 +1,6 @@
-"""The producer's side of a ring: loans slots, puts arrays into them, and knows when one is free again.
+"""The producer's side of a ring: loans slots, puts arrays into them, and keeps track of free slots.
 
-Stands on `names` and `layout`.
+Depends on `names` and `layout`.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from hfg.sharedmemory.names import create, remove
 __all__ = ["Ring", "RingCounts"]
 
 _SMALLEST: Final = 2**16
-"""Below that a copy costs less than a lease."""
+"""Below this size a copy is cheaper than a lease."""
 
 
 class RingCounts(msgspec.Struct):
-    """What became of the arrays.
+    """Counts of arrays by how they were sent.
 
     Attributes:
-      loaned: slots that were loaned to be written to.
-      placed: arrays that were sent by a lease.
-      copied: those of them that had to be copied into a slot first, for nobody had loaned it.
+      loaned: slots that were loaned for writing.
+      placed: arrays that were sent with a lease.
+      copied: placed arrays that had to be copied into a slot first because they were not in a loaned slot.
       without_slot: arrays that went the ordinary way because no slot was free.
       too_large: arrays that went the ordinary way because no slot is large enough.
     """
@@ -46,12 +46,12 @@ class RingCounts(msgspec.Struct):
 
 
 class _Slot:
-    """One slot, as its producer knows it.
+    """The producer's state of one slot.
 
     Attributes:
-      generation: what lies in it now; leases of others are of no use.
-      sendings: that are not done.
-      is_viewed: by an array of this process.
+      generation: the generation of its current array; leases of other generations are invalid.
+      sendings: number of sendings that are not acknowledged.
+      is_viewed: whether an array of this process uses it.
     """
 
     __slots__ = ("generation", "is_viewed", "sendings")
@@ -62,25 +62,25 @@ class _Slot:
         self.is_viewed = False
 
     def renew(self) -> int:
-        """Something else will lie in it; give its generation."""
+        """Start the next generation, for other contents. Return it."""
         self.generation += 1
         return self.generation
 
     def view(self, viewed: bool) -> None:
-        """An array of this process lies there now, or is gone."""
+        """Set whether an array of this process uses it."""
         self.is_viewed = viewed
 
     def sent(self) -> None:
-        """What lies in it goes to consumers, once more."""
+        """Count one more sending of its array to consumers."""
         self.sendings += 1
 
     def done(self) -> None:
-        """One of those is done with everywhere."""
+        """Count one sending as acknowledged by all consumers."""
         self.sendings -= 1
 
 
 class _Lane:
-    """What one consumer has taken and given back."""
+    """The generations that one consumer has taken and returned."""
 
     def __init__(self, name: str, slots: int) -> None:
         self.name = name
@@ -101,19 +101,19 @@ class Ring:
     """Slots in shared memory for the arrays of one output.
 
     Args:
-      name: of the segment, as `segment_name` gives it.
-      slots: how many arrays may be on their way or looked at by consumers at the same time.
-      slot_size: bytes of the largest array.
-      smallest: bytes below which arrays are not placed.
+      name: name of the segment, from `segment_name`.
+      slots: how many arrays may be in transit or in use by consumers at the same time.
+      slot_size: size of the largest array in bytes.
+      smallest: size below which arrays are not placed, in bytes.
 
     Raises:
-      SharedMemoryError: there is no shared memory, no room in it, or one of that name.
+      SharedMemoryError: there is no shared memory, no room in it, or a segment of that name already exists.
 
     Examples:
       >>> from hfg.sharedmemory import segment_name
       >>> ring = Ring(segment_name("docs", "here", os.getpid(), "image"), slots=2, slot_size=2**20)
       >>> image = ring.loan((480, 640), np.uint8)
-      >>> image[:] = 7  # straight into shared memory
+      >>> image[:] = 7  # directly into shared memory
       >>> lease = ring.place(image)
       >>> ring.free
       1
@@ -134,12 +134,13 @@ class Ring:
         self.smallest = smallest
         self.counts = RingCounts()
         size = segment_size(slots, self.slot_size)
-        self._file = create(name, size)  # kept open: its lock says that the producer lives
+        self._file = create(name, size)  # kept open: its lock shows that the producer is alive
         self._mapped = mmap.mmap(self._file, size)
         self._generations = memoryview(self._mapped)[WORDS : WORDS + 8 * slots].cast("Q")
         self._slots = [_Slot() for _ in range(slots)]
         self._next = 0
-        self._turns = threading.RLock()  # nodes of thread groups loan while the loop sends; the same thread may collect
+        # nodes of thread groups loan while the loop sends; garbage collection may re-enter it in the same thread
+        self._turns = threading.RLock()
         self._loans: dict[int, tuple[int, int]] = {}  # by id of the array: slot and address
         self._lanes: dict[int, _Lane] = {}
         self._admitted = 0
@@ -148,7 +149,7 @@ class Ring:
 
     @property
     def free(self) -> int:
-        """How many slots are free: these are the credits."""
+        """Number of free slots: these are the credits."""
         return sum(self._is_free(number) for number in range(len(self._slots)))
 
     def _is_free(self, number: int) -> bool:
@@ -160,7 +161,7 @@ class Ring:
     # --- consumers ---
 
     def admit(self) -> int:
-        """Let a consumer in, or a new incarnation of one; give the number of the lane that it is to open.
+        """Admit a consumer, or a new incarnation of one. Return the number of the lane that it must open.
 
         Raises:
           SharedMemoryError: there is no room.
@@ -171,7 +172,7 @@ class Ring:
         return self._admitted
 
     def dismiss(self, lane: int) -> None:
-        """Take back what a consumer holds, since it is dead; what it still writes reaches nobody."""
+        """Free the slots that a dead consumer holds; anything that it still writes has no effect."""
         found = self._lanes.pop(lane, None)
         if found is not None:
             remove(found.name)
@@ -179,19 +180,19 @@ class Ring:
     # --- arrays ---
 
     def loan(self, shape: tuple[int, ...], dtype: npt.DTypeLike) -> np.ndarray[Any, Any] | None:
-        """Give an array to write to that lies in a slot, or None if no slot is free.
+        """Return a writable array in a slot, or None if no slot is free.
 
-        A loan that is never sent goes back when the array is gone.
+        A loan that is never sent is returned when the array is garbage-collected.
 
         Raises:
-          SharedMemoryError: no array of this shape and dtype can be in a slot.
+          SharedMemoryError: an array of this shape and dtype does not fit into a slot.
         """
         kind = np.dtype(dtype)
         size = math.prod(shape) * kind.itemsize
         if array_problem(kind) is not None or size > self.slot_size:
             raise SharedMemoryError(
-                f"an array of {kind}, {' x '.join(map(str, shape))}, does not fit a slot of {self.slot_size} bytes of "
-                f'"{self.name}"'
+                f"an array of {kind}, {' x '.join(map(str, shape))}, does not fit into a slot of "
+                f'{self.slot_size} bytes of "{self.name}"'
             )
         with self._turns:
             self._must_be_open()
@@ -202,15 +203,16 @@ class Ring:
             return self._array(number, shape, kind)
 
     def _find(self) -> int | None:
-        """Give a free slot a new generation, in turn, so that what was given back last is used last."""
+        """Return a free slot with a new generation, round robin, so that the slot returned last is reused last."""
         for turn in range(len(self._slots)):
             number = (self._next + turn) % len(self._slots)
             if not self._is_free(number):
                 continue
             slot, old = self._slots[number], self._slots[number].generation
             self._generations[number] = slot.renew()
-            # Who takes a slot says so before it looks at the generation, and here it is the other way round: a late
-            # lease is seen by one of the two.
+            # A reader writes that it has taken a slot before it reads the generation; here it is the other way round:
+            # the generation is written first, then the lanes are read. So with a late lease, one of the two sides
+            # notices. If both read before writing, the reader could view a slot while it is overwritten.
             if any(lane.holds(number, old) for lane in self._lanes.values()):
                 continue
             self._next = number + 1
@@ -221,7 +223,7 @@ class Ring:
         made: np.ndarray[Any, Any] = np.ndarray(shape, dtype, self._mapped, PAGE + number * self.slot_size)
         self._slots[number].view(True)
         self._loans[id(made)] = number, _address(made)
-        # All views of it, and views of views, have it as their base, so it is gone when the last of them is.
+        # All views, and views of views, have it as their base, so it is garbage-collected after the last of them.
         weakref.finalize(made, self._forget, id(made), number).atexit = False
         return made
 
@@ -230,10 +232,10 @@ class Ring:
         self._slots[number].view(False)
 
     def place(self, array: np.ndarray[Any, Any]) -> Lease | None:
-        """Give the lease by which consumers view an array; None: it goes the ordinary way, and the counts say why.
+        """Return the lease for consumers of an array; None: it has to be sent as bytes, and the counts have the reason.
 
-        A loaned array, or a contiguous part of one, stays where it is; another is copied into a free slot. It must not
-        be written to any more. Every lease that was given is to be told as `done`.
+        A loaned array, or a contiguous part of one, stays where it is; any other array is copied into a free slot. It
+        must no longer be written to. Call `done` for every lease that was returned.
         """
         with self._turns:
             return self._place(array)
@@ -265,18 +267,18 @@ class Ring:
         return Lease(self.name, number, slot.generation, offset)
 
     def done(self, lease: Lease) -> None:
-        """Say that a token with this lease is done at all consumers, or was given up; views of it may still live.
+        """Record that a token with this lease was acknowledged by all consumers, or dropped; views may still exist.
 
         Raises:
-          UsageError: the lease is not one of those that are still out.
+          UsageError: the lease is not outstanding.
         """
         slot = self._slots[lease.slot] if lease.segment == self.name and lease.slot < len(self._slots) else None
         if slot is None or slot.generation != lease.generation or not slot.sendings:
-            raise UsageError(f'{lease} is no lease of "{self.name}" that is still out')
+            raise UsageError(f'{lease} is not an outstanding lease of "{self.name}"')
         slot.done()
 
     def close(self) -> None:
-        """Remove the segment; arrays and views of it stay readable where they are."""
+        """Remove the segment; arrays and views of it stay readable."""
         with self._turns:
             if self._closed:
                 return

@@ -474,19 +474,19 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "store an object": (
         lambda: encode(object()),
-        "is no data that can be stored; use plain values, arrays, dataclasses",
+        "is not data that can be stored; use plain values, arrays, dataclasses",
     ),
     "read data of code": (
         lambda: decode({"$type": "os:system", "value": ""}),
-        'is of type "os:system", which is no type',
+        'is of type "os:system", which is not a type',
     ),
     "send what has no type": (
         lambda: TokenCodec(dict[str, Any]),
-        "dict[str, Any] cannot cross to another process: Any says nothing of",
+        "dict[str, Any] cannot be sent to another process: Any does not",
     ),
     "send code": (
         lambda: TokenCodec(list[Callable[[], None]]),
-        "is code, and no code crosses; send data that says what to do",
+        "is code, and code cannot be sent; send data that describes what to do",
     ),
     "send another type": (
         lambda: TokenCodec(list[int], what='the value of "a.out"').encode(hfg.Token(["x"])),  # type: ignore[arg-type]
@@ -508,7 +508,7 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: segment_name("lab", "../arm", 1, "image"),
         '"../arm" cannot be part of the name of shared memory: use up to 48 letters, digits',
     ),
-    "sweep everything": (lambda: sweep("/"), "'/' is no prefix of names of shared memory of hfg, which begin with"),
+    "sweep everything": (lambda: sweep("/"), "'/' is not a prefix of names of shared memory of hfg, which begin with"),
     "set a wrong type": (
         running(lambda run, g: run.set(g["count"].ports.parameters["limit"], "x")),
         "parameter \"count.limit\" must be of type int, got 'x'",
@@ -559,16 +559,16 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     "a number as a path": (lambda: build()[3], 'a path is a text such as "fetch/go_to.goal", g'),  # type: ignore[index]
     "report into a folder": (reported("."), 'cannot be written to ".": Is a directory; name a file in a folder that y'),
     "report nowhere": (reported("nowhere/run.html"), "No such file or directory; name a file in a folder that you ca"),
-    "report into 3": (reported(3), 'goes into a file, as in run.report_page("run.html"), got 3'),
+    "report into 3": (reported(3), 'needs a file, as in run.report_page("run.html"), got 3'),
     "report with fewer pictures": (
         reported("x.html", pictures=-1),
-        "pictures= is a whole number from 0 to 1000, got -1",
+        "pictures= must be an integer from 0 to 1000, got -1",
     ),
-    "section 3": (put_on_page(lambda page: page.add_text(3, "x")), "section is a text, got 3"),  # type: ignore[arg-type]
-    "text 3": (put_on_page(lambda page: page.add_text("x", 3)), "text is a text, got 3"),  # type: ignore[arg-type]
+    "section 3": (put_on_page(lambda page: page.add_text(3, "x")), "section must be a string, got 3"),  # type: ignore[arg-type]
+    "text 3": (put_on_page(lambda page: page.add_text("x", 3)), "text must be a string, got 3"),  # type: ignore[arg-type]
     "a row too short": (
         put_on_page(lambda page: page.add_table("x", ("a", "b"), [(1,)])),
-        "a row has as many cells as the table has heads, 2, got (1,)",
+        "a row needs as many cells as the table has heads, 2, got (1,)",
     ),
     "a picture of floats": (
         put_on_page(lambda page: page.add_picture("x", np.zeros((9, 9)))),
@@ -585,7 +585,7 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "a picture at noon": (
         put_on_page(lambda page: page.add_picture("x", "<svg/>", at_s="noon")),  # type: ignore[arg-type]
-        "at_s= is a number of seconds, got 'noon'",
+        "at_s= must be a number of seconds, got 'noon'",
     ),
     "a film": (
         put_on_page(lambda page: page.add_video("x", "film.avi")),
@@ -593,13 +593,13 @@ USES: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "a large film": (
         put_on_page(lambda page: page.add_video("x", "large.webm")),
-        '"large.webm" has 65 MB, more than the 64 that a page takes of one; name it in a text instead',
+        '"large.webm" has 65 MB, but a page takes at most 64 MB per file; mention its name in a text instead',
     ),
     "a film that stands": (
         put_on_page(lambda page: page.add_video("x", "large.webm", speed=0)),
-        "speed= of a video is above 0, got 0",
+        "speed= of a video must be above 0, got 0",
     ),
-    "report with dots": (reported("x.html", picture_size=1), "picture_size= is a whole number from 16 to 4096, got 1"),
+    "report with dots": (reported("x.html", picture_size=1), "picture_size= must be an integer from 16 to 4096, got 1"),
     "draw a pdf": (lambda: build().draw("x.pdf"), 'cannot be drawn into "x.pdf": a drawing ends in .svg or .mmd or .'),
     "draw as a pdf": (lambda: build().draw(format="pdf"), "cannot be drawn into format='pdf': a drawing ends in .svg"),  # type: ignore[arg-type]
     "draw into nothing": (lambda: build().draw("\0.svg"), "embedded null byte; name a file in a folder that you can w"),
@@ -746,7 +746,7 @@ LINES = {
     "check text.txt": "text.txt is no Python file",
     "check steps.py more": "Got unexpected extra argument(s) (more)",
     "run steps.py --clock virtual --report nowhere/x.html": 'cannot be written to "nowhere/x.html": No such file or d',
-    "run steps.py --clock virtual --report x.html --pictures -1": "pictures= is a whole number from 0 to 1000, got -1",
+    "run steps.py --clock virtual --report x.html --pictures -1": "pictures= must be an integer from 0 to 1000, got -1",
     "draw steps.py x.pdf": 'graph "steps" cannot be drawn into "x.pdf": a drawing ends in .svg or .mmd or .dot',
     "draw steps.py x": 'graph "steps" cannot be drawn into "x": a drawing ends in .svg or .mmd or .dot; rename',
     "draw steps.py --format pdf": "Invalid value for '--format': 'pdf' is not one of 'svg', 'mmd', 'dot'",

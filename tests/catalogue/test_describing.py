@@ -114,7 +114,7 @@ def test_a_class_has_ports_of_all_kinds() -> None:
 def test_what_is_not_documented_is_named_with_what_to_write() -> None:
     where = f"{__name__}:Door"
     assert undocumented(describe_type(Door)) == [
-        f'{where}: nothing is said of its slot "move"; add an entry to Attributes: in its docstring'
+        f'{where}: its slot "move" is not documented; add an entry to Attributes: in its docstring'
     ]
 
     @hfg.node
@@ -122,8 +122,8 @@ def test_what_is_not_documented_is_named_with_what_to_write() -> None:
         return value
 
     assert [line.partition(": ")[2].partition(";")[0] for line in undocumented(describe_type(bare))[1:]] == [
-        'nothing is said of its input "value"',
-        'nothing is said of its output "out"',
+        'its input "value" is not documented',
+        'its output "out" is not documented',
     ]
     assert "has no docstring" in undocumented(describe_type(bare))[0]
 

@@ -107,11 +107,11 @@ def test_a_module_may_make_its_types_when_asked(install: Install) -> None:
         ("bad_nodes", "1 / 0", 'bad_nodes, which the entry point "bad" of bad names, cannot be imported: ZeroDivis'),
         ("bad_nodes", "import no_such_thing", 'needs the module "no_such_thing", which is not installed'),
         ("bad_nodes", "def", "SyntaxError"),
-        ("bad_nodes", "raise SystemExit(3)", "left the program as it was imported"),
+        ("bad_nodes", "raise SystemExit(3)", "called sys.exit when it was imported"),
         ("bad_nodes", "import hfg\n@hfg.node\ndef f(x): ...", 'argument "x" has no annotation'),
-        ("bad_nodes", "def __node_types__(): return [3]", "__node_types__() gives 3, which is no node type"),
+        ("bad_nodes", "def __node_types__(): return [3]", "__node_types__() returned 3, which is not a node type"),
         ("bad_nodes:nothing", "", "names bad_nodes:nothing, which has no such name"),
-        ("bad_nodes:some", "some = 3", "names bad_nodes:some, which is no node type and no module"),
+        ("bad_nodes:some", "some = 3", "names bad_nodes:some, which is neither a node type nor a module"),
     ],
 )
 def test_a_broken_plug_in_is_told_in_a_sentence_and_stops_nobody(

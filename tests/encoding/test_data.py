@@ -138,7 +138,7 @@ def test_any_data_comes_back_unchanged_from_json(value: Any) -> None:
     [
         ({"x": "a"}, Pose, "the value.x must be float, got 'a'"),
         ({"x": 1, "z": 2}, Pose, "the value has no 'z': Pose has x, mode, file"),
-        ({}, Pose, "the value is no Pose (TypeError: Pose.__init__() missing 1 required"),
+        ({}, Pose, "the value is not Pose (TypeError: Pose.__init__() missing 1 required"),
         ([1, "a"], list[int], "the value[1] must be int, got 'a'"),
         ({"poses": [{"x": 1.0}, {"x": None}]}, Plan, "the value.poses[1].x must be float, got None"),
         ("SLOW", Mode, "the value must be Mode, one of FAST, GOOD, got 'SLOW'"),
@@ -153,16 +153,24 @@ def test_any_data_comes_back_unchanged_from_json(value: Any) -> None:
         ("yes", bool, "the value must be bool, got 'yes'"),
         ("?", bytes, "the value must be bytes, got '?'"),
         ([[1, 2]], dict[str, int], "the value, key 1 must be str, got 1"),
-        ([[[], 2]], dict[Any, int], "the value has a key that cannot be one"),
-        ([[]], set[Any], "the value has a member that cannot be one"),
-        ({"$type": "os:system", "value": "true"}, Any, 'the value is of type "os:system", which is no type of data'),
+        ([[[], 2]], dict[Any, int], "the value has an invalid key"),
+        ([[]], set[Any], "the value has an invalid member"),
+        ({"$type": "os:system", "value": "true"}, Any, 'the value is of type "os:system", which is not a type of data'),
         ({"$type": "no_such:X", "value": 1}, Any, '"no_such:X": importing "no_such" failed (ModuleNotFoundError'),
-        ({"$type": 3}, Any, 'the value has "$type" but does not say of which type which "value" is'),
-        ({"$type": "array", "dtype": "O", "value": []}, Any, "the value is no array (an array of object is no data)"),
-        ({"$type": "array", "dtype": "U99999999", "value": ["a"]}, Any, "the value is no array (an array of <U9999999"),
-        ({"$type": "array", "shape": [3], "value": [1.0]}, Any, "the value is no array (cannot reshape array"),
+        ({"$type": 3}, Any, 'the value has "$type" but does not state the type of its "value",'),
+        (
+            {"$type": "array", "dtype": "O", "value": []},
+            Any,
+            "the value is not an array (an array of object is not data)",
+        ),
+        (
+            {"$type": "array", "dtype": "U99999999", "value": ["a"]},
+            Any,
+            "the value is not an array (an array of <U9999999",
+        ),
+        ({"$type": "array", "shape": [3], "value": [1.0]}, Any, "the value is not an array (cannot reshape array"),
         ("json:nothing", Callable[[], None], '"json:nothing": module "json" has no "nothing"'),
-        ("json", Callable[[], None], "'json' is no reference; write \"module:name\""),
+        ("json", Callable[[], None], "'json' is not a reference; write \"module:name\""),
     ],
 )
 def test_data_that_is_no_value_of_the_type_is_refused_with_its_place(data: Any, hint: Any, wrong: str) -> None:
@@ -200,9 +208,9 @@ def test_whatever_the_data_is_it_is_a_value_or_refused(hint: Any) -> None:
 @pytest.mark.parametrize(
     ("value", "wrong"),
     [
-        (fractions.Fraction(1, 2), "Fraction: Fraction(1, 2) is no data that can be stored; use plain values"),
+        (fractions.Fraction(1, 2), "Fraction: Fraction(1, 2) is not data that can be stored; use plain values"),
         (lambda: 1, "cannot be found by a name, so it cannot be stored; define it in a module"),
-        (np.array([object()]), "an array of object, 1 cannot be stored; numbers, truth values and texts can"),
+        (np.array([object()]), "an array of object, 1 cannot be stored; numbers, booleans and strings can"),
     ],
 )
 def test_what_is_no_data_is_refused(value: Any, wrong: str) -> None:
@@ -221,7 +229,7 @@ def test_what_contains_itself_is_refused() -> None:
 
 
 def test_a_value_of_another_type_is_refused() -> None:
-    with pytest.raises(EncodingError, match="int: 3 is no str, so it cannot be stored as one"):
+    with pytest.raises(EncodingError, match="int: 3 is not str, so it cannot be stored as one"):
         encode(3, str)
 
 

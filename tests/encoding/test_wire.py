@@ -274,16 +274,23 @@ def test_arrays_that_arrive_are_read_only_views_of_the_frame() -> None:
 
 
 CANNOT: list[tuple[Any, str]] = [
-    (Any, "Any cannot cross to another process: it says nothing of its values; name their type"),
-    (object, "object cannot cross to another process: it says nothing of its values; name their type"),
-    (list, "list cannot cross to another process: it does not say what it holds; write list[...] with a type"),
+    (Any, "Any cannot be sent to another process: it does not describe its values; name their type"),
+    (object, "object cannot be sent to another process: it does not describe its values; name their type"),
+    (list, "list cannot be sent to another process: it does not declare its items; write list[...] with a type"),
     (
         list[Callable[[int], int]],
-        "list[Callable[[int], int]] cannot cross to another process: Callable[[int], int] is code, and no code "
-        "crosses; send data that says what to do",
+        "list[Callable[[int], int]] cannot be sent to another process: Callable[[int], int] is code, and code "
+        "cannot be sent; send data that describes what to do",
     ),
-    (type, "type cannot cross to another process: it is code, and no code crosses; send data that says what to do"),
-    (dict[str, Any], "dict[str, Any] cannot cross to another process: Any says nothing of its values; name their type"),
+    (
+        type,
+        "type cannot be sent to another process: it is code, and code cannot be sent; send data that describes "
+        "what to do",
+    ),
+    (
+        dict[str, Any],
+        "dict[str, Any] cannot be sent to another process: Any does not describe its values; name their type",
+    ),
 ]
 
 
@@ -322,16 +329,16 @@ class Lost:
 @pytest.mark.parametrize(
     ("hint", "words"),
     [
-        (list[Holds], "its part Holds.what is object, which says nothing of its values"),
+        (list[Holds], "its part Holds.what is object, which does not describe its values"),
         (Takes, "takes arguments that it does not keep (InitVar)"),
-        (Lost, "has fields whose types cannot be found"),
-        (Iterator[int], "is no data that hfg can carry"),
-        (Zone, "is no data that hfg can carry"),
-        (Box, "says nothing of its values"),
-        (np.floating, "is of no one size"),
-        (np.longdouble, "is of no one size"),
-        (np.void, "is of no one size"),
-        (T, "says nothing of its values"),
+        (Lost, "has fields whose types cannot be resolved"),
+        (Iterator[int], "is not data that hfg can send;"),
+        (Zone, "is not data that hfg can send;"),
+        (Box, "does not describe its values"),
+        (np.floating, "has no fixed size"),
+        (np.longdouble, "has no fixed size"),
+        (np.void, "has no fixed size"),
+        (T, "does not describe its values"),
     ],
 )
 def test_the_part_that_cannot_cross_is_named(hint: Any, words: str) -> None:
@@ -368,7 +375,7 @@ class Poses(list[Pose]):
         (Array, np.array([object()]), "that another process could read"),
         (Array, np.zeros(2, "i4,f4"), "that another process could read"),
         (Array, np.ma.zeros(2), "send numpy.asarray(...) of it"),
-        (str, "\ud800", "a text in it is no Unicode"),
+        (str, "\ud800", "a string in it is not valid Unicode"),
         (Settings, {"name": "n"}, "expected Settings"),
         (int | str, 1.5, "expected int | str"),
         (Sides | Mode, 3, "expected Sides | Mode"),
@@ -393,7 +400,7 @@ def test_a_class_checks_what_it_holds_on_arrival_too() -> None:
     angle = Angle(1.0)
     angle.degrees = 1e9  # which Angle would not take
     codec = TokenCodec[Any](Angle)
-    with pytest.raises(EncodingError, match=r"refused on arrival: it is no Angle \(ValueError: too far\)"):
+    with pytest.raises(EncodingError, match=r"refused on arrival: it is not Angle \(ValueError: too far\)"):
         codec.decode(*codec.encode(Token(angle)))
 
 
@@ -463,7 +470,7 @@ def test_what_is_no_description_is_refused(data: Any) -> None:
         try:
             assert difference(hint, json.dumps(data)) is not None
         except EncodingError as error:
-            assert "does not say its type" in str(error)  # noqa: PT017
+            assert "cannot read the other end's description of its type" in str(error)  # noqa: PT017
 
 
 def test_a_codec_is_made_once_for_each_type() -> None:

@@ -271,7 +271,7 @@ def test_what_is_left_out_is_on_the_page(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr("hfg.reporting.observing.MOST_ERRORS", 2)
     monkeypatch.setattr("hfg.reporting.html._MOST_ROWS", 1)
     page = page_of(seen(mission()), tmp_path / "run.html")
-    assert "<li>3 more errors behind the first 2</li>" in page
+    assert "<li>3 more errors after the first 2</li>" in page
     assert "<li>the table of nodes has the first 1 of 6</li>" in page
 
 
@@ -320,11 +320,13 @@ def test_a_large_graph_is_drawn_folded_and_one_that_is_too_large_not_at_all(
     monkeypatch.setattr("hfg.reporting.html._MOST_DRAWN", 3)
     graph = mission()
     graph.add(Part(), name="other", enabled=False)
-    assert "<li>the drawing, for the graph has 4 nodes; graph.draw makes it</li>" in page_of(graph, tmp_path / "a.html")
+    assert "<li>the drawing, because the graph has 4 nodes; graph.draw makes it</li>" in page_of(
+        graph, tmp_path / "a.html"
+    )
     monkeypatch.setattr("hfg.reporting.html._MOST_DRAWN", 4)
     graph["other"].graph.add(State(), name="more")
     page = page_of(graph, tmp_path / "b.html")
-    assert "<li>what lies in subgraphs, for it is 5 nodes in all</li>" in page
+    assert "<li>the insides of subgraphs, because there are 5 nodes in all</li>" in page
     assert 'data-path="part"' in page
     assert 'data-path="part/inner"' not in page
 
@@ -341,4 +343,4 @@ def test_a_graph_that_was_edited_is_drawn_as_it_is_in_the_end(tmp_path: Path) ->
         runner.run(main())
     page = (tmp_path / "run.html").read_text(encoding="utf-8")
     assert 'data-path="goal"' in page
-    assert "<li>the graph was changed once; the drawing shows it as it was in the end</li>" in page
+    assert "<li>the graph was changed once; the drawing shows its final state</li>" in page

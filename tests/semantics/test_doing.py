@@ -672,7 +672,7 @@ def test_descriptions_and_drawings_show_it() -> None:
     assert (event.name, event.type, event.doc) == (
         "completed",
         "str",
-        "The do-activity has returned; with the returned value.",
+        "The do-activity has returned; with its result.",
     )
     graph = hfg.Graph()
     graph.add(Lasting(), name="node")
