@@ -14,7 +14,7 @@ RESULTS := benchmarks/results
 PEERS   := .venv-peers
 
 .DEFAULT_GOAL := help
-.PHONY: help demo photographs test lint bench peers bench-peers bench-goals bench-docs bench-links docs-nodes soak setup clean
+.PHONY: help demo photographs test lint bench peers bench-peers bench-goals bench-docs bench-links docs docs-nodes docs-drawings docs-mermaid soak setup clean
 
 help:
 	@echo "make demo    a robot fetches and delivers cubes; score, video and report in out/fetch_delivery, in less than 3 minutes"
@@ -23,8 +23,10 @@ help:
 	@echo "make lint    ruff, mypy and the check of our English"
 	@echo "make bench   run the benchmarks (bench-peers: beside other libraries; bench-docs: into docs/speed.md;"
 	@echo "             bench-goals: what is to be reached, and whether it is; bench-links: from process to process)"
+	@echo "make docs    build the documentation as a site in build/site"
 	@echo "make docs-nodes   write docs/nodes from the docstrings of the library"
 	@echo "make docs-drawings   draw the graphs in README and docs anew"
+	@echo "make docs-mermaid   draw the Mermaid diagrams in docs for the site; needs Chromium and npm"
 	@echo "make soak    run the tests that take minutes"
 	@echo "make clean   remove .venv and everything tools have left"
 
@@ -68,6 +70,15 @@ bench-links: peers
 
 bench-docs: $(READY)
 	$(BIN)/python -m benchmarks.page $(RESULTS)
+
+# The site has tools of its own, which nothing else needs.
+docs: $(READY)
+	@$(BIN)/python -c 'import zensical, mkdocstrings' 2>/dev/null || \
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(BIN)/python tools/build_docs.py
+
+docs-mermaid: $(READY)
+	$(BIN)/python -m tools.draw_mermaid
 
 docs-drawings: $(READY)
 	HFG_REDRAW=1 $(BIN)/python -m pytest -q tests/test_drawings.py
