@@ -47,6 +47,6 @@ def caption(records: Records) -> str:
     clock = f"; the clock ran {disturbed:.2f} times the processor time" if ratios else ""
     busy = disturbed > MOST_DISTURBED or first.load[0] > MOST_LOAD
     return (
-        f"*{measured_on(first)}{clock}; fresh processes a case: {len(first.values)}; "
+        f"*{measured_on(first)}{clock}; fresh processes per case: {len(first.values)}; "
         f"spread {statistics.median(spreads):.0%} in the median, {spreads[-1]:.0%} at worst.*"
     ) + (WARNING if busy else "")
