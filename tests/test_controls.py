@@ -15,11 +15,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hfg
-from hfg.base.controls import escaped
+from hfg.base.controls import cleaned, escaped
 from hfg.cli import show
 from hfg.cli.app import main
 from hfg.errors import FileError, GraphError
+from hfg.links.offers import introduce, read_introduction
 from hfg.nodes.display import TextDisplay
+from hfg.parts.model.failing import as_error
+from hfg.parts.model.messages import Failed
 from hfg.testing import fire
 from hfg.testing.nodes import double
 
@@ -33,6 +36,22 @@ CLI = Path(__file__).resolve().parent.parent / "hfg" / "cli"
 def test_what_steers_is_written_out_and_letters_stay() -> None:
     assert escaped("a\x1b[2J\n\tb\u202e\x7f") == "a\\x1b[2J\n\tb\\u202e\\u007f"
     assert escaped("Füße, 目標, 👩‍🚀, עברית") == "Füße, 目標, 👩‍🚀, עברית"
+
+
+def test_words_of_other_programs_are_cleaned_where_they_are_decoded() -> None:
+    """Programs log them and raise errors that contain them, so the command's own output is not the only place."""
+    evil = EVIL.replace("\udc80", "")  # which no message can have
+    heard = read_introduction(introduce(int, evil, lossless=True))
+    assert heard is not None
+    assert heard.who == escaped(evil)
+    error = as_error(Failed("NodeError", EVIL, EVIL, EVIL, EVIL), "another process")
+    assert not RAW.search("".join(map(str, (error, *error.__notes__))))
+
+
+def test_cleaning_keeps_what_is_not_text() -> None:
+    said = ([EVIL, 1], {EVIL: (b"\x1b", None)}, 2.5)
+    clean = escaped(EVIL)
+    assert cleaned(said) == ([clean, 1], {clean: (b"\x1b", None)}, 2.5)
 
 
 @given(st.text(st.characters(exclude_categories=[]), max_size=40))

@@ -104,11 +104,10 @@ def record(
 
 
 def told(recording: Recording) -> int:
-    """Say what came of a recording; gives the exit code."""
+    """Report the result of a recording; returns the exit code."""
     if recording.error is not None:
-        show.sentence(
-            f"the recording in {recording.path} is not whole: {_why(recording.error)}; it opens up to its last chunk"
-        )
+        readable = "it opens up to its last chunk" if recording.chunks_written else "nothing in it can be read"
+        show.sentence(f"the recording in {recording.path} is not whole: {_why(recording.error)}; {readable}")
         return 1
     size = recording.bytes_written
     shown = f"{size / 1e6:.1f} MB" if size >= 100_000 else f"{size / 1e3:.1f} kB"

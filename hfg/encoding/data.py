@@ -17,6 +17,7 @@ import datetime
 import decimal
 import enum
 import importlib
+import json
 import math
 import os
 import sys
@@ -113,7 +114,8 @@ def decode(data: Any, hint: Any = Any, *, where: str = "the value", find: Find |
       data: the result of `encode`, or data that a person wrote; tuples count as lists.
       hint: the declared type.
       where: the name of the value in messages.
-      find: returns the object for "module:name", by default by importing the module; raises any exception to refuse.
+      find: returns the code that "module:name" refers to, tagged as a reference or not; raises any error to refuse it.
+        Without it, only data with the tag "reference" refers to code, and its module is imported.
 
     Raises:
       EncodingError: it does not represent a value of the type; the message has the part, the expected and the found
@@ -127,7 +129,7 @@ def decode(data: Any, hint: Any = Any, *, where: str = "the value", find: Find |
       hfg.errors.EncodingError: the value must be a colour, as in "#ff8000", got 'red'
     """
     try:
-        return _decode(data, hint, where, find or find_reference)
+        return _decode(data, hint, where, find or _find_tagged)
     except RecursionError:
         raise EncodingError(f"{where} contains itself, or is nested too deep") from None
 
@@ -154,7 +156,7 @@ def read_text(text: str, hint: Any = Any, *, where: str = "the value", find: Fin
     first: EncodingError | None = None
     for data in _readings(text, hint):
         try:
-            return decode(data, hint, where=where, find=find)
+            return decode(data, hint, where=where, find=find or find_reference)
         except EncodingError as error:
             first = first or error
     raise EncodingError(f"{where} must be {describe(hint)}, got {text!r:.80}") from first
@@ -200,6 +202,11 @@ def find_reference(reference: str) -> Any:
     except Exception as error:  # a module may raise anything
         raise EncodingError(f'"{reference}": importing "{module}" failed ({type(error).__name__}: {error})') from error
     return _already_imported(reference)
+
+
+def _find_tagged(reference: str) -> Any:
+    """Find what a tag names, where nobody says what data may refer to; see `_Decoder.code`."""
+    return find_reference(reference)
 
 
 def _already_imported(reference: str) -> Any:
@@ -368,6 +375,8 @@ def _untagged(data: dict[str, Any], where: str, find: Find) -> Any:
             raise EncodingError(f'{where} is of type "{name}", which is not a type of data')
     elif name == "dict":
         return _pairs(inner, Any, Any, where, find)
+    elif name == "reference" and isinstance(inner, str):
+        return find(inner)
     return _decode(inner, hint, where, find)
 
 
@@ -539,6 +548,11 @@ class _Decoder:
             if callable(data):
                 return data
             raise self.refuse(data)
+        if self.find in (_find_tagged, _already_imported):  # or any text in a command could have code called
+            raise EncodingError(
+                f"{self.where} is {data!r:.80}, and a text alone does not refer to code; "
+                f'write {{"{TAG}": "reference", "value": {json.dumps(data):.80}}}'
+            )
         return self.find(data)
 
     def instance(self, data: Any, cls: Any) -> Any:

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias
 
 import msgspec
 
+from hfg.base.controls import cleaned
 from hfg.encoding import description_of, difference, type_fingerprint
 from hfg.errors import EncodingError, UsageError
 
@@ -66,7 +67,7 @@ def introduce(hint: Any, who: str, *, lossless: bool, stream: str = "") -> bytes
 def read_introduction(metadata: bytes) -> Introduction | None:
     """Give what was announced, or None if it is nothing of the kind: it may come from anybody."""
     try:
-        return _decode(metadata)
+        return cleaned(_decode(metadata))
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         return None
 

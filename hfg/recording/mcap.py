@@ -83,6 +83,11 @@ class Writer:
         self._times: tuple[int, int] | None = None
         self._write(MAGIC + _record(_HEADER, _text(profile), _text(library)))
 
+    @property
+    def chunks_written(self) -> int:
+        """Number of chunks that were handed to the system completely."""
+        return len(self._chunks)
+
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Declare a schema; gives its number, from 1."""
         number = len(self._schemas) + 1

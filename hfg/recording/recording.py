@@ -82,6 +82,11 @@ class Recording:
         return self._writer.bytes_written
 
     @property
+    def chunks_written(self) -> int:
+        """Number of chunks in the file; a recording that was broken off can be read up to the last of them."""
+        return self._writer.chunks_written
+
+    @property
     def left_out(self) -> dict[str, int]:
         """Tokens for which there was no time, or no way to write them, by port."""
         found = {place.path: place.left_out + place.refused for place in self._places.values()}

@@ -95,6 +95,11 @@ class RecordingWriter:
         """Length of the file."""
         return self._file.bytes_written
 
+    @property
+    def chunks_written(self) -> int:
+        """Number of chunks that the file holds completely."""
+        return self._file.chunks_written
+
     def start(self) -> None:
         """Begin to write."""
         self._thread.start()

@@ -51,12 +51,12 @@ PLAIN: list[tuple[Any, Any, Any]] = [
     (Found(0.5), Found, {"score": 0.5, "label": "?"}),
     (datetime.datetime(2020, 1, 2, tzinfo=datetime.UTC), datetime.datetime, "2020-01-02T00:00:00Z"),
     (decimal.Decimal("1.50"), decimal.Decimal, "1.50"),
-    (named, Callable[[float], float], "tests.encoding.test_data:named"),
-    (Pose, type, "tests.encoding.kinds:Pose"),
     (Mode.FAST, Literal[Mode.FAST], "FAST"),
     (None, int | None, None),
 ]
 TAGGED: list[tuple[Any, Any]] = [
+    (named, Callable[[float], float]),
+    (Pose, type),
     (math.inf, Any),
     (math.nan, str | float),
     (Mode.FAST, Any),
@@ -169,8 +169,14 @@ def test_any_data_comes_back_unchanged_from_json(value: Any) -> None:
             "the value is not an array (an array of <U9999999",
         ),
         ({"$type": "array", "shape": [3], "value": [1.0]}, Any, "the value is not an array (cannot reshape array"),
-        ("json:nothing", Callable[[], None], '"json:nothing": module "json" has no "nothing"'),
-        ("json", Callable[[], None], "'json' is not a reference; write \"module:name\""),
+        (
+            {"$type": "reference", "value": "json:nothing"},
+            Callable[[], None],
+            '"json:nothing": module "json" has no "nothing"',
+        ),
+        ({"$type": "reference", "value": "json"}, Callable, "'json' is not a reference; write \"module:name\""),
+        ("os:system", Callable[[], None], "the value is 'os:system', and a text alone does not refer to code"),
+        (["os:system"], list[type], "the value[0] is 'os:system', and a text alone does not refer to code"),
     ],
 )
 def test_data_that_is_no_value_of_the_type_is_refused_with_its_place(data: Any, hint: Any, wrong: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -63,6 +64,24 @@ def test_a_value_refers_to_no_function_that_just_is_there() -> None:
     command = {"do": "Connect", "source": "a.b", "target": "c.d", "through": [operator]}
     with pytest.raises(GraphError, match="must not have any function called"):
         hfg.commands.decode(json.dumps([command]))
+
+
+@hfg.node
+def acts(value: int, *, how: Callable[[int], int] = abs) -> int:
+    return how(value)
+
+
+def test_a_text_without_a_tag_refers_to_no_code_when_it_is_applied() -> None:
+    """Nobody can tell from the command what type the parameter has, so such a text is not compared with the rule."""
+    graph = hfg.Graph()
+    graph.add(acts(), name="acts")
+    command = {"do": "SetParameter", "path": "acts.how", "value": "os:system"}
+    (decoded,) = hfg.commands.decode(json.dumps([command]))
+    with pytest.raises(GraphError, match="acts.how"):
+        graph.edit(decoded)
+    with pytest.raises(hfg.errors.EncodingError, match="a text alone does not refer to code"):
+        graph["acts"].ports.parameters["how"].spec.decode("os:system")
+    assert graph["acts"].ports.parameters["how"].value is abs
 
 
 def test_a_time_of_day_in_a_value_is_no_reference() -> None:

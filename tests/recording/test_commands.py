@@ -115,3 +115,12 @@ def test_a_full_disk_is_one_sentence_and_what_was_written_opens(program: Path, c
     assert "the recording in run.mcap is not whole: File too large; it opens up to its last chunk" in done.stderr
     with File(program.parent / "run.mcap") as recording:
         assert recording.info().messages > 1000
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files")
+def test_a_disk_that_is_full_before_the_first_chunk_leaves_nothing_to_read(program: Path, command: Command) -> None:
+    limit = "import resource, signal\nsignal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+    limit += "resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))\n"
+    done = command("record", "robot.py", "-o", "run.mcap", "--clock", "virtual", "--arg", "count=10000", before=limit)
+    assert done.returncode == 1
+    assert "the recording in run.mcap is not whole: File too large; nothing in it can be read" in done.stderr

@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from hfg.base.controls import cleaned
 from hfg.base.logs import log
 from hfg.base.private import is_of_this_user
 from hfg.errors import MessageTooLarge, NoAnswer, QueryRefused, TransportError, in_words
@@ -588,7 +589,7 @@ class LocalSession:
 def _answer_of(kind: int, told: bytes) -> bytes | TransportError:
     if kind == Kind.TELL:
         return told
-    sentence = told.decode(errors="replace")
+    sentence = cleaned(told.decode(errors="replace"))
     return QueryRefused(sentence) if kind == Kind.REFUSE else NoAnswer(sentence)
 
 

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Final, TypeVar
 
 import msgspec
 
+from hfg.base.controls import cleaned
 from hfg.base.logs import Log
 from hfg.errors import TransportError, UsageError
 from hfg.transport import Closing, Presence, Session
@@ -312,7 +313,7 @@ async def ask(session: Session, place: str, request: Any, answer: type[_T], *, t
     """
     told = await session.ask(f"{place}/{request.verb}", msgspec.msgpack.encode(request), timeout_s=timeout_s)
     try:
-        return msgspec.msgpack.decode(told, type=answer)
+        return cleaned(msgspec.msgpack.decode(told, type=answer))
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise TransportError(f'"{place}" answers what this version of hfg cannot read: {error}') from None
 
@@ -358,7 +359,7 @@ class Realm:
                 into.pop(one.name, None)
                 continue
             try:
-                into[one.name] = msgspec.msgpack.decode(one.metadata, type=kind)
+                into[one.name] = cleaned(msgspec.msgpack.decode(one.metadata, type=kind))
             except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
                 _LOGGER.warning('"%s" says of itself what this version of hfg cannot read', one.name)
         changed, self._changed = self._changed, set()

@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 
 from hfg import errors
+from hfg.base.controls import cleaned
 from hfg.base.frames import users_part
 from hfg.base.token import Token
 from hfg.encoding import TokenCodec
@@ -46,6 +47,7 @@ def as_error(failed: Failed, where: str) -> HfgError:
       failed: as it came.
       where: in which process, for a note at the error.
     """
+    failed = cleaned(failed)
     kind = getattr(errors, failed.kind, RunError)
     error: HfgError
     if failed.path:

@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 from typing import TYPE_CHECKING, Any, Final
 
+from hfg.base.controls import cleaned
 from hfg.base.logs import log
 from hfg.errors import MessageTooLarge, NoAnswer, QueryRefused, in_words
 from hfg.transport import Answer
@@ -46,7 +47,7 @@ class Question:
             self._mailbox.leave((self, reply.ok.payload.to_bytes()))
         elif reply.err is not None:
             said = reply.err.payload.to_bytes()[:_LONGEST_REFUSAL].decode(errors="replace")
-            self._mailbox.leave((self, QueryRefused(said)))
+            self._mailbox.leave((self, QueryRefused(cleaned(said))))
 
     def on_end(self) -> None:
         """No reply comes any more; in Zenoh's thread."""
