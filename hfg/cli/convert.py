@@ -14,7 +14,7 @@ import typer
 from hfg.base.whole import write_whole
 from hfg.cli import completing, show
 from hfg.cli.options import AllowOption, ArgOption
-from hfg.cli.target import SUFFIXES, load_graph
+from hfg.cli.target import SUFFIXES, import_from_here, load_graph
 from hfg.errors import TargetError, UsageError
 from hfg.files import apex, describe, save, schema, text_of, write
 
@@ -91,7 +91,12 @@ def _import_apex(target: str, out: Path | None, json: bool) -> int:
 
 
 def _write_schema(file: str | None, allow: Sequence[str]) -> int:
-    text = schema(types=True, allow=allow)
+    if allow:
+        import_from_here()
+    try:
+        text = schema(types=True, allow=allow)
+    except UsageError as error:
+        raise TargetError(str(error)) from None
     if file is None:
         show.write(text)
         return 0

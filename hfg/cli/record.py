@@ -112,12 +112,13 @@ def told(recording: Recording) -> int:
     size = recording.bytes_written
     shown = f"{size / 1e6:.1f} MB" if size >= 100_000 else f"{size / 1e3:.1f} kB"
     ports = f"{len(recording.ports)} port{'s' * (len(recording.ports) != 1)}"
-    show.sentence(f"{recording.path}: {recording.tokens} tokens of {ports}, {shown}")
+    tokens = f"{recording.tokens} token{'s' * (recording.tokens != 1)}"
+    show.sentence(f"{recording.path}: {tokens} of {ports}, {shown}")
     if recording.held_s:
         show.sentence(f"nodes waited {recording.held_s:.3f} s for the disk; --no-lossless would have left tokens out")
     left_out = recording.left_out
     for path, count in left_out.items():
-        show.sentence(f'{count} tokens of "{path}" are not in the recording')
+        show.sentence(f'"{path}": {count} token{"s are" if count != 1 else " is"} not in the recording')
     return 0
 
 

@@ -11,7 +11,7 @@ import sys
 import traceback
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
@@ -54,6 +54,11 @@ def set_debug(debug: bool) -> None:
     _debug = debug
 
 
+_logged: set[str] = set()
+_MOST_LOGGED: Final = 1000
+"""Warnings that were shown when they came; what a run reports at its end is not shown a second time."""
+
+
 class Records:
     """Writes log records to standard error, whatever that is when they come: time, level, path, sentence.
 
@@ -62,6 +67,7 @@ class Records:
 
     def __init__(self, verbosity: int, debug: bool, *, virtual: bool = False) -> None:
         """Show those of hfg from now on: warnings, from verbosity 1 more; in virtual time with the run's seconds."""
+        _logged.clear()
         self._handler = logging.StreamHandler(_StandardError())
         self._handler.setFormatter(_Line(virtual))
         self._hfg = logging.getLogger("hfg")
@@ -90,6 +96,8 @@ class _Line(logging.Formatter):
         else:
             record.told = f"{self.formatTime(record, '%H:%M:%S')}.{int(record.msecs):03d}"
         record.where = getattr(record, "path", None) or record.name
+        if record.levelno >= logging.WARNING and len(_logged) < _MOST_LOGGED:
+            _logged.add(record.getMessage())
         return super().format(record)
 
 
@@ -204,7 +212,8 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]], *, 
 def report(name: str, result: Report, verbosity: int) -> None:
     """Tell on standard error how a run went: a line; from verbosity 1 its nodes, from 2 its edges."""
     for error in result.errors:
-        sentence(error)
+        if error not in _logged:
+            sentence(error)
     sentence(f'graph "{name}": {result.outcome} after {result.duration_s:.3f} s, {result.firings} firings')
     if result.lost_activity:
         sentence(f'graph "{name}": activity was lost {result.lost_activity} times')

@@ -115,19 +115,25 @@ def find(named: str | None) -> list[Answer]:
       TargetError: there is none.
     """
     if named is not None and is_process(named):
-        return [Answer(name=named)]
+        with contextlib.closing(run_sockets()) as there:
+            if named in run_names(there):
+                return [Answer(name=named)]
     found = runs()
     if not found:
+        what = "no graph runs that could be looked at"
+        if named is not None and is_process(named):
+            what = f"no graph that could be looked at runs in process {named}, nor in any other"
         raise TargetError(
-            "no graph runs that could be looked at: hfg run begins one, or a program with hfg.run(graph, watch=True) "
-            "or HFG_WATCH=1, on the real clock, as the same user"
+            f"{what}: hfg run starts one, or a program with hfg.run(graph, watch=True) or HFG_WATCH=1, on the real "
+            "clock, as the same user"
         )
     if named is None:
         return found
     fitting = [one for one in found if one.graph == named]
     if not fitting:
-        there = ", ".join(f'"{one.graph}" in process {one.name}' for one in found)
-        raise TargetError(f'no graph "{named}" runs that could be looked at; there is {there}')
+        running = ", ".join(f'"{one.graph}" in process {one.name}' for one in found)
+        where = f"in process {named}" if is_process(named) else f'by the name "{named}"'
+        raise TargetError(f"no graph that could be looked at runs {where}; there is {running}")
     return fitting
 
 

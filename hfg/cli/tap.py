@@ -5,7 +5,7 @@ Stands on `execute`, `sockets`, `target`, `settings`, `interrupt` and `show`.
 
 from __future__ import annotations
 
-import contextlib
+import importlib.util
 import sys
 from collections.abc import Awaitable
 from contextlib import redirect_stdout
@@ -21,8 +21,8 @@ from hfg.cli.execute import execute
 from hfg.cli.interrupt import Interrupt
 from hfg.cli.options import AllowOption, Clock, ClockOption, DebugOption, ParamOption, TargetArgument, UntilOption
 from hfg.cli.settings import set_parameters
-from hfg.cli.sockets import Line, find, is_process, runs, which
-from hfg.cli.target import SUFFIXES, load_graph
+from hfg.cli.sockets import Line, find, is_process, which
+from hfg.cli.target import SUFFIXES, import_from_here, load_graph
 from hfg.engine import Run
 from hfg.engine.face.watching import Answer, Question
 from hfg.engine.observing.encoding import line_of
@@ -80,7 +80,8 @@ def tap(
     if error is not None:
         show.failure(error)
     if printer.skipped and rate is None:
-        show.sentence(f"{printer.skipped} tokens were skipped: more passed than could be printed")
+        tokens = "1 token was" if printer.skipped == 1 else f"{printer.skipped} tokens were"
+        show.sentence(f"{tokens} skipped: more passed than could be printed")
     if not printer.seen and report is not None:
         show.sentence(f'no token passed "{path}" in {report.duration_s:.3f} s')
     if interrupt.count:
@@ -94,9 +95,14 @@ def _runs_already(target: str) -> list[Answer]:
         return find(target)
     if ":" in target or target.endswith(_CODE) or Path(target).exists() or Path(f"{target}.py").exists():
         return []
-    with contextlib.suppress(TargetError):
-        return [one for one in runs() if one.graph == target]
-    return []
+    import_from_here()
+    try:
+        return find(target)
+    except TargetError as error:
+        top = target.partition(".")[0]
+        if top.isidentifier() and importlib.util.find_spec(top) is not None:
+            return []
+        raise TargetError(f'there is no file or module "{target}", and {error}') from None
 
 
 def _look_at(name: str, question: Question, limit: int | None) -> int:

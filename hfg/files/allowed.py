@@ -68,9 +68,22 @@ class Allowed:
         self._extra = tuple(extra)
         self._remedy = remedy
         self.wanted: dict[str, None] = {}
+        self._asked: set[str] = set()
+
+    def unneeded(self) -> str | None:
+        """Return a sentence about packages that are allowed although nothing has asked for them; None without any."""
+        extra = [f'"{one}"' for one in self._extra if not any(_is_in(module, (one,)) for module in self._asked)]
+        if not extra:
+            return None
+        names, pronoun = " and ".join(extra), "it" if len(extra) == 1 else "them"
+        verb = "is" if len(extra) == 1 else "are"
+        return (
+            f"{names} {verb} allowed, but the file wants no code of {pronoun}; leave {pronoun} out, or correct the name"
+        )
 
     def refusal(self, module: str) -> str | None:
         """Say why a module must not be imported, with the remedy; None if it may be."""
+        self._asked.add(module)
         if module in sys.modules:
             return None
         if module.endswith(".__main__"):

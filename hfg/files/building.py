@@ -16,6 +16,7 @@ from typing import Any, Final
 import msgspec
 
 from hfg import registry
+from hfg.base.logs import Log
 from hfg.encoding import find_reference
 from hfg.errors import EngineInternalError, FileError, GraphError, HfgError, TargetError
 from hfg.files.allowed import Allowed
@@ -50,6 +51,7 @@ from hfg.nodetypes.node import Node
 
 __all__ = ["box_of_file", "build", "load", "modules_of"]
 
+_LOGGER: Final = Log("hfg.files")
 _OPTIONS: Final = tuple(name for name in NODE_OPTIONS if name != "iterate_over")
 _EDGE_OPTIONS: Final = ("active", "capacity", "overflow", "capacity_limit", "buffer")
 _NOBODY: Final[Any] = None
@@ -63,7 +65,10 @@ def load(path: Path, allow: Iterable[str] = ()) -> Graph:
     if read is None:
         loading.findings.reject(f"{path} cannot be loaded")
         raise EngineInternalError(f"{path} was not read, and nobody said why")
-    return loading.graph(read, path.resolve())
+    graph = loading.graph(read, path.resolve())
+    if unneeded := loading.allowed.unneeded():
+        _LOGGER.warning("%s: %s", path, unneeded)
+    return graph
 
 
 def build(document: Document, beside: Path, allow: Iterable[str] = ()) -> Graph:

@@ -273,11 +273,12 @@ def _gaps(recording: File, info: RecordingInfo) -> list[str]:
         "apart by the order of their tokens"
         for node in _unnumbered(recording)
     ]
-    left_out = [(port, count, "there was no time for them") for port, count in info.left_out.items()]
-    refused = [(port, count, "their values are no data") for port, count in info.refused.items()]
-    return found + [
-        f'{count} tokens of "{port}" are not in the recording: {why}' for port, count, why in left_out + refused
-    ]
+    left_out = [(port, count, "the disk was too slow") for port, count in info.left_out.items()]
+    refused = [(port, count, "such values are not data") for port, count in info.refused.items()]
+    for port, count, why in left_out + refused:
+        tokens = "1 token is" if count == 1 else f"{count} tokens are"
+        found.append(f'"{port}": {tokens} not in the recording: {why}')
+    return found
 
 
 def _sorted(

@@ -40,6 +40,15 @@ def test_the_schema_is_written(command: Command) -> None:
     assert command("convert", "--schema", "no/such/folder.json").code == 2
 
 
+def test_the_schema_knows_node_types_of_an_allowed_module_of_the_current_folder(command: Command) -> None:
+    shown = command("convert", "--schema", "--allow", "steps")
+    assert (shown.code, shown.err) == (0, "")
+    assert '"const": "steps:third"' in shown.out
+    shown = command("convert", "--schema", "--allow", "stairs")
+    assert (shown.code, shown.out) == (2, "")
+    assert 'hfg: stairs has no node types for the schema: there is no module "stairs"' in shown.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

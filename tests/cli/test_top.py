@@ -109,7 +109,16 @@ def test_of_several_runs_one_must_be_named(command: Command, place: Path) -> Non
         assert command("top", "second").out.startswith("second  running")
         shown = command("top", "third")
         assert shown.code == 2
-        assert 'no graph "third" runs that could be looked at; there is "first" in process 7' in shown.err
+        there = f'there is "first" in process 7, "second" in process {os.getpid()}'
+        assert f'no graph that could be looked at runs by the name "third"; {there}' in shown.err
+        for verb in (("top",), ("tap", "out")):
+            shown = command(verb[0], "4242", *verb[1:])
+            assert (shown.code, shown.err.count("\n")) == (2, 1)
+            assert f"no graph that could be looked at runs in process 4242; {there}" in shown.err
+        shown = command("tap", "third", "ticks.out")
+        assert (shown.code, shown.err.count("\n")) == (2, 1)
+        assert 'there is no file or module "third", and no graph that could be looked at runs by the name' in shown.err
+        assert there in shown.err
 
 
 @pytest.mark.parametrize(

@@ -87,6 +87,14 @@ def test_a_file_refers_to_no_function_that_just_is_there(reference: str) -> None
         hfg.load(mapped(reference))
 
 
+def test_modules_that_are_allowed_and_not_wanted_are_reported(caplog: pytest.LogCaptureFixture) -> None:
+    (file := Path("plain.hfg.yaml")).write_text("hfg: 1\nnodes:\n  a: {type: 'hfg.testing.nodes:Script'}\n")
+    hfg.load(file, allow=["nope"])
+    assert 'plain.hfg.yaml: "nope" is allowed, but the file wants no code of it; leave it out' in caplog.text
+    hfg.load(file, allow=["nope", "json"])
+    assert '"nope" and "json" are allowed, but the file wants no code of them; leave them out' in caplog.text
+
+
 def test_a_function_of_an_allowed_module_may_be_referred_to_and_nothing_that_it_has_imported() -> None:
     write("from os import system\ndef twice(x): return 2 * x\n", "my_functions.py")
     assert hfg.load(mapped("my_functions:twice"), allow=["my_functions"]).nodes

@@ -362,7 +362,7 @@ def test_silence_stands_in_for_a_value_that_cannot_be_recorded_so_that_joins_sta
     playing = play_into(graph, file, speed=None)
     report = hfg.run(graph)
     assert report.outputs["out"] == ["-1 1", "-3 3", "-4 4", "-5 5"]
-    assert playing.gaps == ['1 tokens of "camera.image" are not in the recording: their values are no data']
+    assert playing.gaps == ['"camera.image": 1 token is not in the recording: such values are not data']
     assert report.errors == playing.warnings
     assert playing.gaps[0] in caplog.text
 

@@ -38,17 +38,13 @@ class Connections:
         """
         if not is_single(target):
             if (source, target) in self.pairs:
-                raise errors.ConnectionError(
-                    f'"{end_path(source)}" and "{target.path}" are connected already; an edge is drawn once (rule P2)'
-                )
+                raise errors.ConnectionError(_again(source, target))
             return
         found = self.into.get(target)
         if found is None:
             return
         if found.source is source:
-            raise errors.ConnectionError(
-                f'"{end_path(source)}" and "{target.path}" are connected already; an edge is drawn once'
-            )
+            raise errors.ConnectionError(_again(source, target))
         raise errors.ConnectionError(
             f'"{target.path}" takes one edge and has one from "{end_path(found.source)}", '
             f'so "{end_path(source)}" cannot lead there too; '
@@ -150,3 +146,11 @@ class Connections:
         if self._order is not None:
             assert self._order.items == self.edges
             assert set().union(*self._at.values()) == set(self.edges)
+
+
+def _again(source: SourceEnd, target: TargetEnd) -> str:
+    pair = f'"{end_path(source)}" and "{target.path}"'
+    return (
+        f"{pair} are connected already; an edge is drawn once (rule P2): leave the second one out, or give its options "
+        "to the first"
+    )

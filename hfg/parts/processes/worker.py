@@ -52,7 +52,7 @@ from hfg.parts.model.messages import (
 )
 from hfg.parts.model.sieve import sieve
 from hfg.parts.running.carrier import Carrier
-from hfg.parts.running.channels import Channel, name_of
+from hfg.parts.running.channels import Channel, called
 from hfg.parts.running.keeping import Keeper, read
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import sweep_run
@@ -247,7 +247,7 @@ class Worker:
         if message.part not in self._lives or self._carrier is None:
             return  # who is no neighbour
         if message.life <= max(self._lives[message.part], FIRST_LIFE):
-            raise Untrue(f"of life {message.life} of {name_of(message.part)}, which has had later ones")
+            raise Untrue(f"of life {message.life} of {called(message.part)}, which has had later ones")
         old = self._channels[message.part]
         await old.close()
         self._channels[message.part] = self._channel_to(part, message.part, message.life)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from hfg.base.logs import Log
 from hfg.graph.flat import CutEdge
 from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, OfAnEdge, Sees, Shares, Speaks, Untrue
-from hfg.parts.running.channels import name_of
+from hfg.parts.running.channels import called
 from hfg.parts.running.ends import IncomingEnd, OutgoingEnd, World
 from hfg.parts.running.part import Part
 from hfg.transport import Session
@@ -75,9 +75,7 @@ class Carrier:
 
     def admit(self, other: str, life: int) -> None:
         """Another part has died and begins anew, as that life."""
-        _LOGGER.info(
-            "%s: %s is there again, as life %d: its edges go on", name_of(self._part.name), name_of(other), life
-        )
+        _LOGGER.info("%s: %s is there again, as life %d: its edges go on", called(self._part.name), called(other), life)
         for link in self._links.values():
             if link.other == other:
                 link.admit(life)
@@ -98,7 +96,7 @@ class Carrier:
             or (says_producer and label not in self._incoming)
             or (says_consumer and label not in self._outgoing)
         ):
-            raise Untrue(f'of an edge "{label:.200}", which does not lead so from it to {name_of(self._part.name)}')
+            raise Untrue(f'of an edge "{label:.200}", which does not lead so from it to {called(self._part.name)}')
         match message:
             case Speaks():
                 self._part.speak(label, message.speaking, message.total)

@@ -15,7 +15,7 @@ from hfg.links.running import LinkReceiver, LinkSender
 from hfg.parts.model.messages import Message, Untrue, pack, unpack
 from hfg.transport import Session
 
-__all__ = ["Channel", "name_of"]
+__all__ = ["Channel", "called", "name_of"]
 
 _LOGGER = Log("hfg.parts")
 _WINDOW: Final = 64  # messages on their way
@@ -25,6 +25,11 @@ _MAIN: Final = "main"  # what the part without a name is called in keys
 def name_of(part: str) -> str:
     """Give what a part is called in the keys of a transport."""
     return f"part {part}" if part else _MAIN
+
+
+def called(part: str) -> str:
+    """Return what people call a part: by its group, or as the main process."""
+    return f'group "{part}"' if part else "the main process"
 
 
 class Channel:
@@ -99,7 +104,7 @@ class Channel:
         """What has come changes nothing; it is counted, and logged the first time."""
         self.refused += 1
         if self.refused == 1:
-            _LOGGER.warning("%s is not believed: %s; more of the kind is counted", name_of(self._there), why)
+            _LOGGER.warning("%s is not believed: %s; more of the kind is counted", called(self._there), why)
 
     async def flush(self, within_s: float) -> None:
         """Wait until the other has all that was said, or for so long."""

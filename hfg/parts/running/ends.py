@@ -24,7 +24,7 @@ from hfg.parts.model.components import is_synchronous
 from hfg.parts.model.failing import codec_of
 from hfg.parts.model.inheriting import UNKNOWN, Arrived, Where
 from hfg.parts.model.messages import GoesOn, Hears, Joins, Message, Sees, Shares, Speaks, Untrue
-from hfg.parts.running.channels import name_of
+from hfg.parts.running.channels import called, name_of
 from hfg.parts.running.part import Part
 from hfg.parts.running.rings import Borrowing, Lending, segment_of
 from hfg.ports.outputs import OutputPort
@@ -88,11 +88,11 @@ class _NearEnd:
         self._part.finish("failed", problem)
 
     def _cannot_carry(self, error: Exception) -> None:
-        self._fail(f"cannot carry a value to {name_of(self.other)}", error)
+        self._fail(f"cannot carry a value to {called(self.other)}", error)
 
     def _need_to_join(self) -> None:
         if not self._waits_to_join:
-            raise Untrue(f'of edge "{self._edge.label}", which this life of {name_of(self._part.name)} knows already')
+            raise Untrue(f'of edge "{self._edge.label}", which this life of {called(self._part.name)} knows already')
 
 
 class OutgoingEnd(_NearEnd):

@@ -26,7 +26,7 @@ from hfg.parts.model.agreement import Account, Answer, Question, Rest
 from hfg.parts.model.components import Component, is_synchronous
 from hfg.parts.model.inheriting import Arrived, Where
 from hfg.parts.model.messages import Untrue
-from hfg.parts.running.channels import name_of
+from hfg.parts.running.channels import called
 from hfg.parts.running.keeping import Keeper
 from hfg.parts.running.progress import Progress
 from hfg.ports.edges import EventEdge
@@ -361,9 +361,9 @@ class Part:
         is_own = self._start.get(label, 0) > inlet.received  # the producer has sent them, and former lives lost them
         whose = self.name if is_own else self._producers[label]
         tokens = "1 token was" if count == 1 else f"{count} tokens were"
-        what = f'edge "{label}": {tokens} lost with a process of {name_of(whose)}'
+        what = f'edge "{label}": {tokens} lost with a process of {called(whose)}'
         if not is_own and self.keeper is None:
-            what += "; silence takes their place, so that what belongs together still meets"
+            what += f"; silence takes {'its' if count == 1 else 'their'} place, so that joins stay aligned"
         self._report(what)
 
     def _report(self, what: str) -> None:
