@@ -26,6 +26,8 @@ from pathlib import Path
 from posixpath import join, normpath
 from urllib.parse import unquote, urlsplit
 
+import msgspec
+
 ROOT = Path(__file__).resolve().parent.parent
 STAGED, SITE = ROOT / "build" / "docs", ROOT / "build" / "site"
 ASSETS = Path(__file__).parent / "site"
@@ -63,7 +65,18 @@ def stage() -> None:
 
 def _members(match: re.Match[str]) -> str:
     module = pkgutil.resolve_name(match[1])
-    return "\n\n".join(f"::: {match[1]}.{name}" for name in module.__all__)
+    return "\n\n".join(f"::: {match[1]}.{name}{_fields(getattr(module, name))}" for name in module.__all__)
+
+
+def _fields(thing: object) -> str:
+    """Return the fields of a struct as a code block, unless its docstring lists them. Mkdocstrings ignores structs."""
+    if not (isinstance(thing, type) and issubclass(thing, msgspec.Struct)) or "Attributes:" in (thing.__doc__ or ""):
+        return ""
+    hints = {
+        name: hint for one in reversed(thing.__mro__) for name, hint in getattr(one, "__annotations__", {}).items()
+    }
+    lines = [f"    {name}: {hints[name]}," for name in thing.__struct_fields__]
+    return "\n\n" + "\n".join(["```python", f"{thing.__name__}(", *lines, ")", "```"])
 
 
 def _fence(match: re.Match[str], folder: str) -> str:
