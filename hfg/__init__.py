@@ -1,18 +1,37 @@
-"""hfg: Activity Flow Graphs on asyncio.
+"""hfg: Activity Flow Graphs for asyncio. Data flow, events and activity in one model.
 
-Which floor stands on which; imports go down only, and asyncio begins on floor 5:
+Functions and classes are node types. A graph connects nodes, and `hfg.run` runs it:
+
+    @hfg.node
+    def numbers() -> Iterator[int]:
+        yield from range(3)
+
+    @hfg.node
+    def show(number: int) -> None:
+        print(number)
+
+    graph = hfg.Graph("hello")
+    graph.connect(graph.add(numbers()).out, graph.add(show()).number)
+    hfg.run(graph)
+
+- Write nodes with `hfg.node` and `hfg.Node`; declare ports with `Input`, `Output`, `Event`, `slot` and `Parameter`.
+- Build graphs with `hfg.Graph` and `hfg.Subgraph`; save and load them with `hfg.save` and `hfg.load`.
+- Run graphs with `hfg.run`, `hfg.run_async` or `async with hfg.running(graph) as run`.
+- Use ready-made nodes from `hfg.nodes`; the command `hfg nodes` lists them.
+
+The tutorial is docs/tutorial.md. `import hfg` is fast, because each name is imported when it is first used.
+
+For developers: these are the layers of the package. Imports go down only. Layers 0 to 3 build graphs without an
+engine; code that waits starts in layer 5.
 
     7  cli      pubsub    composing
-    6  nodes    files   recording   reporting   parts   catalogue     beside: testing (sees all; nobody below sees it)
-    5  engine   links at work                             outside: hfg_transports (sees floors 0-1 only)
+    6  nodes    files   recording   reporting   parts   catalogue    also: testing (imports all; none imports it)
+    5  engine   links.running                             outside: hfg_transports (imports layers 0-1 only)
     4  activity   links   timeline
     3  graph
     2  nodetypes   registry
     1  ports                transport   sharedmemory
     0  errors  types  <-  base  <-  encoding  images  trace
-
-A graph is built (floors 0-3) without any engine; the engine runs what it finds there.
-So `import hfg` imports nearly nothing: each name is imported when it is first used.
 """
 
 from __future__ import annotations

@@ -39,11 +39,11 @@ def agent(
     settings: SettingsOption = None,
     insecure: Annotated[
         bool,
-        typer.Option("--insecure", help="Listen at tcp/ addresses of the settings, where nobody proves who he is."),
+        typer.Option("--insecure", help="Allow tcp/ addresses in the settings, which do not authenticate anyone."),
     ] = False,
-    verbose: Annotated[int, typer.Option("-v", "--verbose", count=True, help="Tell of each part.")] = 0,
+    verbose: Annotated[int, typer.Option("-v", "--verbose", count=True, help="Report each process.")] = 0,
 ) -> int:
-    """Let this host run parts of graphs, as processes, until Ctrl-C; modules are found from the working directory."""
+    """Let this host run parts of graphs until Ctrl-C. Modules are searched for from the working directory."""
     show.Records(max(verbose, 0), debug=False).loaded()
     said = session_settings(settings)
     if insecure and not said:

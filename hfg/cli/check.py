@@ -27,7 +27,7 @@ def check(
     json: Annotated[bool, typer.Option("--json", help="Write the problems as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
-    """Look for mistakes in a graph without running it; exit code 1 if there are errors."""
+    """Check a graph for errors without running it (exit code 1 if there are any)."""
     show.set_debug(debug)
     graph: Graph | None = None
     refused_file: FileError | None = None

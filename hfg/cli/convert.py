@@ -29,7 +29,7 @@ def convert(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Argument(help="a file that ends in .hfg.yaml; without it, standard output")
+        Path | None, typer.Argument(help="a file name that ends in .hfg.yaml; default: standard output")
     ] = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
@@ -37,17 +37,17 @@ def convert(
         bool,
         typer.Option(
             "--schema",
-            help="Write the JSON schema of graph files, for editors, with all installed or allowed node types.",
+            help="Write the JSON schema of graph files, with all installed and allowed node types.",
         ),
     ] = False,
     json: Annotated[
-        bool, typer.Option("--json", help="Of a file of CS::APEX: write what became of each part as JSON.")
+        bool, typer.Option("--json", help="For a CS::APEX file: report how each part was converted, as JSON.")
     ] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
-    """Write a graph as a graph file; what no file can say is told, all of it, and then nothing is written.
+    """Write a graph to a graph file. Fails without writing anything if part of the graph cannot be stored.
 
-    Of a file of CS::APEX it is told what is mapped, approximated and missing.
+    For a CS::APEX file, it reports what is mapped, approximated and missing.
     """
     show.set_debug(debug)
     if json_schema:

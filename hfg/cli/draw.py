@@ -18,25 +18,23 @@ __all__ = ["draw"]
 def draw(
     target: TargetArgument,
     out: Annotated[
-        Path | None, typer.Argument(help="a file that ends in .svg, .mmd or .dot; without it, standard output")
+        Path | None, typer.Argument(help="a file name that ends in .svg, .mmd or .dot; default: standard output")
     ] = None,
-    depth: Annotated[
-        int | None, typer.Option(metavar="N", help="Show so many subgraphs inside each other open; 0 folds all.")
-    ] = None,
+    depth: Annotated[int | None, typer.Option(metavar="N", help="Open N levels of subgraphs; 0 collapses all.")] = None,
     fold: Annotated[
-        list[str] | None, typer.Option(metavar="PATH", help="Show this subgraph folded; may be given more than once.")
+        list[str] | None, typer.Option(metavar="PATH", help="Collapse this subgraph. Can be repeated.")
     ] = None,
     active: Annotated[
-        list[str] | None, typer.Option(metavar="PATH", help="Show this node as active; may be given more than once.")
+        list[str] | None, typer.Option(metavar="PATH", help="Show this node as active. Can be repeated.")
     ] = None,
     ports: Annotated[
-        Literal["used", "all"], typer.Option(help="Which ports an SVG shows: those that edges lead to, or all.")
+        Literal["used", "all"], typer.Option(help="Ports to show in an SVG: those with edges, or all.")
     ] = "used",
     arg: ArgOption = None,
     allow: AllowOption = None,
     format: Annotated[  # noqa: A002 - the word users know
         Literal["svg", "mmd", "dot"] | None,
-        typer.Option("--format", help="SVG, Mermaid or Graphviz; by default what the file ends in, else Mermaid."),
+        typer.Option("--format", help="SVG, Mermaid or Graphviz. Default: by the file name, or else Mermaid."),
     ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:

@@ -17,9 +17,9 @@ __all__ = ["info", "told_losses"]
 
 def info(
     file: Annotated[Path, typer.Argument(help="a recording, or any MCAP file")],
-    json: Annotated[bool, typer.Option("--json", help="Write it as JSON.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write JSON.")] = False,
 ) -> int:
-    """Say what is in a recording: ports, types, counts, rates, and whether it is whole."""
+    """Show what a recording contains: ports, types, counts, rates, and damage."""
     try:
         with File(file) as recording:
             found = recording.info()

@@ -37,12 +37,12 @@ Whoever can read {authority}.key can be anybody: it is for tests, and belongs on
 
 @verbs.callback()
 def keys() -> None:
-    """Make certificates for agents, workers and viewers, signed by an authority for tests."""
+    """Create certificates for agents, workers and viewers, signed by an authority for tests."""
 
 
 @verbs.command("secret")
-def _secret(file: Annotated[Path, typer.Argument(help="where it is to lie; it must not be there yet")]) -> int:
-    """Make a secret that all programs of a realm have, instead of certificates: key = "..." in their settings."""
+def _secret(file: Annotated[Path, typer.Argument(help="the file to create; it must not exist")]) -> int:
+    """Create a secret shared by all programs of a realm, instead of certificates: key = "..." in settings."""
     try:
         with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as stream:
             stream.write(secrets.token_hex(32) + "\n")
@@ -52,17 +52,17 @@ def _secret(file: Annotated[Path, typer.Argument(help="where it is to lie; it mu
     return 0
 
 
-Folder = Annotated[Path, typer.Argument(help="where the authority and the certificates lie")]
+Folder = Annotated[Path, typer.Argument(help="folder of the authority and the certificates")]
 Hosts = Annotated[
     list[str] | None,
-    typer.Option("--host", help="a name or address by which the agent is reached; several times for several"),
+    typer.Option("--host", help="a name or address of the agent; can be repeated"),
 ]
-Days = Annotated[int, typer.Option(help="how long they are valid", min=1, max=3650)]
+Days = Annotated[int, typer.Option(help="days for which they are valid", min=1, max=3650)]
 
 
 @verbs.command("new")
 def _new(folder: Folder, host: Hosts = None, days: Days = 365) -> int:
-    """Make an authority, and a certificate each for an agent, a worker and a viewer."""
+    """Create an authority, and a certificate each for an agent, a worker and a viewer."""
     make_authority(folder, days=days)
     for name in ("agent", "worker", "viewer"):
         make_certificate(folder, name, name, hosts=_hosts(host), days=days)
@@ -73,12 +73,12 @@ def _new(folder: Folder, host: Hosts = None, days: Days = 365) -> int:
 @verbs.command("add")
 def _add(
     folder: Folder,
-    name: Annotated[str, typer.Argument(help="by which [access] knows it")],
-    kind: Annotated[Kind, typer.Option(help="what it is for")] = "agent",
+    name: Annotated[str, typer.Argument(help="its name in [access]")],
+    kind: Annotated[Kind, typer.Option(help="its purpose")] = "agent",
     host: Hosts = None,
     days: Days = 365,
 ) -> int:
-    """Make one more certificate by the authority that is there, as for the agent of another host."""
+    """Create another certificate with the existing authority, for example for another host's agent."""
     make_certificate(folder, name, kind, hosts=_hosts(host), days=days)
     show.write(f"{folder / name}.pem and {folder / name}.key are there\n")
     return 0

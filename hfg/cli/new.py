@@ -26,7 +26,7 @@ _LONGEST_NAME = 40  # a longer one would make lines that formatters break
 
 @verbs.callback()
 def new() -> None:
-    """Begin a node type, a graph or a package of node types: files that work, and their test."""
+    """Create a node type, a graph or a package, with tests."""
 
 
 @verbs.command("node")
@@ -45,7 +45,7 @@ def _graph(name: Name) -> int:
 def _plugin(
     name: Annotated[str, typer.Argument(help="of the package, as in my_lamps, MyLamps or plugins/my-lamps")],
 ) -> int:
-    """Write a package with a node type, its test and the entry point by which hfg finds it."""
+    """Write a package with a node type, its test and the entry point that hfg needs."""
     parent, module = _place(name)
     if find_spec(module) is not None:
         raise TargetError(f'there is a module "{module}" already, which the package would hide: take another name')

@@ -37,16 +37,16 @@ _WIDEST = 120  # longer lines are hard to read
 def nodes(
     what: Annotated[
         str | None,
-        typer.Argument(help="a module, a file.py, a family of the library, or one node type; without it, all there is"),
+        typer.Argument(help="a module, a file.py, a family of the library, or one node type; default: all"),
     ] = None,
     search: Annotated[
-        str | None, typer.Option("--search", "-s", help="Only those that these words describe, best first.")
+        str | None, typer.Option("--search", "-s", help="Show only types that match these words, best first.")
     ] = None,
-    category: Annotated[str | None, typer.Option("--category", "-c", help="Only those of this category.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Write all that is known of them as JSON.")] = False,
+    category: Annotated[str | None, typer.Option("--category", "-c", help="Show only types of this category.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write complete descriptions as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show hfg's own frames in tracebacks.")] = False,
 ) -> int:
-    """List node types, of a module or of all that is installed; of one type show its ports, parameters and text."""
+    """List the node types of a module, or all that are installed; or describe one type."""
     show.set_debug(debug)
     if what is None and not json:
         return _installed(search, category)

@@ -42,16 +42,16 @@ TargetArgument = Annotated[
         help="module:graph, file.py, file.py:graph, file.hfg.yaml or file.apex", autocompletion=completing.targets
     ),
 ]
-ClockOption = Annotated[Clock, typer.Option(help="virtual: as fast as the machine can, the same each time.")]
+ClockOption = Annotated[Clock, typer.Option(help="virtual: as fast as possible, and reproducible.")]
 UntilOption = Annotated[
     float | None,
-    typer.Option(metavar="SECONDS", callback=_not_negative, help="End the run at this time on its clock."),
+    typer.Option(metavar="SECONDS", callback=_not_negative, help="Stop after this many seconds."),
 ]
 ParamOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="PATH=VALUE",
-        help="Set a parameter, as in lookup.tolerance=0.2; may be given several times.",
+        help="Set a parameter, as in lookup.tolerance=0.2. Can be repeated.",
         autocompletion=completing.parameters,
     ),
 ]
@@ -59,21 +59,23 @@ ArgOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME=VALUE",
-        help="An argument of the function that builds the graph, as in count=3; may be given several times.",
+        help="Pass an argument to the function that builds the graph, as in count=3. Can be repeated.",
     ),
 ]
 AllowOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="PACKAGE",
-        help="A module or package whose code a graph file may run; may be given several times.",
+        help="Allow a graph file to use this module or package. Can be repeated.",
     ),
 ]
 SettingsOption = Annotated[
     str | None,
-    typer.Option(metavar="FILE", help="Settings of the realm (TOML): where agents and other hosts are found."),
+    typer.Option(metavar="FILE", help="Settings of the realm (TOML): addresses of agents and other hosts."),
 ]
 DebugOption = Annotated[
     bool, typer.Option("--debug", help="Check values against port types; show hfg's own frames in tracebacks.")
 ]
-VerboseOption = Annotated[int, typer.Option("-v", "--verbose", count=True, help="Report each node; twice, each edge.")]
+VerboseOption = Annotated[
+    int, typer.Option("-v", "--verbose", count=True, help="Report each node; with -vv, each edge.")
+]

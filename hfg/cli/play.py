@@ -43,23 +43,23 @@ def play(
         typer.Option(
             "--map",
             metavar="FROM=TO",
-            help="Play a recorded port as another of the graph, as in camera.out=front.image; several times.",
+            help="Play a recorded port into another port, as in camera.out=front.image. Can be repeated.",
         ),
     ] = None,
-    speed: Annotated[str, typer.Option(help="How much faster than it was recorded; max: as fast as can be.")] = "1",
+    speed: Annotated[str, typer.Option(help="Speed factor, or max for as fast as possible.")] = "1",
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="Record the run again.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     pickle: Annotated[bool, typer.Option("--pickle", help="Read pickled values, which runs code.")] = False,
     clock: ClockOption = Clock.real,
     until: UntilOption = None,
     param: ParamOption = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
-    table: Annotated[bool, typer.Option(help="On a terminal and the real clock, a live table of nodes.")] = True,
+    table: Annotated[bool, typer.Option(help="Show a live table of nodes (on a terminal and the real clock).")] = True,
     debug: DebugOption = False,
     verbose: VerboseOption = 0,
 ) -> int:
-    """Play a recording into a graph, in the place of the sources that were recorded."""
+    """Play a recording into a graph, in place of the recorded sources."""
     show.set_debug(debug)
     records = show.Records(verbose, debug, virtual=clock is Clock.virtual)
     ports = dict(_pair(one) for one in mapped or [])

@@ -49,24 +49,22 @@ def record(
         list[str] | None,
         typer.Option(
             metavar="PATTERN",
-            help="Ports or nodes, as in 'camera/*' or detect.out; may be given several times. All outputs and events.",
+            help="Ports or nodes, as in 'camera/*' or detect.out. Can be repeated. Default: all outputs and events.",
         ),
     ] = None,
-    lossless: Annotated[
-        bool, typer.Option(help="Nodes wait for a disk that is too slow; else what it is too slow for is left out.")
-    ] = True,
-    images: Annotated[_Images, typer.Option(help="How images are written; png keeps every bit.")] = _Images.raw,
-    pickle: Annotated[bool, typer.Option("--pickle", help="Pickle values that are no data.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
+    lossless: Annotated[bool, typer.Option(help="Let nodes wait for a slow disk, or skip tokens instead.")] = True,
+    images: Annotated[_Images, typer.Option(help="Image format; png is lossless.")] = _Images.raw,
+    pickle: Annotated[bool, typer.Option("--pickle", help="Pickle values that are not plain data.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     clock: ClockOption = Clock.real,
     until: UntilOption = None,
     param: ParamOption = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
-    table: Annotated[bool, typer.Option(help="On a terminal and the real clock, a live table of nodes.")] = True,
+    table: Annotated[bool, typer.Option(help="Show a live table of nodes (on a terminal and the real clock).")] = True,
     debug: DebugOption = False,
 ) -> int:
-    """Run a graph and record what passes its ports, for hfg play, hfg info and Foxglove; Ctrl-C ends it well."""
+    """Run a graph and record its ports for hfg play, hfg info and Foxglove. Ctrl-C ends the recording properly."""
     show.set_debug(debug)
     records = show.Records(0, debug, virtual=clock is Clock.virtual)
     graph = load_graph(target, arg or [], allow)

@@ -17,10 +17,10 @@ __all__ = ["recover"]
 
 def recover(
     file: Annotated[Path, typer.Argument(help="a recording, or any MCAP file")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="Where to write what can be read.")],
-    force: Annotated[bool, typer.Option("--force", help="Write over a file that is there.")] = False,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The new recording.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> int:
-    """Write all that can be read of a damaged recording into a complete one, and say what is lost."""
+    """Write everything that can be read from a damaged recording to a new file, and report what is lost."""
     try:
         count, losses = recover_recording(file, output, force=force)
     except UsageError as error:

@@ -55,13 +55,13 @@ def run(
     arg: ArgOption = None,
     allow: AllowOption = None,
     settings: SettingsOption = None,
-    policy: Annotated[str | None, typer.Option(help="Which node is next: fifo, priority, random ...")] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the policy random.")] = None,
+    policy: Annotated[str | None, typer.Option(help="Which node runs next: fifo, priority, random ...")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed for --policy random.")] = None,
     trace: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Write every event of the run, one JSON object a line; in .json, a timeline for Perfetto.",
+            help="Write every event of the run, one JSON object per line; to a .json file, a timeline for Perfetto.",
         ),
     ] = None,
     report_file: Annotated[
@@ -69,20 +69,18 @@ def run(
         typer.Option(
             "--report",
             metavar="FILE",
-            help="Write a page about the run, one HTML file: drawing, activity, counts, pictures.",
+            help="Write a report page, one HTML file: drawing, activity, counts, images.",
         ),
     ] = None,
-    pictures: Annotated[int, typer.Option(metavar="N", help="With --report: how many pictures it shows at most.")] = 24,
-    table: Annotated[
-        bool, typer.Option(help="On a terminal and the real clock, a live table of nodes while it runs.")
-    ] = True,
+    pictures: Annotated[int, typer.Option(metavar="N", help="With --report: show at most N images.")] = 24,
+    table: Annotated[bool, typer.Option(help="Show a live table of nodes (on a terminal and the real clock).")] = True,
     json: Annotated[
-        bool, typer.Option("--json", help="Write the report as JSON; what nodes print goes to standard error.")
+        bool, typer.Option("--json", help="Write the report as JSON. Output of nodes goes to standard error.")
     ] = False,
     debug: DebugOption = False,
     verbose: VerboseOption = 0,
 ) -> int:
-    """Run a graph to its end; Ctrl-C ends it earlier, twice at once."""
+    """Run a graph. Ctrl-C stops it; a second Ctrl-C stops it immediately."""
     show.set_debug(debug)
     records = show.Records(verbose, debug, virtual=clock is Clock.virtual)
     graph = load_graph(target, arg or [], allow)

@@ -59,7 +59,7 @@ _PATIENCE_S: Final = 2.0  # for one look
 _FIRST_LIFE: Final = 1
 
 RunArgument = Annotated[
-    str, typer.Argument(metavar="RUN", help="its name or the beginning of it, or that of its graph")
+    str, typer.Argument(metavar="RUN", help="name of the run, its first characters, or the name of its graph")
 ]
 
 
@@ -111,7 +111,7 @@ def ps(
     settings: SettingsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Write agents and runs as JSON.")] = False,
 ) -> int:
-    """List agents, runs and their parts in the realm."""
+    """List the agents, runs and processes of the realm."""
     return asyncio.run(_ps(settings, json))
 
 
@@ -119,14 +119,15 @@ def deploy(
     target: TargetArgument,
     settings: SettingsOption = None,
     on: Annotated[
-        str | None, typer.Option("--on", metavar="HOST", help="Whose agent runs the main part; else that of here.")
+        str | None,
+        typer.Option("--on", metavar="HOST", help="The host whose agent runs the main part. Default: this host."),
     ] = None,
     until: UntilOption = None,
     param: ParamOption = None,
     arg: ArgOption = None,
     allow: AllowOption = None,
 ) -> int:
-    """Let an agent run a graph, which goes on when this terminal is closed."""
+    """Run a graph on an agent; it keeps running when this terminal closes."""
     arguments = [] if until is None else ["--until", f"{until!r}"]
     for name, values in (("--param", param), ("--arg", arg), ("--allow", allow)):
         for value in values or ():
@@ -137,9 +138,9 @@ def deploy(
 def logs(
     run: RunArgument,
     settings: SettingsOption = None,
-    follow: Annotated[bool, typer.Option("--follow", "-f", help="Go on until the run is over.")] = False,
+    follow: Annotated[bool, typer.Option("--follow", "-f", help="Continue until the run is over.")] = False,
 ) -> int:
-    """Print what the parts of a run have written on the hosts of agents."""
+    """Print the output of a run's processes on the hosts of agents."""
     try:
         return asyncio.run(_logs(settings, run, follow))
     except KeyboardInterrupt:  # how one leaves it
@@ -147,15 +148,15 @@ def logs(
 
 
 def stop(run: RunArgument, settings: SettingsOption = None) -> int:
-    """End a run well, whatever host it is on."""
+    """End a run normally, on whichever host it is."""
     return asyncio.run(_stop(settings, run))
 
 
 def restart(
-    part: Annotated[str, typer.Argument(metavar="RUN/GROUP", help="a group of a run, which has a process of its own")],
+    part: Annotated[str, typer.Argument(metavar="RUN/GROUP", help="a group of a run that has a process of its own")],
     settings: SettingsOption = None,
 ) -> int:
-    """End the process of one group and begin another, while the rest of the run waits."""
+    """Restart the process of one group while the rest of the run waits."""
     run, slash, group = part.partition("/")
     if not slash or not run or not group:
         raise TargetError(f'"{part}" names no group of a run: write RUN/GROUP, as hfg ps shows them')

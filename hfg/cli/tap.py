@@ -44,19 +44,19 @@ def tap(
     ],
     clock: ClockOption = Clock.real,
     until: UntilOption = None,
-    limit: Annotated[int | None, typer.Option("-n", "--limit", min=1, help="End after so many tokens.")] = None,
+    limit: Annotated[int | None, typer.Option("-n", "--limit", min=1, help="Stop after N tokens.")] = None,
     rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Print at most so many tokens a second, the newest.")
+        float | None, typer.Option(metavar="HZ", help="Print at most this many tokens per second, the newest.")
     ] = None,
     param: ParamOption = None,
     allow: AllowOption = None,
     json: Annotated[bool, typer.Option("--json", help="Write each token as a JSON object.")] = False,
     debug: DebugOption = False,
 ) -> int:
-    """Print the tokens of a port or an edge, one a line; what nodes print goes to standard error.
+    """Print the tokens that pass a port or an edge, one per line. Output of nodes goes to standard error.
 
-    The graph is run for it. If TARGET is the number of a process or the name of a graph, as hfg top shows them, look at
-    what runs there already.
+    This runs the graph. If TARGET is a process id or the name of a running graph, as hfg top shows them, it watches
+    that run instead.
     """
     show.set_debug(debug)
     records = show.Records(0, debug, virtual=clock is Clock.virtual)

@@ -31,12 +31,12 @@ _BETWEEN_S = 1.0  # where there is one table only, rates are those of so long
 
 def top(
     run: Annotated[
-        str | None, typer.Argument(help="process id or name of the graph; without it, the only one that runs")
+        str | None, typer.Argument(help="process id or name of the graph; default: the only running graph")
     ] = None,
     settings: SettingsOption = None,
-    json: Annotated[bool, typer.Option("--json", help="Write one look at the run as JSON.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Write the current state of the run as JSON.")] = False,
 ) -> int:
-    """Watch a graph that runs in another process, by `hfg run` or a program; without a terminal, one table."""
+    """Watch a graph that is running in another process. Without a terminal, print one table."""
     if settings is not None:
         with RealmLine(settings, run) as far:
             return _look(far, json)
