@@ -1,18 +1,18 @@
-"""Recording what passes ports of a run to MCAP files, and playing it back.
+"""Recording the tokens of a run's ports to MCAP files, and playing them back.
 
-playing     nodes that send what was recorded             `hfg play`
-players     step by step, at its time
-tracks      what one node did: firings, calls, signals
-reading     files, also damaged ones                      `hfg info`
-recovering  makes a complete file of one that is not      `hfg recover`
-recording   which ports, what is said about the run       `run.record`, `hfg record`
+playing     nodes that send recorded tokens               `hfg play`
+players     play step by step, each at its time
+tracks      the steps of one node: firings, calls, signals
+reading     files, including damaged ones                 `hfg info`
+recovering  makes a complete file of an incomplete one    `hfg recover`
+recording   which ports, description of the run           `run.record`, `hfg record`
 writing     the thread that encodes and writes
 mcap        the file: chunks, indexes, summary
-layout      where everything lies in a file, damaged or not
-chunks      what is in a chunk, within bounds
-messages    what a token looks like in it
-schemas     JSON schemas, those of Foxglove for images
-values      values as JSON and back, to the bit
+layout      where everything is in a file, damaged or not
+chunks      the contents of a chunk, within bounds
+messages    the form of a token in it
+schemas     JSON schemas, Foxglove's for images
+values      values as JSON and back, bit for bit
 """
 
 from hfg.recording.playing import Playing, play_into

@@ -1,7 +1,7 @@
 """Unpacks a chunk of an MCAP file within bounds, and finds the messages in it (rule L4).
 
-A chunk says itself how long it is, packed and unpacked, and each record in it how long that one is. None of this is
-believed: whatever does not fit is `Damaged`, before memory is spent on it. Stands on bounds, lz4 and zstandard.
+A chunk states its own length, packed and unpacked, and each record in it states its length. These lengths are not
+trusted: a mismatch raises `Damaged` before memory is allocated for it. Depends on bounds, lz4 and zstandard.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 HEAD: Final = struct.Struct("<BQ")
-"""What stands before each record: what it is, and its length."""
+"""The head of each record: its kind and its length."""
 SCHEMA, CHANNEL, MESSAGE, CHUNK = 3, 4, 5, 6
 
 _MESSAGE: Final = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
@@ -43,19 +43,19 @@ _BLOCK: Final = 2**20
 
 
 class Damaged(Exception):
-    """Something in a file is not what it says."""
+    """Part of a file contradicts its own description."""
 
 
 class ChunkHead(NamedTuple):
-    """What a chunk says of itself.
+    """The head of a chunk.
 
     Attributes:
       first: time of its first message, in nanoseconds.
-      last: of its last.
-      size: unpacked.
-      checksum: of what is unpacked; 0: none.
-      compression: its name.
-      begin: where what is packed begins in the record.
+      last: time of its last message.
+      size: size of the unpacked data.
+      checksum: checksum of the unpacked data; 0: none.
+      compression: name of the compression.
+      begin: offset of the packed data in the record.
     """
 
     first: int
@@ -67,38 +67,38 @@ class ChunkHead(NamedTuple):
 
 
 def chunk_head(data: bytes, length: int) -> ChunkHead:
-    """Read what a chunk says of itself.
+    """Read the head of a chunk.
 
     Args:
-      data: the beginning of its record, 60 bytes or all.
-      length: of the whole record.
+      data: the start of its record, at least 60 bytes or all of it.
+      length: length of the whole record.
 
     Raises:
-      Damaged: it is no chunk, or says what cannot be.
+      Damaged: it is not a chunk, or its head is impossible.
     """
     try:
         first, last, size, checksum, letters = _BEFORE.unpack_from(data)
         at = _BEFORE.size + letters
         if letters > 8:
-            raise Damaged("it names no way to unpack it")
+            raise Damaged("its compression has no name")
         compression = data[_BEFORE.size : at].decode("ascii")
         (packed,) = struct.unpack_from("<Q", data, at)
     except (struct.error, UnicodeDecodeError):
-        raise Damaged("its first bytes are none of a chunk") from None
+        raise Damaged("it does not start like a chunk") from None
     if packed != length - at - 8:
-        raise Damaged(f"it says that {packed:,} bytes are in it, but {length - at - 8:,} are")
+        raise Damaged(f"its head states {packed:,} bytes, but it has {length - at - 8:,}")
     return ChunkHead(first, last, size, checksum, compression, at + 8)
 
 
 def unpacked(record: bytes) -> bytes:
-    """Give what a chunk holds; no more memory is spent than `CHUNK_BYTES`, and what it says of its size.
+    """Return the unpacked data of a chunk. It uses no more memory than `CHUNK_BYTES`, nor than the size in its head.
 
     Raises:
-      Damaged: it cannot be unpacked, or is more than it says or than the limit.
+      Damaged: it cannot be unpacked, or exceeds the size in its head or the limit.
     """
     head = chunk_head(record, len(record))
     if head.size > CHUNK_BYTES.most:
-        raise Damaged(f"it says that it unpacks to {head.size:,} bytes, {CHUNK_BYTES.remedy}")
+        raise Damaged(f"it would unpack to {head.size:,} bytes, {CHUNK_BYTES.remedy}")
     packed = memoryview(record)[head.begin :]
     match head.compression:
         case "":
@@ -108,12 +108,12 @@ def unpacked(record: bytes) -> bytes:
         case "zstd":
             content = _unzstd(packed, head.size)
         case other:
-            raise Damaged(f'it is packed as "{other}", and only lz4 and zstd are known')
+            raise Damaged(f'it is packed as "{other}", but only lz4 and zstd are supported')
     if len(content) != head.size:
         more = "more than" if len(content) > head.size else f"{len(content):,} bytes, not"
-        raise Damaged(f"it unpacks to {more} the {head.size:,} bytes that it says")
+        raise Damaged(f"it unpacks to {more} the {head.size:,} bytes in its head")
     if head.checksum and zlib.crc32(content) != head.checksum:
-        raise Damaged("its checksum is another")
+        raise Damaged("its checksum is wrong")
     return content
 
 
@@ -127,7 +127,7 @@ def _unlz4(packed: memoryview, size: int) -> bytes:
 
 
 def _unzstd(packed: memoryview, size: int) -> bytes:
-    """Read it piece by piece: what its frame says of its size is not asked."""
+    """Read it piece by piece; the size in its frame is ignored."""
     window = 1 << max(20, CHUNK_BYTES.most.bit_length())
     parts: list[bytes] = []
     left = size + 1
@@ -153,18 +153,18 @@ class Message(NamedTuple):
 
 
 class Content(NamedTuple):
-    """What is in a chunk.
+    """The contents of a chunk.
 
     Attributes:
-      data: unpacked.
-      places: where each message begins, and where it ends.
+      data: the unpacked data.
+      places: start and end of each message.
     """
 
     data: bytes
     places: array[int]
 
     def messages(self) -> Iterator[Message]:
-        """Go through the messages; they are made as they are asked for, so that many small ones fit into memory."""
+        """Yield the messages. They are made on demand, so that many small ones fit into memory."""
         data, places = self.data, self.places
         for number in range(0, len(places), 2):
             begin, end = places[number], places[number + 1]
@@ -176,22 +176,22 @@ def content_of(data: bytes, declare: Callable[[int, bytes], None]) -> Content:
     """Find the records.
 
     Args:
-      data: unpacked.
-      declare: is given each schema and channel that is declared in it.
+      data: the unpacked data.
+      declare: called with each schema and channel that is declared in it.
 
     Raises:
-      Damaged: the lengths that they say do not add up to its own.
+      Damaged: the lengths of the records do not add up to the length of the chunk.
     """
     places = array("Q")
     at, end = 0, len(data)
     while at < end:
         if at + HEAD.size > end:
-            raise Damaged("a record in it is not whole")
+            raise Damaged("a record in it is incomplete")
         opcode, length = HEAD.unpack_from(data, at)
         begin = at + HEAD.size
         at = begin + length
         if at > end:
-            raise Damaged(f"a record in it says that it has {length:,} bytes, and there are {end - begin:,}")
+            raise Damaged(f"a record in it states {length:,} bytes, but there are {end - begin:,}")
         if opcode == MESSAGE:
             if length < _MESSAGE.size:
                 raise Damaged("a message in it is too short")

@@ -1,6 +1,6 @@
-"""In which of a few forms values of a type are written: what both ways, and the schemas of files, go by.
+"""The forms in which values of a type are written: the basis of encoding, decoding and the schemas of files.
 
-Stands on nothing of the recording.
+Does not depend on other modules of the recording.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 __all__ = ["PLAIN_TYPES", "Form", "bare", "fields_of", "form_of", "is_plain", "reference"]
 
 PLAIN_TYPES: Final = frozenset({bool, int, float, str})
-"""Types whose values nobody changes and JSON knows."""
+"""Types whose values are immutable and can be written as JSON."""
 
 
 def bare(hint: Any) -> Any:
-    """Give a type without what is said about it."""
+    """Return a type without its metadata."""
     while True:
         if typing.get_origin(hint) is Annotated:
             hint = typing.get_args(hint)[0]
@@ -35,7 +35,7 @@ def bare(hint: Any) -> Any:
 
 
 def is_plain(hint: Any) -> bool:
-    """Whether values of a type are numbers, truth values or text, and so can be kept as they are."""
+    """Return whether values of a type are numbers, booleans or strings, and so can be kept without a copy."""
     hint = bare(hint)
     if typing.get_origin(hint) is Literal:
         return all(type(one) in PLAIN_TYPES for one in typing.get_args(hint))
@@ -43,12 +43,12 @@ def is_plain(hint: Any) -> bool:
 
 
 def reference(kind: type) -> str:
-    """Give the name by which a class is found again."""
+    """Return the name by which a class can be found."""
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
 def fields_of(kind: Any) -> dict[str, Any] | None:
-    """Give the fields of a struct, dataclass or NamedTuple with their types; None of anything else."""
+    """Return the fields of a struct, dataclass or NamedTuple with their types; None for other classes."""
     if not isinstance(kind, type):
         return None
     if issubclass(kind, msgspec.Struct):
@@ -61,18 +61,18 @@ def fields_of(kind: Any) -> dict[str, Any] | None:
         return None
     try:
         hints = typing.get_type_hints(kind, include_extras=True)
-    except Exception:  # names that only a type checker knows
+    except Exception:  # names that exist only for type checkers
         hints = {}
     return {name: hints.get(name, Any) for name in names}
 
 
 class Form(NamedTuple):
-    """How values of a type are written; all others are, each, with their own types beside them.
+    """How values of a type are written; other values are written together with their own types.
 
     Attributes:
-      kind: "any" where nothing is known of the type.
-      of: the type of what is not None, of the items of a list, or of the values of a dict whose keys are names; the
-        types of fields by name; what is said of the items of a tuple.
+      kind: "any" if nothing is known about the type.
+      of: the type of values other than None, of the items of a list, or of the values of a dict whose keys are names;
+        the types of fields by name; the types of a tuple's items.
     """
 
     kind: Literal["optional", "fields", "enum", "bytes", "list", "tuple", "dict", "array", "any"]
@@ -80,7 +80,7 @@ class Form(NamedTuple):
 
 
 def form_of(hint: Any) -> Form:
-    """Give the form of a type that is `bare`."""
+    """Return the form of a type that is `bare`."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     other = _optional(hint)
     if other is not None:
@@ -104,7 +104,7 @@ def form_of(hint: Any) -> Form:
 
 
 def _optional(hint: Any) -> Any:
-    """The only other member of a union with None."""
+    """Return the only other member of a union with None."""
     if typing.get_origin(hint) not in (typing.Union, types.UnionType):
         return None
     others = [one for one in typing.get_args(hint) if one is not types.NoneType]

@@ -1,8 +1,9 @@
-"""Finds where everything lies in an MCAP file, also in one that is damaged or was cut off.
+"""Finds the position of everything in an MCAP file, even if the file is damaged or was cut off.
 
-A whole file has a summary that says where each chunk is; it is believed if its checksum holds. Records are followed
-from the beginning in any case. Where one cannot be, the next chunk is the one of the summary, or, without a summary,
-the next place that looks like one. Stands on `chunks` and the records of the package `mcap`.
+A complete file has a summary with the position of each chunk, which is used if its checksum is right. In any case,
+records are followed from the start. If a record cannot be read, the search continues at the next chunk according to the
+summary, or, without a summary, at the next place that looks like one. Depends on `chunks` and the records of the
+package `mcap`.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ from hfg.recording.mcap import MAGIC
 __all__ = ["Layout", "Piece", "read_record"]
 
 _FOOTER: Final = HEAD.size + 20 + len(MAGIC)
-_LONGEST_RECORD: Final = 64 * 2**20  # of what is no chunk, no message and no attachment
-_PIECE: Final = 4 * 2**20  # bytes of messages outside of chunks that are read at once
+_LONGEST_RECORD: Final = 64 * 2**20  # except chunks, messages and attachments
+_PIECE: Final = 4 * 2**20  # bytes of messages outside chunks that are read at once
 _LOOKS_LIKE_A_CHUNK: Final = re.compile(
     rb"\x06.{5}\x00{3}.{28}(?:\x03\x00{3}lz4|\x04\x00{3}zstd|\x00{4}).{5}\x00{3}", re.DOTALL
 )
@@ -49,12 +50,12 @@ _FIRST_PRIVATE: Final = 0x80
 
 
 class Piece(NamedTuple):
-    """Where messages lie: a chunk, or some that follow one another outside of any.
+    """A place with messages: a chunk, or consecutive messages outside chunks.
 
     Attributes:
-      begin: of the chunk's content, or of the first record.
-      length: of it.
-      is_chunk: which of both.
+      begin: start of the chunk's content, or of the first record.
+      length: its length.
+      is_chunk: whether it is a chunk.
     """
 
     begin: int
@@ -63,12 +64,12 @@ class Piece(NamedTuple):
 
     @property
     def end(self) -> int:
-        """Where the next record begins."""
+        """Where the next record starts."""
         return self.begin + self.length
 
 
 class _Exact(ReadDataStream):
-    """Reads what a record's lengths ask for, or refuses: the package gives what there is."""
+    """Reads exactly as many bytes as a record's lengths ask for, or fails; the package would return fewer."""
 
     def read(self, length: int) -> bytes:
         data: bytes = super().read(length)
@@ -78,7 +79,7 @@ class _Exact(ReadDataStream):
 
 
 def read_record(opcode: int, data: bytes) -> Any:
-    """Make a record of its bytes; None of a kind that nobody here asks for.
+    """Make a record from its bytes; None for kinds that are not used here.
 
     Raises:
       Damaged: it cannot be read.
@@ -90,23 +91,23 @@ def read_record(opcode: int, data: bytes) -> Any:
         return kind.read(_Exact(BytesIO(data)))
     except Damaged:
         raise
-    except Exception as error:  # the package raises what the bytes lead it to
+    except Exception as error:  # the package may raise anything for damaged bytes
         raise Damaged(f"a record of kind {Opcode(opcode).name} cannot be read ({error})") from None
 
 
 class Layout:
-    """Where everything lies.
+    """The positions of everything in a file.
 
     Attributes:
       whole: the file is complete up to its end, and so is its summary.
-      ended: nothing was recorded behind what is here; the summary may be damaged.
-      pieces: where messages lie, in order.
-      library: who has written it.
+      ended: the recording ended here; the summary may be damaged.
+      pieces: places of messages, in order.
+      library: the program that wrote it.
       schemas: by number.
       channels: by number.
-      metadata: by name; of several of one name the last.
-      beside: where attachments and metadata lie: what each is, its place and length.
-      faults: what is damaged outside of chunks, and where that begins.
+      metadata: by name; if there are several of one name, the last.
+      beside: places of attachments and metadata: kind, position and length of each.
+      faults: damage outside chunks, with the position of its start.
       statistics: of the summary.
     """
 
@@ -122,9 +123,10 @@ class Layout:
         self.beside: list[tuple[int, int, int]] = []
         self.faults: list[tuple[int, str]] = []
         self.statistics: Statistics | None = None
-        self._checksum: tuple[int, int] | None = None  # of all that is before a place, as its writer has said
-        self._indexed: dict[int, int] = {}  # length of each chunk of which the summary tells, by its place
-        self._bare = False  # the last piece is one of messages outside of chunks
+        # checksum of everything before a position, as stated by its writer
+        self._checksum: tuple[int, int] | None = None
+        self._indexed: dict[int, int] = {}  # length of each chunk in the summary, by its position
+        self._bare = False  # the last piece consists of messages outside chunks
         end = self._read_summary()
         self._places = sorted(self._indexed)
         self._follow(len(MAGIC), size if end is None else end)
@@ -132,7 +134,7 @@ class Layout:
     # --- the summary --------------------------------------------------------------------------------------------------
 
     def _read_summary(self) -> int | None:
-        """Read the summary, if there is one that is not damaged; gives where it begins."""
+        """Read the summary, if there is one that is not damaged. Return its position."""
         if self._size < _FOOTER + len(MAGIC):
             return None
         tail = self._at(self._size - _FOOTER, _FOOTER)
@@ -178,13 +180,13 @@ class Layout:
     def _take_index(self, record: ChunkIndex) -> None:
         at, length = record.chunk_start_offset, record.chunk_length
         if at < len(MAGIC) or length < HEAD.size or at + length > self._size:
-            raise Damaged("it tells of a chunk that is not in the file")
+            raise Damaged("it lists a chunk that is not in the file")
         self._indexed[at] = length
 
     # --- the data -----------------------------------------------------------------------------------------------------
 
     def _follow(self, at: int, end: int) -> None:
-        """Go from record to record, over chunks without looking into them."""
+        """Follow records from `at` to `end`, skipping the contents of chunks."""
         while at < end and not self.ended:
             known = self._indexed.get(at)
             if known is not None:
@@ -202,7 +204,7 @@ class Layout:
                 self.faults.append((at, str(error)))
                 at = end if found is None else found
         if not self.whole:
-            behind = "its summary cannot be read, so it is read without" if self.ended else "it was cut off here"
+            behind = "its summary cannot be read and was ignored" if self.ended else "it was cut off here"
             self.faults.append((at, behind))
 
     def _take(self, opcode: int, at: int, length: int) -> None:
@@ -211,13 +213,13 @@ class Layout:
             self._add(Piece(at, length, is_chunk=True))
         elif opcode == MESSAGE:
             if self._places and self.profile == "hfg":
-                raise Damaged("a message is outside of the chunks, where hfg writes none")
+                raise Damaged("a message is outside the chunks, where hfg does not write any")
             self._take_message(at, length)
         elif opcode == Opcode.ATTACHMENT:
             self.beside.append((opcode, at, length))
         elif opcode == Opcode.DATA_END:
             if length < 4 or (self._places and at <= self._places[-1]):
-                raise Damaged("what looks like the end of the data is none")
+                raise Damaged("the end of the data is not valid")
             self.ended = True
             (checksum,) = struct.unpack("<I", self._at(at, 4))
             if checksum:
@@ -241,7 +243,7 @@ class Layout:
         self._bare = True
 
     def declare(self, record: Any) -> None:
-        """Take what says what is in the file."""
+        """Process a record that declares contents of the file."""
         match record:
             case Header():
                 self.library, self.profile = record.library, record.profile
@@ -279,7 +281,7 @@ class Layout:
         return min(self._places[number], end) if number < len(self._places) else end
 
     def lost_in(self, piece: Piece) -> tuple[int | None, int | None, int | None]:
-        """Say what was in a chunk that cannot be read: how many messages, and their times, as far as it is known."""
+        """Return the contents of an unreadable chunk as far as known: number of messages, and their times."""
         count = None
         for length in self._message_indexes(piece.end):
             count = (count or 0) + max(length - 6, 0) // 16
@@ -290,7 +292,7 @@ class Layout:
         return count, head.first, head.last
 
     def _message_indexes(self, at: int) -> Iterator[int]:
-        """The lengths of the records behind a chunk that say where its messages are."""
+        """Yield the lengths of the index records after a chunk."""
         while True:
             try:
                 opcode, length = self._head(at, self._size)
@@ -302,7 +304,7 @@ class Layout:
             at += HEAD.size + length
 
     def keeps_its_checksum(self) -> bool:
-        """Whether all before the end of the data is as it was written; as far as the file says."""
+        """Return whether everything before the end of the data is unchanged, as far as the file has a checksum."""
         if self._checksum is None:
             return True
         end, said = self._checksum
@@ -315,19 +317,19 @@ class Layout:
         return self._stream.read(length)
 
     def _head(self, at: int, end: int) -> tuple[int, int]:
-        """What a record is, and its length; it ends before `end`."""
+        """Return kind and length of a record that ends before `end`."""
         if at + HEAD.size > end:
-            raise Damaged("a record is not whole")
+            raise Damaged("a record is incomplete")
         opcode, length = HEAD.unpack(self._at(at, HEAD.size))
         if opcode == 0 or _LAST_OPCODE < opcode < _FIRST_PRIVATE:
-            raise Damaged("what should be a record is none")
+            raise Damaged("a record is not valid")
         if length > end - at - HEAD.size:
-            raise Damaged(f"a record says that it has {length:,} bytes, which are not there")
+            raise Damaged(f"a record states {length:,} bytes, which are not there")
         return opcode, length
 
     def _record(self, opcode: int, at: int, length: int) -> Any:
         if length > _LONGEST_RECORD:
-            raise Damaged(f"a record has {length:,} bytes, and none that describes may have more than 64 MiB")
+            raise Damaged(f"a record has {length:,} bytes, but descriptions may have at most 64 MiB")
         return read_record(opcode, self._at(at, length))
 
     def _checksum_of(self, at: int, end: int) -> int:
@@ -339,10 +341,10 @@ class Layout:
         return found
 
     def content(self, begin: int, length: int) -> bytes:
-        """Read a record; of a chunk what is packed.
+        """Read a record; for a chunk, the packed data.
 
         Raises:
-          Damaged: it is longer than any may be.
+          Damaged: it is longer than allowed.
         """
         if length > CHUNK_BYTES.most + _HEAD_OF_A_CHUNK:
             raise Damaged(f"it has {length:,} bytes, {CHUNK_BYTES.remedy}")

@@ -1,8 +1,9 @@
 """Writes MCAP files in batches: chunked, compressed, indexed, with a summary, and readable up to the last chunk.
 
-The package `mcap` writes one message a call, which costs more than most graphs do for a token; here a batch of encoded
-messages becomes a chunk in a few calls. What is written is the format's own (https://mcap.dev/spec): each chunk is
-handed to the system as soon as it is whole, so a file that was cut off opens up to there. Stands on nothing of hfg.
+The package `mcap` writes one message per call, which costs more time than most graphs spend per token; here a batch of
+encoded messages becomes a chunk in a few calls. The output follows the format's specification (https://mcap.dev/spec).
+Each chunk is passed to the system as soon as it is complete, so a file that was cut off can be read up to there. Does
+not depend on hfg.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ _HEAD: Final = np.dtype(
         ("publish_time", "<u8"),
     ]
 )
-"""What stands before the data of a message."""
+"""The head of a message, before its data."""
 
-_HEAD_BYTES: Final = f"V{_HEAD.itemsize}"  # each as bytes, in one call
+_HEAD_BYTES: Final = f"V{_HEAD.itemsize}"  # all heads as bytes, in one call
 
 
 class _ChunkIndex(NamedTuple):
@@ -61,9 +62,9 @@ class Writer:
     """One file.
 
     Attributes:
-      bytes_written: its length up to here.
-      chunk_bytes: of the chunk under way, before it is compressed.
-      chunk_messages: how many it holds.
+      bytes_written: its length so far.
+      chunk_bytes: size of the open chunk before compression.
+      chunk_messages: number of messages in it.
     """
 
     def __init__(self, stream: BinaryIO, *, library: str, profile: str = "") -> None:
@@ -72,11 +73,11 @@ class Writer:
         self.bytes_written = 0
         self.chunk_bytes = 0
         self.chunk_messages = 0
-        self._contents: list[bytes] = []  # of the chunk under way
+        self._contents: list[bytes] = []  # of the open chunk
         self._columns: list[tuple[Array, Array, Array]] = []  # its channels, times and lengths
         self._schemas: list[bytes] = []
         self._channels: list[bytes] = []
-        self._new: list[bytes] = []  # schemas and channels that no chunk holds yet
+        self._new: list[bytes] = []  # schemas and channels that no chunk contains yet
         self._chunks: list[_ChunkIndex] = []
         self._metadata: list[tuple[int, int, str]] = []
         self._counts: dict[int, int] = {}
@@ -89,7 +90,7 @@ class Writer:
         return len(self._chunks)
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Declare a schema; gives its number, from 1."""
+        """Declare a schema. Return its number, from 1."""
         number = len(self._schemas) + 1
         record = _record(_SCHEMA, struct.pack("<H", number), _text(name), _text(encoding), _blob(data))
         self._schemas.append(record)
@@ -97,7 +98,7 @@ class Writer:
         return number
 
     def add_channel(self, topic: str, schema: int, encoding: str, metadata: Mapping[str, str]) -> int:
-        """Declare a channel; gives its number, from 1."""
+        """Declare a channel. Return its number, from 1."""
         number = len(self._channels) + 1
         record = _record(_CHANNEL, struct.pack("<HH", number, schema), _text(topic), _text(encoding), _texts(metadata))
         self._channels.append(record)
@@ -106,7 +107,7 @@ class Writer:
         return number
 
     def add_metadata(self, name: str, metadata: Mapping[str, str]) -> None:
-        """Write a record of metadata, and hand it to the system."""
+        """Write a record of metadata, and pass it to the system."""
         record = _record(_METADATA, _text(name), _texts(metadata))
         self._metadata.append((self.bytes_written, len(record), name))
         self._write(record)
@@ -120,7 +121,7 @@ class Writer:
         publish_times: Array,
         bodies: Sequence[bytes],
     ) -> None:
-        """Put messages into the chunk under way: columns, times in nanoseconds."""
+        """Put messages into the open chunk: columns, times in nanoseconds."""
         heads = np.empty(len(bodies), _HEAD)
         lengths = np.fromiter(map(len, bodies), np.int64, len(bodies))
         heads["opcode"] = _MESSAGE
@@ -139,7 +140,7 @@ class Writer:
         self.chunk_messages += len(bodies)
 
     def end_chunk(self) -> None:
-        """Write the chunk under way, and hand it to the system."""
+        """Write the open chunk, and pass it to the system."""
         if not self._columns:
             return
         declared = b"".join(self._new)
@@ -177,8 +178,8 @@ class Writer:
         self._times = (first, last) if self._times is None else (min(first, self._times[0]), max(last, self._times[1]))
 
     def finish(self) -> None:
-        """Write what tells a reader where everything is. The stream stays open."""
-        if self._new:  # channels on which nothing passed
+        """Write the index for readers. The stream stays open."""
+        if self._new:  # channels without messages
             self._write(b"".join(self._new))
             self._new.clear()
         self._write(_record(_DATA_END, struct.pack("<I", self._checksum)))
@@ -238,7 +239,7 @@ class Writer:
 def _by_channel(
     channels: npt.NDArray[Any], times: npt.NDArray[Any], offsets: npt.NDArray[Any]
 ) -> Iterator[tuple[int, npt.NDArray[np.uint64]]]:
-    """Give the channels of the messages of a chunk, each with the times and places of its own, in their order."""
+    """Yield the channels of the messages of a chunk, each with the times and places of its messages, in order."""
     order = np.argsort(channels, kind="stable")
     pairs = np.empty((len(channels), 2), "<u8")
     pairs[:, 0], pairs[:, 1] = times[order], offsets[order]
@@ -250,7 +251,7 @@ def _by_channel(
 
 
 def _compressed(content: bytes) -> tuple[str, bytes]:
-    """What takes less room: pictures that are compressed already do not become smaller."""
+    """Return the content compressed, unless it does not shrink, as pictures that are already compressed."""
     packed = lz4.frame.compress(content, store_size=True)
     if len(packed) < _WORTH_COMPRESSING * len(content):
         return "lz4", packed

@@ -1,7 +1,7 @@
-"""What a token looks like in the file: one kind of message for each kind of port. Stands on `schemas` and `values`.
+"""The form of tokens in a file: one kind of message for each kind of port. Depends on `schemas` and `values`.
 
-Markers are no values, so that a channel holds values alone, which other programs can plot: they have a channel of
-their own, and so has what happens to the graph itself.
+Markers are not values and have a channel of their own, so that a channel contains only values, which other programs can
+plot. Events of the graph itself have a separate channel, too.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ MARKERS: Final = "hfg/markers"
 """Channel of markers: silence and the ends of streams."""
 
 EVENTS: Final = "hfg/events"
-"""Channel of what happens in a run apart from tokens: activity, parameters, structure, errors."""
+"""Channel of events of a run other than tokens: activity, parameters, structure, errors."""
 
 Images = Literal["raw", "png", "jpeg"]
 
@@ -48,7 +48,7 @@ _TOLD: Final = ("began", "call", "beside", "silent", "last", "waited", "refused"
 
 
 class Firings:
-    """Numbers the firings of a node that has several outputs, so that each is played as one.
+    """Numbers the firings of a node that has several outputs, so that each is played back as one firing.
 
     A firing puts one token on each live output (F3), and which are live changes only with the structure of the graph.
     So a firing is over when one of its outputs sends again, or when the structure has changed.
@@ -73,11 +73,11 @@ class Firings:
 
 
 class _Circumstances(msgspec.Struct, omit_defaults=True, kw_only=True):
-    """How a token was sent, as far as the token does not say so itself; see `recorder.Told`.
+    """How a token was sent, as far as the token itself does not show it; see `recorder.Told`.
 
     Attributes:
       firing: number of the firing among those of its node; 0: the node has one output, so each token is a firing.
-      refused: the value could not be recorded, and silence stands in its place.
+      refused: the value could not be recorded; silence takes its place.
     """
 
     time: float | None = None
@@ -92,7 +92,7 @@ class _Circumstances(msgspec.Struct, omit_defaults=True, kw_only=True):
 
 
 class Marked(_Circumstances, omit_defaults=True):
-    """A marker that has passed a port."""
+    """A marker that was sent by a port."""
 
     port: str
     marker: str
@@ -102,7 +102,7 @@ class Marked(_Circumstances, omit_defaults=True):
 
 
 class Timed(_Circumstances):
-    """A token that passed at another time than that of its stamp, in virtual time, which is exact."""
+    """A token that was sent at a time other than its stamp, in virtual time, which is exact."""
 
     value: Any
     activity: int
@@ -111,7 +111,7 @@ class Timed(_Circumstances):
 
 
 class PlainToken(msgspec.Struct, gc=False):
-    """A token with a number, as it is in the file; made in great numbers, so the garbage collector is not to look."""
+    """A token with a number, as in the file. There are many, so it is not tracked by the garbage collector."""
 
     value: float
     activity: int
@@ -151,7 +151,7 @@ class _Compressed(_Circumstances, omit_defaults=True):
 
 
 def circumstances(token: Token[Any], time: float | None, firing: int) -> dict[str, Any]:
-    """What is written of how a token came to be sent; `time`: when it passed, if that is to be written."""
+    """Return the recorded circumstances of a token; `time`: when it was sent, if that is to be written."""
     found: dict[str, Any] = {"firing": firing} if time is None else {"time": time, "firing": firing}
     if type(token) is Told:
         found |= {name: getattr(token, name) for name in _TOLD}
@@ -159,18 +159,18 @@ def circumstances(token: Token[Any], time: float | None, firing: int) -> dict[st
 
 
 class TokenWriter:
-    """Makes messages of the tokens of one port.
+    """Makes messages from the tokens of one port.
 
     Attributes:
-      keep: makes of a value what nobody changes any more, and its size, on the loop of the run; None: nobody can
-        change it anyway.
+      keep: returns an immutable copy of a value and its size, on the loop of the run; None: values are immutable
+        anyway.
       metadata: of its channel.
       channel: its number in the file; 0 before the first value.
-      values: how many were written.
-      markers: how many.
-      left_out: how many tokens there was no time for.
-      refused: how many values are no data.
-      firings: numbers the firings of its node; None: the port is the node's only output, or no output.
+      values: number of values written.
+      markers: number of markers written.
+      left_out: number of tokens skipped for lack of time.
+      refused: number of values that are not data.
+      firings: numbers the firings of its node; None: the port is the node's only output, or not an output.
       schema_name: of its channel.
       schema: of its channel.
     """
@@ -207,11 +207,11 @@ class TokenWriter:
 
     def _keep_image(self, value: Any) -> tuple[np.ndarray[Any, Any], int]:
         if not isinstance(value, np.ndarray) or schemas.encoding_of(value) is None:
-            raise CannotKeep(f"{describe_value(value)} is no image")
+            raise CannotKeep(f"{describe_value(value)} is not an image")
         return np.array(value, order="C", copy=True), value.nbytes
 
     def message(self, token: Token[Any], time: float | None, firing: int = 0) -> Any:
-        """Give what is to be encoded; `time`: when it passed, if that is to be written."""
+        """Return the data to encode; `time`: when the token was sent, if that is to be written."""
         if self.is_image:
             return self._image(token, time, firing)
         value = token.value
@@ -243,14 +243,14 @@ class TokenWriter:
 
 
 class TokenReader:
-    """Makes tokens of the messages of one channel."""
+    """Makes tokens from the messages of one channel."""
 
     def __init__(self, schema_name: str, hint: Any, *, may_pickle: bool) -> None:
         self._schema_name = schema_name
         self._codec = Codec(hint, may_pickle=may_pickle)
 
     def token(self, message: dict[str, Any]) -> Token[Any]:
-        """Read one.
+        """Return the token of a message.
 
         Raises:
           CannotKeep: the value cannot be read here.
@@ -279,7 +279,7 @@ def _decompress(data: str, shape: list[int]) -> np.ndarray[Any, Any]:
     need_fair_size(packed, "the picture")
     value: Any = cv2.imdecode(np.frombuffer(packed, np.uint8), cv2.IMREAD_UNCHANGED)
     if value is None:
-        raise CannotKeep("it is no picture that OpenCV can read, or it is not whole")
+        raise CannotKeep("it is not a picture that OpenCV can read, or it is incomplete")
     decoded: np.ndarray[Any, Any] = value.reshape(shape)
     return decoded
 

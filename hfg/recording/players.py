@@ -1,8 +1,8 @@
 """Plays the steps of a track as the code of one node: its process function, its `ready()`, its slots.
 
-A firing is played when it began, by the clock; what the engine would not yet allow a node of its kind (its outputs, its
-rate in a run that is the same to the bit) it does not allow the player either. A slot call is played when that call
-comes, by its number, else when it was. Stands on the engine and `tracks`.
+A firing is played when it started, by the clock. If the engine would not yet allow a node of its kind to fire (its
+outputs, its rate in a bit-identical run), it does not allow the player either. A slot call is played when that call
+arrives, by its number; otherwise at its recorded time. Depends on the engine and `tracks`.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ class Player:
     """Plays the steps of a track.
 
     Attributes:
-      engine: of the run in which it plays; None outside of one.
+      engine: engine of the run in which it plays; None outside a run.
     """
 
     def __init__(self, node: Node, track: Track, outputs: Mapping[str, str], speed: float | None) -> None:
-        """Begin.
+        """Start.
 
         Args:
-          node: it sends.
-          track: what.
-          outputs: which recorded port is which of its outputs and events.
-          speed: how much faster than it was; None: as fast as can be.
+          node: the node that sends.
+          track: the steps to play.
+          outputs: the node's output or event for each recorded port.
+          speed: factor of the recorded speed; None: as fast as possible.
         """
         self._node = node
         self._outputs = outputs
@@ -57,24 +57,24 @@ class Player:
         run: Any = None if node._place is None else level_of(node._place.graph).whole.run
         self.engine: Any = getattr(run, "_engine", None)
         self._worker: Any = None if self.engine is None else self.engine.worker_of(node)
-        self._start: float | None = None  # when its graph began to move
+        self._start: float | None = None  # when its graph started to run
         self._waits = self._waits_for_other = False
 
     def _begin_at(self, start: float) -> None:
         self._start = start
         worker = self._worker
         if not self._is_exact() and worker.options.max_rate_hz:
-            # what it had for a rate is in the recording, and would only hold up who plays faster
+            # the recording reflects the node's original rate limit, which would only slow down faster playback
             worker.options = msgspec.structs.replace(worker.options, max_rate_hz=None)
             worker.paced = bool(worker.gates_over)
 
     def _is_exact(self) -> bool:
-        """Whether each moment is to be the same to the bit."""
+        """Return whether each moment must be bit-identical."""
         track = self._track
         return self._speed == 1.0 and self.engine.virtual and track.exact and self._start == track.began
 
     def _look(self) -> None:
-        """Read what comes first."""
+        """Read the next step."""
         if not self._read:
             self._read = True
             self._firing = next(self._firings, None)
@@ -85,19 +85,20 @@ class Player:
     # --- firings ------------------------------------------------------------------------------------------------------
 
     def ready(self) -> bool:
-        """Whether a firing is due; if not, it is asked again when it is.
+        """Return whether a firing is due; if not, the engine calls it again when one is.
 
         Raises:
-          EndOfStream: there is nothing left.
+          EndOfStream: no step is left.
         """
         self._look()
         self._play_others()
         step = self._firing
         fed = () if self._worker is None else self._worker.live_inputs  # parameters
         while fed and step is not None and step.silent:
-            step = self._firing = next(self._firings, None)  # the engine does that by itself, as it did
+            # the engine does this itself, as it did during the recording
+            step = self._firing = next(self._firings, None)
         if fed and all(edge.contents()[0].is_marker for edge in fed):
-            return True  # nor does it ask for the function now
+            return True  # the engine does not call the function in this case either
         if step is None:
             if self._other is not None:
                 return False
@@ -115,7 +116,7 @@ class Player:
         return False
 
     def play(self) -> None:
-        """Send what one firing has sent.
+        """Send the tokens of one firing.
 
         Raises:
           EndOfStream: the stream ended here.
@@ -126,7 +127,7 @@ class Player:
         self._end_firing(step)
 
     async def play_waiting(self) -> None:
-        """The same for a node whose code waits: it takes as long as it did.
+        """Do the same for a node whose code waits; the firing takes as long as it did.
 
         Raises:
           EndOfStream: the stream ended here.
@@ -149,7 +150,7 @@ class Player:
             raise EndOfStream
         self._firing = next(self._firings, None)
         if self._worker is not None:
-            # what leaves without a stamp of its own, silence too, has that of then
+            # tokens without a stamp of their own, including silence, get the firing's stamp
             self._worker.stamp = step.began if self._track.of_source else _newest_stamp(step)
         return step
 
@@ -169,10 +170,10 @@ class Player:
             await asyncio.sleep(max(left, 0.0))
 
     def _due(self, when: float) -> float:
-        """When on the clock of this run that is which was `when` on that of the recording."""
+        """Return the time on this run's clock for a time on the recording's clock."""
         assert self._start is not None
         if self._speed == 1.0 and self._start == self._track.began:
-            return when  # to the bit
+            return when  # bit for bit
         return self._start + (when - self._track.began) / (self._speed or 1.0)
 
     def _now_due(self) -> None:
@@ -182,7 +183,7 @@ class Player:
     # --- slot calls, and what is triggered beside all -----------------------------------------------------------------
 
     def called(self) -> None:
-        """A slot of the node is called."""
+        """Count a call of a slot of the node."""
         self._look()
         step = self._other
         if step is not None and step.call and self._worker is not None and step.call == self._worker.call_number:
@@ -190,7 +191,7 @@ class Player:
         self._play_others()
 
     def _play_others(self) -> None:
-        """Trigger what comes next as far as it is due: a call that has not come is behind all others of its moment."""
+        """Trigger the next signals that are due. A call that has not arrived comes after all others of its moment."""
         while self._other is not None:
             step = self._other
             if self.engine is None or self._speed is None:
@@ -226,7 +227,7 @@ class Player:
 
 
 def tell_losses(player: Player, file: File) -> None:
-    """Log what of a recording cannot be read, when it is met, and put it into the report of the run: each once."""
+    """Log each loss in a recording when it is reached, and put it into the report of the run, once."""
     told: list[HfgError] = [] if player.engine is None else player.engine.core.errors
 
     def tell(loss: Loss) -> None:
@@ -244,6 +245,6 @@ _GRACE_S: Final = 2e-9
 
 
 def _newest_stamp(step: Step) -> float:
-    """Of what left in a firing: that of its markers, for values may have one of their own."""
+    """Return the newest stamp of a firing's markers; values may have stamps of their own."""
     silent = [token.stamp for token in step.sent.values() if token.value is NO_MESSAGE]
     return max(silent or [token.stamp for token in step.sent.values()] or [step.when])

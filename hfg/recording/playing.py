@@ -1,9 +1,9 @@
-"""Playing recordings back: nodes that send what was recorded, when it was.
+"""Playing recordings back: nodes that send recorded tokens at their recorded times.
 
-What one node has sent is played by one node, firing by firing: the tokens that left together leave together again,
-with their values, modifiers and stamps, silence and the end of the stream included; so a graph that is played into
-does what it did. In the place of a node of the graph stands one with the same ports, parameters and options. Stands on
-the engine, `players`, `tracks` and `reading`.
+The tokens of one node are played by one node, firing by firing: tokens that left together leave together again, with
+their values, modifiers and stamps, including silence and the end of the stream. So a graph that a recording is played
+into repeats its behaviour. A node of the graph is replaced by one with the same ports, parameters and options. Depends
+on the engine, `players`, `tracks` and `reading`.
 """
 
 from __future__ import annotations
@@ -56,14 +56,14 @@ async def _process_waiting(self: Any) -> None:
 
 
 def _teardown(self: Any) -> None:
-    """Close the file behind the run, not when the node is disabled or reset: it goes on where it was."""
+    """Close the file after the run, not when the node is disabled or reset: playback continues where it was."""
     player = self._player
     if player.engine is None or player.engine.core.over:
         self._recording.close()
 
 
 def _spoke(file: File) -> tuple[set[str], set[str]]:
-    """The ports that anything has passed, markers too, and those of them where it was in no firing or slot call."""
+    """Return the ports that sent anything, and those among them that sent outside firings and slot calls."""
     markers = file.numbers_of(MARKERS)
     found: set[str] = set()
     beside: set[str] = set()
@@ -83,14 +83,14 @@ _numbers = itertools.count(1)
 
 
 def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any], how: _How) -> str:
-    """Make a type with the ports and parameters of a node's, that plays what was recorded of it; gives its reference.
+    """Make a type with the ports and parameters of a node's type that plays its recording. Return its reference.
 
     Args:
       old: the node.
       file: the recording.
-      names: paths of recorded ports, and which port of the node each is.
+      names: paths of recorded ports, and the node's port for each.
       hints: types of these ports.
-      how: it is played.
+      how: options of playback.
     """
     kind = old._type
     waits = kind.is_source and kind.process_kind.startswith("async")
@@ -102,7 +102,7 @@ def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any]
             origin=cls,
             module=__name__,
             qualname=qualname,
-            doc=f"Plays what was recorded of {old.place.path}.",
+            doc=f"Plays the recording of {old.place.path}.",
             inputs={},
             states={},
             process_kind="async" if waits else "function",
@@ -113,11 +113,11 @@ def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any]
             caller=lambda node: node.process,
         )
 
-    players: WeakKeyDictionary[Any, tuple[File, Player]] = WeakKeyDictionary()  # of each run
+    players: WeakKeyDictionary[Any, tuple[File, Player]] = WeakKeyDictionary()  # per run
 
     def setup(self: Any) -> None:
         engine: Any = getattr(level_of(self._place.graph).whole.run, "_engine", None)
-        if engine in players:  # it was disabled or reset, and goes on where it was
+        if engine in players:  # it was disabled or reset, and continues where it was
             self._recording, self._player = players[engine]
             return
         self._recording = File(file)
@@ -134,7 +134,8 @@ def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any]
         "ready": _ready,
         "process": _process_waiting if waits else _process,
         "teardown": _teardown,
-        "_slot_call": lambda self, name: lambda token: self._player.called(),  # what a slot did is in the recording
+        # the effects of a slot are in the recording
+        "_slot_call": lambda self, name: lambda token: self._player.called(),
     }
     made_class: Any = types.new_class(qualname, (Node,), {"_made": made}, lambda names: names.update(body))
     setattr(sys.modules[__name__], qualname, made_class)
@@ -142,17 +143,17 @@ def _stand_in(old: Node, file: str, names: dict[str, str], hints: dict[str, Any]
 
 
 class Playing(msgspec.Struct):
-    """What `play_into` has done to a graph.
+    """The changes that `play_into` has made to a graph.
 
     Attributes:
       played: paths of recorded ports, and where each is played.
-      recomputed: recorded ports that the graph makes itself from what is played.
+      recomputed: recorded ports that the graph computes itself from the played tokens.
       silent: connected outputs of played nodes that were not recorded.
-      rest: nodes that are disabled, for all that they send went to nodes that are played.
+      rest: nodes that are disabled because all their tokens went to played nodes.
       missing: recorded ports that the graph does not have.
-      live: sources of the graph that were not recorded, so they run their own code.
-      gaps: what the recording itself lacks, as sentences.
-      is_damaged: whether something in it cannot be read, or was lost before it was recovered.
+      live: sources of the graph that were not recorded, so their own code runs.
+      gaps: what the recording itself lacks, as messages.
+      is_damaged: whether part of it cannot be read, or was lost before it was recovered.
     """
 
     played: dict[str, str] = {}
@@ -167,7 +168,7 @@ class Playing(msgspec.Struct):
 
     @property
     def warnings(self) -> list[str]:
-        """What is not as it was recorded, as sentences; the report of the run has them among its errors."""
+        """Differences from the recorded run, as messages; the report of the run lists them among its errors."""
         return [
             *self.gaps,
             *(f'"{port}" was recorded, but the graph has no such port, so it is not played' for port in self.missing),
@@ -196,27 +197,26 @@ def play_into(
     speed: float | None = 1.0,
     pickle: bool = False,
 ) -> Playing:
-    """Let a graph at rest play a recording when it is run, in the place of the nodes that were recorded.
+    """Make a graph that is not running play a recording in its next run, in place of the nodes that were recorded.
 
-    Of the nodes that were recorded those are played that come first, above all sources; what others have sent the graph
-    makes itself again. What fed only played nodes is disabled. What is not as it was recorded is logged, and listed in
+    The first recorded nodes along the edges are played, mainly sources; the graph computes the tokens of the others
+    itself. Nodes that fed only played nodes are disabled. Differences from the recorded run are logged, and listed in
     the report of the run.
 
     Args:
-      graph: is changed, as by an edit; `graph.undo()` takes it back.
+      graph: the graph; it is changed as by an edit, and `graph.undo()` reverts it.
       file: the recording.
-      ports: which recorded ports stand for which ports of the graph. An output or event of the graph,
-        {"camera.out": "front.image"}, sends what was recorded of the other port, and all other ports are played under
-        their own paths. An input or slot, {"camera.out": "detect.image"}, is fed; with inputs and slots only, nothing
-        else is played.
-      speed: how many recorded seconds pass in one second on the run's clock; None: as fast as can be.
-      pickle: read values that were pickled, which runs code.
+      ports: maps recorded ports to ports of the graph. An output or event of the graph, {"camera.out": "front.image"},
+        sends the recording of the other port, and all other ports are played under their own paths. An input or slot,
+        {"camera.out": "detect.image"}, is fed; if there are only inputs and slots, nothing else is played.
+      speed: recorded seconds per second of the run's clock; None: as fast as possible.
+      pickle: allow reading pickled values, which runs code.
 
     Raises:
       UsageError: the file cannot be read, the graph lacks a port, or nothing of it can be played.
     """
     if speed is not None and not speed > 0:
-        raise UsageError(f"speed= says how much faster than recorded it is played, above 0, or None; got {speed!r}")
+        raise UsageError(f"speed= is a factor of the recorded speed, above 0, or None; got {speed!r}")
     path = os.fspath(Path(file).resolve())
     playing = Playing()
     with File(path) as recording:
@@ -240,7 +240,7 @@ def play_into(
 
 
 def _unnumbered(recording: File) -> list[str]:
-    """Nodes with several recorded outputs whose firings have no numbers, because an older version wrote the file."""
+    """Return nodes whose firings of several outputs have no numbers because an older version wrote the file."""
     if recording.metadata.get("hfg", {}).get("version") != _WITHOUT_NUMBERS:
         return []
     outputs = [one for one in recorded_ports(recording).values() if one.metadata.get("kind") == "output"]
@@ -249,28 +249,28 @@ def _unnumbered(recording: File) -> list[str]:
 
 
 def _with_one_output(recording: File) -> list[str]:
-    """Nodes of which one output was recorded, so that its tokens have no numbers."""
+    """Return nodes with one recorded output, whose tokens have no numbers."""
     outputs = [one for one in recorded_ports(recording).values() if one.metadata.get("kind") == "output"]
     return [node for node, count in Counter(one.metadata.get("node", "") for one in outputs).items() if count == 1]
 
 
 def _misaligned(uncounted: list[str], played: Mapping[str, str]) -> list[str]:
-    """What a join may meet behind a loss, where several nodes are played, and firings of some have no numbers."""
+    """Return warnings about joins that a loss may misalign, where several nodes are played without firing numbers."""
     nodes = {port.rpartition(".")[0] for port in played}
     return [
-        f'firings of "{node}" have no numbers in the recording, as one output of it was recorded: those that are lost '
-        "are not played as silence, and what comes later may meet other tokens in a join"
+        f'firings of "{node}" have no numbers in the recording because only one output of it was recorded: '
+        "lost firings are not played as silence, and later tokens may meet other tokens in a join"
         for node in uncounted
         if node in nodes and len(nodes) > 1
     ]
 
 
 def _gaps(recording: File, info: RecordingInfo) -> list[str]:
-    """What the recording does not hold, though it passed."""
+    """Return what the recording lacks although it was sent."""
     found = [f"{info.path} is damaged: {loss}" for loss in info.losses]
     found += [
-        f'firings of "{node}" have no numbers in the recording, which an older version of hfg wrote: they are told '
-        "apart by the order of their tokens"
+        f'firings of "{node}" have no numbers in the recording because an older version of hfg wrote it: they '
+        "are distinguished by the order of their tokens"
         for node in _unnumbered(recording)
     ]
     left_out = [(port, count, "the disk was too slow") for port, count in info.left_out.items()]
@@ -284,7 +284,7 @@ def _gaps(recording: File, info: RecordingInfo) -> list[str]:
 def _sorted(
     graph: Graph, file: str, recorded: Mapping[str, Any], ports: Mapping[str, str]
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Tell mappings to ports that send from those to ports that take.
+    """Separate mappings to sending ports from mappings to receiving ports.
 
     Raises:
       UsageError: there is no such recorded port, or no such port of the graph.
@@ -296,11 +296,13 @@ def _sorted(
             raise UsageError(f'no port "{source}" was recorded in {file}; {suggest(source, recorded)}')
         try:
             port: Any = graph[target]
-        except Exception as error:  # whatever is wrong with the path
-            raise UsageError(f'the graph lacks "{target}", to which "{source}" is to be played: {error}') from None
+        except Exception as error:  # any error in the path
+            raise UsageError(f'the graph has no "{target}", into which "{source}" should be played: {error}') from None
         kind = getattr(port, "kind", "")
         if kind not in ("output", "event", "input", "slot", "parameter"):
-            raise UsageError(f'"{source}" is to be played to a port, and "{target}" is none; name one of its ports')
+            raise UsageError(
+                f'"{source}" must be played into a port, but "{target}" is not a port; name one of its ports'
+            )
         (sending if kind in ("output", "event") else fed)[source] = target
     return sending, fed
 
@@ -326,13 +328,13 @@ def _feed(
 
 
 class _Recorded(NamedTuple):
-    """What was recorded.
+    """The recorded ports.
 
     Attributes:
       ports: channels, by path of the port.
-      spoke: ports that something has passed.
-      beside: those where it did in no firing and no slot call.
-      mapped: ports that are played as others of the graph.
+      spoke: ports that sent something.
+      beside:  ports that sent outside firings and slot calls.
+      mapped: ports that are played as other ports of the graph.
     """
 
     ports: dict[str, Any]
@@ -354,7 +356,7 @@ def _replace(graph: Graph, file: str, recorded: _Recorded, how: _How) -> list[co
     choice = _Choice(of_node, nodes, flat)
     chosen = choice.choose(recorded)
     if not chosen:
-        raise UsageError(f"nothing passed the ports that were recorded in {file}, so there is nothing to play")
+        raise UsageError(f"the recorded ports in {file} sent nothing, so there is nothing to play")
     kept = choice.kept()
     done.rest = _idle(chosen, flat, kept)
     edit: list[commands.Command] = []
@@ -369,7 +371,7 @@ def _replace(graph: Graph, file: str, recorded: _Recorded, how: _How) -> list[co
             for edge in _edges_into(node)
             if edge.target.path not in kept
         ]
-        if _is_away(flat, nodes[path].options.group or "loop"):  # what is played is read from the file here
+        if _is_away(flat, nodes[path].options.group or "loop"):  # recordings are read in this process
             edit.append(commands.Move(path, "loop"))
         hints = {port: _hint(node._type, name) for port, name in names.items()}
         edit.append(commands.Replace(path, _stand_in(node, file, names, hints, how)))
@@ -385,10 +387,10 @@ def _is_away(flat: Any, group: str) -> bool:
 
 
 def _ports_of_nodes(recorded: _Recorded, nodes: Mapping[str, Any]) -> tuple[dict[str, dict[str, str]], list[str]]:
-    """Which port of which node each recorded port is; "" for what says that a source has fired.
+    """Return node and port for each recorded port; "" for the event that shows that a source has fired.
 
     Returns:
-      these, by path of the node and of the recorded port, and the recorded ports that no node here has
+      The mapping, by path of the node and of the recorded port, and the recorded ports that no node here has.
     """
     of_node: dict[str, dict[str, str]] = {}
     missing: list[str] = []
@@ -409,21 +411,21 @@ def _ports_of_nodes(recorded: _Recorded, nodes: Mapping[str, Any]) -> tuple[dict
                 missing.append(port)
                 continue
             raise UsageError(
-                f'"{port}" cannot be played as "{recorded.mapped[port]}": "{path}" plays "{origins[path]}" already, '
-                "and the firings of one node come from one recorded node"
+                f'"{port}" cannot be played as "{recorded.mapped[port]}": "{path}" already plays '
+                f'"{origins[path]}", and the firings of one node come from one recorded node'
             )
         else:
             of_node.setdefault(path, {})[port] = place
     for port in recorded.mapped.keys() & set(missing):
         raise UsageError(
-            f'"{port}" cannot be played as "{recorded.mapped[port]}", which is a port of a subgraph or sent by every '
-            "node; name an output or event that a node inside declares"
+            f'"{port}" cannot be played as "{recorded.mapped[port]}", which is a port of a subgraph or an '
+            "automatic event; name an output or event that an inner node declares"
         )
     return of_node, missing
 
 
 def _silent(path: str, node: Node, names: Mapping[str, str], flat: Any) -> list[str]:
-    """Outputs of a played node that were not recorded, though edges lead away from them."""
+    """Return outputs of a played node that were not recorded although they have edges."""
     return [
         f"{path}.{name}"
         for name in node._type.outputs
@@ -432,17 +434,17 @@ def _silent(path: str, node: Node, names: Mapping[str, str], flat: Any) -> list[
 
 
 def _hint(kind: NodeType, name: str) -> Any:
-    """The type of what a port of a node sends."""
+    """Return the type of the values of a node's port."""
     spec: Any = kind.outputs.get(name) or kind.events.get(name)
     return Any if spec is None or spec.type is None else spec.type
 
 
 class _Choice:
-    """Of the recorded nodes those to play.
+    """Chooses the recorded nodes to play.
 
-    These are sources, those that have sent signals in no firing and no slot call though nothing else than slots moves
-    them, and whoever comes first behind what is not known: sources that were not recorded, what comes from outside,
-    ports that were left out. All others do again what they did.
+    These are sources, nodes with only slots that sent signals outside firings and slot calls, and the first nodes after
+    anything unknown: sources that were not recorded, tokens from outside, ports that were left out. All other nodes
+    repeat their work.
     """
 
     def __init__(self, of_node: dict[str, dict[str, str]], nodes: Mapping[str, Any], flat: Any) -> None:
@@ -450,7 +452,7 @@ class _Choice:
         self._nodes = nodes
         self._flat = flat
         self._chosen: set[str] = set()
-        self._tainted: set[int] = set()  # edges of which nobody knows what passes
+        self._tainted: set[int] = set()  # edges with unknown tokens
         self._leaving: dict[str, list[Any]] = {path: [] for path in nodes}
         for edge in flat.edges:
             if edge.source.node >= 0:
@@ -464,7 +466,7 @@ class _Choice:
         return kind
 
     def choose(self, recorded: _Recorded) -> list[str]:
-        """Give their paths, in the order of the recording."""
+        """Return the paths of the chosen nodes, in the order of the recording."""
         mapped = {target.rpartition(".")[0] for target in recorded.mapped.values()}
         for path, names in self._of_node.items():
             kind = self._kind(path)
@@ -490,7 +492,7 @@ class _Choice:
         return unknown
 
     def _unknown_behind(self, path: str, spoke: Set[str]) -> list[Any]:
-        """Something unknown comes to a node: give the edges of which nobody knows what passes for that."""
+        """Return the edges whose tokens are unknown because of unknown input to a node."""
         if not path or path in self._chosen:
             return []
         if not spoke & set(self._of_node.get(path, ())):
@@ -502,7 +504,7 @@ class _Choice:
         return [edge for edge in self._leaving[path] if not _is_played(edge.source, self._of_node[path])]
 
     def kept(self) -> set[str]:
-        """The paths of those parameters of played sources whose edges stay, for what they send is the same again."""
+        """Return the paths of parameters of played sources whose edges stay because their values repeat."""
         return {
             edge.target.port.path
             for edge in self._flat.edges
@@ -515,13 +517,13 @@ class _Choice:
 
 
 def _is_played(source: Any, names: Mapping[str, str]) -> bool:
-    """Whether what leaves there is: recorded, or what every node sends by itself."""
+    """Return whether tokens from this output are played: recorded, or sent automatically."""
     name = sent_of(source.name) or source.name
     return name in names.values() or source.kind == "parameter" or name in AUTOMATIC_EVENTS
 
 
 def _idle(chosen: list[str], flat: Any, kept: Set[str]) -> list[str]:
-    """Those who work for nobody any more: all that they send went into firings of nodes that are played."""
+    """Return the nodes without any remaining consumer: all their tokens went into firings of played nodes."""
     leads: dict[str, list[Any]] = {node.path: [] for node in flat.nodes if node.path not in chosen}
     for edge in flat.edges:
         if edge.source.node >= 0 and flat.nodes[edge.source.node].path in leads:
@@ -543,7 +545,7 @@ def _takes_nothing(end: Any, flat: Any, chosen: list[str], idle: list[str], kept
 
 
 def _edges_into(node: Node) -> list[Any]:
-    """The edges on whose tokens the firings of a node wait, for one that plays fires when it did."""
+    """Return the edges that the firings of a node wait for; a played node fires by its recorded times instead."""
     return [
         edge
         for edge in level_of(node.place.graph).edges

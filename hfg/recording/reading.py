@@ -1,7 +1,7 @@
-"""Reading recordings, also those that are damaged or were cut off: chunk by chunk, so that no file is too long.
+"""Reading recordings, including files that are damaged or were cut off.
 
-A chunk that cannot be read costs what was in it, and nothing else; what that was is told (rule L4). Stands on `layout`
-and `chunks`.
+Files are read chunk by chunk, so that they can have any length. A chunk that cannot be read costs only its own
+contents, and the loss is reported (rule L4). Depends on `layout` and `chunks`.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ _KEPT_CHUNKS: Final = 8
 _KEPT_BYTES: Final = 64 * 2**20
 _MOST_TOLD: Final = 100
 RECOVERED: Final = "hfg:recovered"
-"""The metadata in which a recovered file says what it lacks."""
+"""The metadata in which a recovered file lists its losses."""
 
 RawMessage = tuple[int, int, bytes]
 """Channel, nanoseconds, data."""
 
 
 class Loss(msgspec.Struct):
-    """What of a recording cannot be read.
+    """A part of a recording that cannot be read.
 
     Attributes:
-      what: and why, as a sentence without an end.
-      messages: how many are lost; None: nobody knows.
-      first_s: time of the first of them; None: nobody knows.
-      last_s: time of the last.
+      what: what is lost and why, as a message without a full stop.
+      messages: number of lost messages; None if unknown.
+      first_s: time of the first one; None if unknown.
+      last_s: time of the last one.
     """
 
     what: str
@@ -50,23 +50,23 @@ class Loss(msgspec.Struct):
     last_s: float | None = None
 
     def __str__(self) -> str:
-        """Say it."""
+        """Return the loss as a message."""
         if self.messages is None:
-            return f"{self.what}; how many messages are lost by that is not known"
+            return f"{self.what}; the number of lost messages is unknown"
         when = "" if self.first_s is None else f", from {self.first_s:.3f} s to {self.last_s:.3f} s"
         return f"{self.what}; {_messages(self.messages)} lost{when}" if self.messages else self.what
 
 
 class PortInfo(msgspec.Struct):
-    """What is known of one recorded port.
+    """Information about one recorded port.
 
     Attributes:
-      path: of the port; of a file that hfg did not write, the topic.
+      path: path of the port; the topic, if hfg did not write the file.
       kind: "output", "event", ...
-      type: of its values, in words.
+      type: type of its values, in words.
       schema: the name of the schema of its messages.
-      values: how many were recorded, without markers.
-      rate_hz: of these, on the average.
+      values: number of recorded values, without markers.
+      rate_hz: their average rate.
     """
 
     path: str
@@ -78,19 +78,19 @@ class PortInfo(msgspec.Struct):
 
 
 class RecordingInfo(msgspec.Struct):
-    """What is known of a recording.
+    """Information about a recording.
 
     Attributes:
-      whole: its writer has finished it; else it was cut off, and ends with its last whole chunk.
-      losses: what in it cannot be read, and what a file that was recovered has lost before.
+      whole: its writer has finished it; otherwise it was cut off, and ends with its last complete chunk.
+      losses: parts that cannot be read, and losses from before the file was recovered.
       graph: the name of the graph; empty if hfg did not write it.
       clock: "real" or "virtual".
-      began: of the run, on its clock.
+      began: start of the run, on its clock.
       duration_s: from the first token to the last.
-      outcome: of the run; empty if it is not known.
-      markers: how many.
-      left_out: tokens that there was no time for, by port.
-      refused: values that are no data, by port.
+      outcome: of the run; empty if unknown.
+      markers: number of markers.
+      left_out: number of tokens skipped for lack of time, by port.
+      refused: number of values that are not data, by port.
       held_s: how long nodes waited for the recording.
       commands: the graph itself, as commands that make it (`hfg.commands.decode`).
     """
@@ -119,19 +119,19 @@ class File:
     """An MCAP file.
 
     Attributes:
-      path: where it is.
+      path: path of the file.
       whole: whether its writer has finished it.
       channels: by number.
       schemas: by number.
-      metadata: by name; of several of one name the last.
-      when_lost: is told of each chunk that cannot be read, when it is met.
+      metadata: by name; if there are several of one name, the last.
+      when_lost: called with each chunk that cannot be read, when it is reached.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         """Open it.
 
         Raises:
-          UsageError: there is no such file, or it is no MCAP file.
+          UsageError: there is no such file, or it is not an MCAP file.
         """
         self.path = Path(path)
         self._kept: OrderedDict[int, Content] = OrderedDict()
@@ -141,14 +141,16 @@ class File:
             self._stream: BinaryIO = self.path.open("rb")
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
-            raise UsageError(f"the recording {path} cannot be opened: {why}") from None
+            raise UsageError(f"cannot open the recording {path}: {why}") from None
         try:
             if self._stream.read(len(MAGIC)) != MAGIC:
-                raise UsageError(f"{path} is no MCAP file: hfg record writes them, and so do many other programs")
+                raise UsageError(
+                    f"{path} is not an MCAP file; hfg record writes such files, and so do many other programs"
+                )
             self.layout = Layout(self._stream, os.fstat(self._stream.fileno()).st_size)
         except OSError as error:
             self._stream.close()
-            raise UsageError(f"the recording {path} cannot be read: {error.strerror}") from None
+            raise UsageError(f"cannot read the recording {path}: {error.strerror}") from None
         except BaseException:
             self._stream.close()
             raise
@@ -157,12 +159,12 @@ class File:
         self.channels: dict[int, Channel] = self.layout.channels
         self.schemas: dict[int, Schema] = self.layout.schemas
         self.metadata: dict[str, dict[str, str]] = self.layout.metadata
-        if self.layout.statistics is None:  # what chunks declare is to be read
+        if self.layout.statistics is None:  # chunks may contain declarations
             for number in range(len(self.layout.pieces)):
                 self._content(number)
 
     def close(self) -> None:
-        """Read no more."""
+        """Close the file."""
         self._stream.close()
 
     def __enter__(self) -> File:
@@ -172,16 +174,16 @@ class File:
         self.close()
 
     def contents(self) -> Iterator[Content]:
-        """Go through the chunks that can be read."""
+        """Yield the chunks that can be read."""
         for number in range(len(self.layout.pieces)):
             content = self._content(number)
             if content is not None:
                 yield content
 
     def messages(self, channels: frozenset[int] | None = None) -> Iterator[RawMessage]:
-        """Go through all messages, or those of some channels, in the order in which they were written.
+        """Yield all messages, or those of some channels, in the order in which they were written.
 
-        What cannot be read is left out; `losses` tells of it.
+        Unreadable parts are skipped; see `losses`.
         """
         wanted = self.channels if channels is None else channels
         for content in self.contents():
@@ -190,11 +192,11 @@ class File:
                     yield message.channel, message.log_time, message.data
 
     def numbers_of(self, topic: str) -> frozenset[int]:
-        """Give the channels of one topic."""
+        """Return the channels of one topic."""
         return frozenset(number for number, one in self.channels.items() if one.topic == topic)
 
     def began(self) -> float:
-        """When its graph began to move, on its clock; when the recording did if that was later."""
+        """Return when the recorded graph started to run, or when the recording started, if that was later."""
         for _, _, data in self.messages(self.numbers_of(EVENTS)):
             event = self.object_in(data)
             if event.get("type") == "RunStarted":
@@ -206,22 +208,22 @@ class File:
         """Decode a message of hfg's own.
 
         Raises:
-          UsageError: it is none.
+          UsageError: the data is not such a message.
         """
         try:
             found = json_value(data)
         except (RecursionError, ValueError) as error:
-            raise UsageError(f"{self.path} is damaged: a message in it is no JSON ({error})") from None
+            raise UsageError(f"{self.path} is damaged: a message in it is not JSON ({error})") from None
         if not isinstance(found, dict):
-            raise UsageError(f"{self.path} is damaged: a message in it is no object but {str(found)[:40]!r}")
+            raise UsageError(f"{self.path} is damaged: a message in it is not an object but {str(found)[:40]!r}")
         return found
 
     def losses(self) -> list[Loss]:
-        """Say what cannot be read; all of the file is looked at."""
+        """Return what cannot be read; reads the whole file."""
         return self._count()[1]
 
     def info(self) -> RecordingInfo:
-        """Say what is known of it; all messages are counted."""
+        """Return information about the recording; counts all messages."""
         seen, losses = self._count()
         counts = seen.counts
         duration = (seen.last - seen.first) / 1e9 if seen.counts else 0.0
@@ -265,7 +267,7 @@ class File:
     # --- what cannot be read ------------------------------------------------------------------------------------------
 
     def _count(self) -> tuple[_Seen, list[Loss]]:
-        """Look at all of the file."""
+        """Read the whole file and count."""
         seen = _Seen()
         for content in self.contents():
             for channel, _, when, _, _ in content.messages():
@@ -276,7 +278,7 @@ class File:
         return seen, self._losses(seen)
 
     def losses_met(self) -> list[Loss]:
-        """Say what could not be read as far as the file was looked at."""
+        """Return the losses in the part of the file that was read."""
         faults = [Loss(f"at byte {at:,}: {why}") for at, why in self.layout.faults]
         if faults and not self.layout.ended:
             faults[-1].messages = None
@@ -293,23 +295,23 @@ class File:
             return found
         statistics = self.layout.statistics
         if not self.layout.keeps_its_checksum():
-            return [Loss("something outside of its chunks is damaged, so what it says about itself may be wrong")]
+            return [Loss("something outside the chunks is damaged, so the description of the file may be wrong")]
         if statistics is not None and statistics.message_count != sum(seen.counts.values()):
             found.append(
-                Loss(f"its summary tells of {_messages(statistics.message_count)}, and another number is there")
+                Loss(f"its summary lists {_messages(statistics.message_count)}, but there is a different number")
             )
         return found
 
     def _recovered(self) -> list[Loss]:
-        """What was lost before the file was recovered."""
+        """Return the losses from before the file was recovered."""
         said = self.metadata.get(RECOVERED, {}).get("losses", "[]")
         try:
             return msgspec.json.decode(said, type=list[Loss])
         except (msgspec.DecodeError, RecursionError):
-            return [Loss("what was lost before it was recovered cannot be read", None)]
+            return [Loss("the list of losses from before it was recovered cannot be read", None)]
 
     def _content(self, number: int) -> Content | None:
-        """Read a chunk; None if it cannot be, which is noted."""
+        """Read a chunk. Return None if it cannot be read, and record the loss."""
         if number in self._lost:
             return None
         kept = self._kept.get(number)
@@ -342,7 +344,7 @@ class File:
 
 
 class _Seen:
-    """What messages there are."""
+    """The messages found in a file."""
 
     def __init__(self) -> None:
         self.counts: Counter[int] = Counter()
@@ -365,7 +367,7 @@ def _messages(count: int) -> str:
 
 
 def number_in(said: object) -> float:
-    """Give the number that a file says; 0 where it says something else."""
+    """Return the number in a file's data; 0 if it is not a number."""
     try:
         return float(said)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):

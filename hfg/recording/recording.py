@@ -1,4 +1,4 @@
-"""Recording a run: which ports, into which file, and what came of it. Stands on the engine and on `writing`."""
+"""Recording a run: which ports, into which file, and the results. Depends on the engine and on `writing`."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ VERSION: Final = 2
 
 
 class Recording:
-    """A recording under way, or what came of it; use it with `with` or `async with`, or leave its end to the run's.
+    """A recording in progress, or its result. Use it with `with` or `async with`, or let it end with the run.
 
     Attributes:
-      path: of the file.
-      when_failed: called on the loop of the run when nothing can be written any more.
+      path: path of the file.
+      when_failed: called on the loop of the run when writing has failed.
     """
 
     def __init__(self, run: Run, writer: RecordingWriter, recorder: Recorder, select: Sequence[str], how: _How) -> None:
@@ -50,7 +50,7 @@ class Recording:
         self._select = select
         self._how = how
         self._places: dict[Any, TokenWriter] = {}
-        self._firings: dict[Any, Firings] = {}  # of nodes with several outputs
+        self._firings: dict[Any, Firings] = {}  # for nodes with several outputs
         self._told: set[TokenWriter] = set()
         self.when_failed: Callable[[], None] | None = None
         recorder.on_structure = self._look_again
@@ -68,17 +68,17 @@ class Recording:
 
     @property
     def error(self) -> BaseException | None:
-        """Why nothing more is written; None if all is well."""
+        """Why writing has stopped; None if there is no error."""
         return self._writer.error
 
     @property
     def tokens(self) -> int:
-        """How many tokens were written, markers too."""
+        """Number of tokens written, including markers."""
         return sum(place.values + place.markers for place in list(self._places.values()))
 
     @property
     def bytes_written(self) -> int:
-        """How long the file is by now."""
+        """Current length of the file."""
         return self._writer.bytes_written
 
     @property
@@ -88,21 +88,21 @@ class Recording:
 
     @property
     def left_out(self) -> dict[str, int]:
-        """Tokens for which there was no time, or no way to write them, by port."""
+        """Tokens that could not be recorded in time, or at all, by port."""
         found = {place.path: place.left_out + place.refused for place in self._places.values()}
         return {path: count for path, count in found.items() if count}
 
     @property
     def held_s(self) -> float:
-        """For how long nodes had to wait for the recording."""
+        """How long nodes had to wait for the recording, in seconds."""
         return self._recorder.held_s
 
     def stop(self) -> None:
-        """Record nothing more; what has passed is still written. Does nothing the second time."""
+        """Stop recording; tokens sent so far are still written. A second call does nothing."""
         self._recorder.stop()
 
     async def close(self) -> None:
-        """Record nothing more, and wait until the file is whole."""
+        """Stop recording, and wait until the file is complete."""
         self.stop()
         await self._recorder.written()
 
@@ -117,10 +117,10 @@ class Recording:
     # --- inside -------------------------------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Look at what is selected.
+        """Start observing the selected ports.
 
         Raises:
-          UsageError: nothing is, or values of a port cannot be recorded.
+          UsageError: no port is selected, or values of a port cannot be recorded.
         """
         for port in self._selected():
             self._add(port)
@@ -135,15 +135,15 @@ class Recording:
                 continue
             matching = [port for path, port in known.items() if _fits(path, pattern)]
             if not matching:
-                raise UsageError(f'no port fits "{pattern}"; the ports that send here are {_listed(known)}')
+                raise UsageError(f'no port matches "{pattern}"; the sending ports are {_listed(known)}')
             found |= {id(port): port for port in matching}
         return list(found.values())
 
     def _named(self, path: str, known: dict[str, Any]) -> Any:
-        """A port that nobody lists: an input, a slot, an automatic event."""
+        """Return a port that is not listed: an input, a slot, an automatic event."""
         try:
             port: Any = self._run.graph[path]
-        except Exception:  # whatever is wrong with the path
+        except Exception:  # any error in the path
             port = None
         if not isinstance(port, Port):
             raise UsageError(f'there is no port "{path}" to record; {suggest(path, known)}')
@@ -174,7 +174,7 @@ class Recording:
         self._places[port] = place
 
     def _look_again(self) -> None:
-        """The graph was edited: what has come and is selected is recorded too."""
+        """The graph was edited: start recording new ports that are selected."""
         known = ports_of(self._run)
         for path, port in known.items():
             if any(_fits(path, pattern) for pattern in self._select):
@@ -184,8 +184,8 @@ class Recording:
                     _LOGGER.warning('"%s" is not recorded: %s', path, error)
 
     def _has_failed(self, error: BaseException) -> None:
-        """From the thread."""
-        _LOGGER.error("the recording in %s is not whole, nothing more is written: %s", self.path, error)
+        """Called from the thread."""
+        _LOGGER.error("the recording in %s is incomplete, writing has stopped: %s", self.path, error)
         if self.when_failed is not None:
             self._run._engine.from_any_thread(self.when_failed)
 
@@ -222,36 +222,36 @@ def record(
     pickle: bool = False,
     force: bool = False,
 ) -> Recording:
-    """Write what passes ports of a run to an MCAP file, from now on; `run.record` does the same.
+    """Record the tokens of a run's ports in an MCAP file, from now on; `run.record` does the same.
 
     Args:
-      run: the run; before its nodes are set up (`begin=`) nothing is missed.
-      file: where to; it is made, and can be read at any time up to its last second.
+      run: the run. To miss nothing, call this before its nodes are set up (`begin=`).
+      file: the new file; it can be read at any time, up to its last second.
       select: paths of ports or nodes, or patterns of them, "camera/*"; by default all outputs and events.
-      lossless: nothing is left out: nodes whose ports are recorded wait where the disk is slower. Else the graph is
-        never slowed, and what there is no time for is counted.
-      images: how images are written: "raw", "png" (smaller, slower, the same to the bit), "jpeg" (with losses).
-      pickle: write values that are no data with pickle; reading such a file runs code.
-      force: write over a file that is there.
+      lossless: skip nothing: recorded nodes wait if the disk is slower. Otherwise the graph is never slowed, and
+        skipped tokens are counted.
+      images: how images are written: "raw", "png" (smaller, slower, lossless), "jpeg" (lossy).
+      pickle: write values that are not data with pickle; reading such a file runs code.
+      force: overwrite an existing file.
 
     Raises:
-      UsageError: no port fits, one is in another process, values of one cannot be recorded, or the file is there
-        already or cannot be made.
+      UsageError: no port matches, a port is in another process or its values cannot be recorded, or the file already
+        exists or cannot be made.
       NotRunning: the run is over.
     """
-    run._need_running("nothing will pass any more")
+    run._need_running("nothing more will be sent")
     patterns = [select] if isinstance(select, str) else list(select)
     if not patterns:
-        raise UsageError('select= says which ports are recorded, as in select="camera/*"; it is empty')
+        raise UsageError('select= is empty; it selects the ports to record, as in select="camera/*"')
     if images not in ("raw", "png", "jpeg"):
-        raise UsageError(f'images= is "raw", "png" or "jpeg", got {images!r}')
+        raise UsageError(f'images= must be "raw", "png" or "jpeg", got {images!r}')
     run._need_here(lambda port: any(_fits(port, pattern) for pattern in patterns))
     path = Path(file)
     parts, engine = run._parts, run._engine
     probe = _Probe()
     dry = Recording.__new__(Recording)
     dry._run, dry._select = run, patterns
-    for port in dry._selected():  # refuse before there is a file
+    for port in dry._selected():  # refuse before the file exists
         _need_data(port.path, port.type, pickle)
         probe.look(parts, port)
     stream = open_new(path, force=force)
@@ -265,28 +265,28 @@ def record(
 
 
 class _Probe:
-    """Looks once, to see whether that can be."""
+    """Looks once, to find out whether observing works."""
 
     def put(self, token: Any) -> None:
-        """A token passes."""
+        """Called with a token."""
 
     def end(self) -> None:
-        """No more will."""
+        """Called at the end."""
 
     def look(self, parts: Any, port: Any) -> None:
-        """Refuse what nobody can look at."""
+        """Refuse ports that cannot be observed."""
         parts.taps.look(port, self)()
 
 
 def ports_of(run: Run) -> dict[str, Any]:
-    """Give the ports that send in a run, by path: outputs with an edge, and events that node types declare.
+    """Return the ports that send in a run, by path: outputs with an edge, and events that node types declare.
 
-    Of a source whose outputs nobody may take `processed` says when it has fired, and what goes with an output without
-    an edge as an event is all that anybody sees of it.
+    If a source has outputs without consumers, its event `processed` shows when it has fired; an output without an edge
+    is visible only through its event `sent`.
     """
     found: dict[str, Any] = {}
-    taken: set[Any] = set()  # outputs of sources that always are; by port
-    speaking: set[Any] = set()  # whose these are
+    taken: set[Any] = set()  # outputs of sources that are always live; by port
+    speaking: set[Any] = set()  # the nodes of these
     for edge in run._engine.core.edges:
         if edge.segments and edge.source_port.kind == "output":
             found[edge.source_port.path] = edge.source_port
@@ -308,7 +308,7 @@ def ports_of(run: Run) -> dict[str, Any]:
 
 
 def _is_always_live(target: Any) -> bool:
-    """Whether nothing in the graph disables a node, or one that it stands in (F10)."""
+    """Return whether nothing in the graph disables a node, or a subgraph around it (F10)."""
     around = [target, *(scope.worker for scope in target.around)]
     return not any(
         worker.blocked & DISABLED
@@ -323,7 +323,7 @@ def _fits(path: str, pattern: str) -> bool:
 
 
 def _is_inside(node: str, path: str) -> bool:
-    """Whether a port belongs to a node, or to one inside of it."""
+    """Return whether a port belongs to a node, or to one inside it."""
     return path.startswith((f"{node}.", f"{node}/"))
 
 
@@ -341,11 +341,11 @@ def _need_data(path: str, hint: Any, may_pickle: bool) -> None:
     """Refuse a port whose values can never be written."""
     if may_pickle or not isinstance(hint, type) or hint in (object, Any):
         return
-    if hint.__module__ == "builtins" or hint.__flags__ & (1 << 20):  # an abstract class: what comes may be data
+    if hint.__module__ == "builtins" or hint.__flags__ & (1 << 20):  # an abstract class: actual values may be data
         return
     if getattr(hint, "_is_protocol", False) or _is_data(hint):
         return
-    raise UsageError(_cannot(path, f"{reference(hint)} is no data that JSON can hold"))
+    raise UsageError(_cannot(path, f"{reference(hint)} is not data that JSON can hold"))
 
 
 def _is_data(hint: type) -> bool:
@@ -384,7 +384,7 @@ def _cannot(path: str, error: object) -> str:
 
 
 def _beginning(run: Run, lossless: bool, images: str) -> dict[str, str]:
-    """What is said about the run at the beginning of the file: the graph itself, with the values of parameters."""
+    """Return the description of the run for the start of the file: the graph itself, with the values of parameters."""
     flat = flatten(run.graph)
     nodes = {
         node.path: {
@@ -397,7 +397,7 @@ def _beginning(run: Run, lossless: bool, images: str) -> dict[str, str]:
     edges = [{"edge": edge.label, "active": edge.active} for edge in flat.edges]
     try:
         made_by = commands.encode(run.graph.as_commands())
-    except GraphError:  # types or operators without a name: what nodes and edges there are is said all the same
+    except GraphError:  # types or operators without a name: nodes and edges are listed anyway
         made_by = ""
     return {
         "version": str(VERSION),
@@ -413,7 +413,7 @@ def _beginning(run: Run, lossless: bool, images: str) -> dict[str, str]:
 
 
 def _shown(value: Any) -> Any:
-    """A parameter's value as JSON, or as text if it is no data."""
+    """Return a parameter's value as JSON, or as text if it is not data."""
     try:
         return msgspec.Raw(msgspec.json.encode(value))
     except Exception:

@@ -1,7 +1,7 @@
-"""Makes a complete recording of one that is damaged or was cut off: with all that can be read, summary and indexes.
+"""Makes a complete recording from one that is damaged or was cut off: everything readable, with summary and indexes.
 
-What is lost is written into it, so that whoever reads it later knows it too. Stands on `reading`, and on the package
-`mcap`, which writes the file.
+Losses are recorded in it, so that later readers know them, too. Depends on `reading`, and on the package `mcap`, which
+writes the file.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ __all__ = ["recover"]
 def recover(
     file: str | os.PathLike[str], output: str | os.PathLike[str], *, force: bool = False
 ) -> tuple[int, list[Loss]]:
-    """Write all that can be read of a recording into a new file, which is complete and has a summary.
+    """Write everything readable in a recording to a new file, which is complete and has a summary.
 
     Args:
-      file: a recording, also one of another program.
-      output: is written whole, or not at all.
-      force: write over a file that is there.
+      file: a recording, possibly of another program.
+      output: the new file; it is written completely, or not at all.
+      force: overwrite an existing file.
 
     Returns:
-      How many messages it has, and what is lost.
+      The number of messages, and the losses.
 
     Raises:
-      UsageError: the one cannot be read, or the other not written.
+      UsageError: the recording cannot be read, or the new file cannot be written.
     """
     place = Path(output)
     if place.exists() and Path(file).exists() and place.samefile(file):
-        raise UsageError(f"{output} is the recording itself: name another file, so that nothing more can be lost")
+        raise UsageError(f"{output} is the recording itself: name another file, so that nothing more is lost")
     if place.exists() and not force:
         raise is_there(place)
     with File(file) as recording:
@@ -52,16 +52,16 @@ def recover(
         try:
             write_whole(place, recovering.write, overwrite=force)
         except OSError as error:
-            raise UsageError(f"{output} cannot be written: {error.strerror}") from None
+            raise UsageError(f"cannot write {output}: {error.strerror}") from None
     return recovering.count, recovering.losses
 
 
 class _Recovering:
-    """Copies what can be read.
+    """Copies everything readable.
 
     Attributes:
-      count: how many messages.
-      losses: what cannot be read.
+      count: number of messages.
+      losses: the parts that cannot be read.
     """
 
     def __init__(self, recording: File) -> None:

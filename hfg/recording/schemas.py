@@ -1,7 +1,7 @@
-"""JSON schemas of what is recorded, so that other programs can show it; images in those that Foxglove knows.
+"""JSON schemas of recorded values, so that other programs can show them; images use Foxglove's schemas.
 
-`foxglove.RawImage` and `foxglove.CompressedImage` are Foxglove's published schemas; what else a token has stands
-beside their fields, where readers that do not know it pass over it. Stands on `forms`.
+`foxglove.RawImage` and `foxglove.CompressedImage` are Foxglove's published schemas. The other parts of a token are
+additional fields, which other readers ignore. Depends on `forms`.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _TOKEN: Final[dict[str, Any]] = {
     "activity": {"type": "integer", "enum": [-1, 0, 1], "description": "The token's activity modifier"},
     "stamp": {"type": "number", "description": "Seconds on the run's clock"},
     "sequence": {"type": "integer", "description": "Number of the token on its edge, from 1"},
-    "time": {"type": "number", "description": "When it passed, if that was not at its stamp; in virtual time"},
-    "began": {"type": "number", "description": "When the firing began that has sent it, if not at its stamp"},
+    "time": {"type": "number", "description": "When it was sent, if not at its stamp; in virtual time"},
+    "began": {"type": "number", "description": "When the firing that sent it started, if not at its stamp"},
     "call": {"type": "integer", "description": "Number of the slot call in which it was triggered"},
-    "beside": {"type": "boolean", "description": "It was triggered in no firing and no slot call"},
+    "beside": {"type": "boolean", "description": "It was triggered outside firings and slot calls"},
     "silent": {"type": "boolean", "description": "The function was not run in this firing"},
-    "last": {"type": "boolean", "description": "The node's end() has written it"},
+    "last": {"type": "boolean", "description": "It was written by the node's end()"},
     "waited": {"type": "boolean", "description": "The firing waited, though no time passed"},
 }
 _BYTES: Final = {"type": "string", "contentEncoding": "base64"}
@@ -84,12 +84,12 @@ _DEEPEST: Final = 8
 
 
 def is_image(hint: Any) -> bool:
-    """Whether a type is one of images."""
+    """Return whether a type is one of images."""
     return any(isinstance(one, Pixels) for one in getattr(hint, "__metadata__", ()))
 
 
 def encoding_of(value: np.ndarray[Any, Any]) -> str | None:
-    """Give an image's encoding in Foxglove's words, or in OpenCV's where Foxglove has none; None of what is none."""
+    """Return an image's encoding in Foxglove's terms, otherwise in OpenCV's; None if it is not an image."""
     channels = 1 if value.ndim == 2 else value.shape[2] if value.ndim == 3 else 0
     dtype = value.dtype.newbyteorder("<") if value.dtype.byteorder == ">" else value.dtype
     if not 1 <= channels <= 4 or dtype.kind not in _LETTERS:
@@ -98,7 +98,7 @@ def encoding_of(value: np.ndarray[Any, Any]) -> str | None:
 
 
 def message_schema(hint: Any) -> bytes:
-    """Give the schema of the messages of a port of this type."""
+    """Return the schema of the messages of a port of this type."""
     return msgspec.json.encode(
         {
             "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -119,7 +119,7 @@ _ARRAY: Final[dict[str, Any]] = {
         "data": {**_BYTES, "description": "In C order"},
     },
 }
-# a whole number where the type says float is written as it is, what is not finite as an object
+# an integer where the type is float is written unchanged, a non-finite number as an object
 _SIMPLE: Final[dict[Any, dict[str, Any]]] = {
     int: {"type": "integer"},
     float: {"type": ["number", "object"]},
@@ -129,7 +129,7 @@ _SIMPLE: Final[dict[Any, dict[str, Any]]] = {
 
 
 def _schema(hint: Any, depth: int) -> dict[str, Any]:
-    """What is exactly of the type; a value that is not stands as an object with "$type"."""
+    """Return the schema of values that are exactly of the type; other values are objects with "$type"."""
     hint = bare(hint)
     if depth > _DEEPEST:
         return {}

@@ -1,9 +1,8 @@
-"""What a node did, step by step, read from a recording as it is needed: firings, slot calls, signals beside both.
+"""The actions of a node, step by step, read on demand from a recording: firings, slot calls, other signals.
 
-A recording holds tokens. Those that left in one firing have its number; where a node has one output, or the recording
-is of version 1, an output that sends again begins the next firing. The signals of a firing come before its outputs.
-What is otherwise is written beside the token (`recorder.Told`).
-Stands on `reading` and `messages`.
+A recording contains tokens. Tokens of one firing have its number. If a node has one output, or the recording is of
+version 1, the next token of an output starts the next firing. The signals of a firing come before its outputs.
+Exceptions are recorded with the token (`recorder.Told`). Depends on `reading` and `messages`.
 """
 
 from __future__ import annotations
@@ -23,17 +22,17 @@ from hfg.types import accepts, describe
 __all__ = ["Record", "Step", "Track", "recorded_ports"]
 
 _PROCESSED = "processed"
-_MOST_LOST: Final = 100_000  # firings; more are not believed, for anybody can write a number
+_MOST_LOST: Final = 100_000  # firings; larger numbers are not trusted because a file can contain any number
 
 
 class Record(msgspec.Struct):
     """One token of a recording.
 
     Attributes:
-      port: which it has passed.
-      when: it did, in seconds of the recording's clock.
-      token: what.
-      told: what else is known of how it came to be sent, see `recorder.Told`.
+      port: the port that sent it.
+      when: the time, in seconds of the recording's clock.
+      token: the token.
+      told: other facts about how it was sent, see `recorder.Told`.
     """
 
     port: str
@@ -43,23 +42,23 @@ class Record(msgspec.Struct):
 
 
 class Step(msgspec.Struct):
-    """A firing, a slot call, or signals beside both.
+    """A firing, a slot call, or signals outside both.
 
     Attributes:
-      began: when it begins.
+      began: when it starts.
       when: when it is over.
-      signals: what is triggered on the way.
+      signals: signals that it triggers.
       fires: it is a firing.
-      sent: what leaves by the outputs then, by recorded port.
+      sent: tokens of its outputs, by recorded port.
       ends: the node ends with it.
-      last: what leaves was written by `end()`.
+      last: its tokens were written by `end()`.
       silent: the process function was not run.
-      waits: it is over later than it begins, if only in the same moment.
-      call: the number of the slot call that it is; 0: none.
-      told: `processed` has told of it.
-      number: of the firing, as its tokens say; 0: they do not.
+      waits: it ends later than it starts, even if at the same moment.
+      call: number of the slot call; 0: it is not one.
+      told: `processed` has reported it.
+      number: of the firing, according to its tokens; 0: they have none.
 
-    Methods named `take_` say whether a record belongs to it, which has it by that.
+    Methods named `take_` return whether a record belongs to the step. If it does, they add it.
     """
 
     began: float
@@ -80,7 +79,7 @@ class Step(msgspec.Struct):
         return self.ends or self.last
 
     def take_the_end(self) -> bool:
-        """It was told that the node has ended."""
+        """The end of the node was reported."""
         self.ends = self._is_last_word
         return self.ends
 
@@ -92,21 +91,21 @@ class Step(msgspec.Struct):
         return True
 
     def take_sent(self, record: Record) -> bool:
-        """An event says what an output has sent; the outputs of a firing leave before that is told."""
+        """An event shows what an output has sent; the outputs of a firing leave before that."""
         if not self.fires or self.told:
             return False
         self.sent[record.port] = record.token
         return True
 
     def take_processed(self) -> bool:
-        """An event says that a firing is over."""
+        """An event shows that a firing is over."""
         if not self.sent or self.told or self._is_last_word:
             return False
         self.told = True
         return True
 
     def take_output(self, record: Record, *, at_once: bool) -> bool:
-        """A token has left by an output; `at_once`: those of one firing have the same time."""
+        """An output has sent a token; `at_once`: tokens of one firing have the same time."""
         if not self.fires or self.told:
             return False
         if record.token.value is END and self._is_last_word:
@@ -123,14 +122,14 @@ class Step(msgspec.Struct):
 
 
 class Track:
-    """What is to be played of one node: its steps."""
+    """The steps of one node, for playback."""
 
     def __init__(self, file: File, ports: Mapping[str, Any], *, may_pickle: bool) -> None:
-        """Choose what is played.
+        """Choose the ports to play.
 
         Args:
           file: the recording.
-          ports: paths of recorded ports, and the type of the port that sends what was recorded there.
+          ports: paths of recorded ports, and the type of the port that plays each.
           may_pickle: whether pickled values are read.
         """
         self._file = file
@@ -152,13 +151,13 @@ class Track:
                 self._node = channel.metadata.get("node", "")
                 self.of_source = channel.metadata.get("source") == "true"
         kinds = set(self._kinds.values())
-        self._closes = bool(kinds & {"output", _PROCESSED})  # what says that a firing is over is among the ports
+        self._closes = bool(kinds & {"output", _PROCESSED})  # the ports include one that shows when a firing is over
         self._has_outputs = "output" in kinds
 
     def firings(self) -> Iterator[Step]:
-        """Go through the firings; those that a damaged file has lost are silence, as far as they are known by numbers.
+        """Yield the firings. Firings that a damaged file has lost are silent, as far as their numbers show them.
 
-        So what comes later meets in a join what it met.
+        So later tokens meet the same tokens in a join as before.
         """
         last: Step | None = None
         for step in self._steps():
@@ -168,7 +167,7 @@ class Track:
                 yield step
 
     def _lost_between(self, last: Step | None, step: Step) -> Iterator[Step]:
-        """Those of which nothing was read, between two firings, or before the first one; evenly in that time."""
+        """Yield the lost firings between two firings, or before the first one, evenly spaced in time."""
         before, began = (last.number, last.when) if last is not None else (0, self.began)
         lost = step.number - before - 1
         if lost < 1 or lost > _MOST_LOST or not self._file.losses_met():
@@ -178,15 +177,15 @@ class Track:
             yield Step(when, when, fires=True, number=before + number)
 
     def others(self) -> Iterator[Step]:
-        """Go through what else there was: slot calls, and signals beside them."""
+        """Yield the other steps: slot calls, and signals outside them."""
         if not {"event"} & set(self._kinds.values()):
             return iter(())
         return (step for step in self._steps() if not step.fires)
 
     def _steps(self) -> Iterator[Step]:
-        signals: list[Record] = []  # of the firing that is under way
-        sent: dict[str, Token[Any]] = {}  # what is known of its outputs by events alone
-        step: Step | None = None  # the one that is being read
+        signals: list[Record] = []  # of the firing in progress
+        sent: dict[str, Token[Any]] = {}  # tokens of its outputs that are known only from events
+        step: Step | None = None  # the step being read
         before = self.began
         for record in self._records():
             kind = "end" if not record.port else self._kinds[record.port]
@@ -207,11 +206,11 @@ class Track:
                 signals, sent = [], {}
         if step is not None:
             yield step
-        for record in signals:  # the recording was over before the firing was
+        for record in signals:  # the recording ended before the firing
             yield Step(record.when, record.when, [record])
 
     def _goes_on(self, step: Step, kind: str, record: Record, *, amid: bool) -> bool:
-        """Whether a record belongs to the step that is being read, which has it by that."""
+        """Return whether a record belongs to the step being read, and add it if it does."""
         if kind == "end":
             return step.take_the_end()
         if kind == "event":
@@ -225,7 +224,7 @@ class Track:
     def _firing(
         self, kind: str, record: Record, before: float, signals: list[Record], sent: dict[str, Token[Any]]
     ) -> Step:
-        """Begin the step of a firing that is over with this record."""
+        """Return the step of a firing that is complete with this record."""
         token, told = record.token, record.told
         when = record.when
         if kind == "end":
@@ -254,7 +253,7 @@ class Track:
 
     def _records(self) -> Iterator[Record]:
         wanted = frozenset(self._readers) | self._markers
-        if _PROCESSED in self._kinds.values():  # nobody may have taken the END either
+        if _PROCESSED in self._kinds.values():  # it is also possible that no consumer took the END
             wanted |= self._events
         node = self._node
         for number, ns, data in self._file.messages(wanted):
@@ -264,7 +263,7 @@ class Track:
                     yield Record("", number_in(message.get("time")), _END, {})
                 continue
             if not _is_sound(message):
-                raise UsageError(f"{self._file.path} is damaged: a message in it is no token ({data[:80]!r})")
+                raise UsageError(f"{self._file.path} is damaged: a message in it is not a token ({data[:80]!r})")
             if number in self._markers:
                 if message.get("port") in self._kinds:
                     marker = END if message.get("marker") == "END" else NO_MESSAGE
@@ -274,7 +273,7 @@ class Track:
             channel, reader, hint = self._readers[number]
             try:
                 token = reader.token(message)
-            except Exception as error:  # whatever the data leads somebody to: numpy, OpenCV, a class of the user's
+            except Exception as error:  # the data may make numpy, OpenCV or a user's class raise anything
                 raise UsageError(
                     f'a value of "{channel.topic}" in {self._file.path} cannot be read as {describe(hint)}: '
                     f"{error if isinstance(error, HfgError) else in_words(error)}"
@@ -282,8 +281,8 @@ class Track:
             is_event = channel.metadata.get("kind") == "event"
             if not accepts(token.value, hint) and not (token.value is None and is_event):
                 raise UsageError(
-                    f'"{channel.topic}" in {self._file.path} has the value {token.value!r:.80}, which is no '
-                    f"{describe(hint)}, as the port now says: record again, or map it to another port"
+                    f'"{channel.topic}" in {self._file.path} has the value {token.value!r:.80}, which is not '
+                    f"{describe(hint)}, the current type of the port: record again, or map it to another port"
                 )
             yield Record(channel.topic, self._when(ns, message), token, message)
 
@@ -301,7 +300,7 @@ _NUMBERS: Final = (int, float)
 
 
 def _is_sound(message: dict[str, Any]) -> bool:
-    """Whether what a token needs is there, and what is said of it is of the types that it should be."""
+    """Return whether a token's data is complete and has the right types."""
     return (
         isinstance(message.get("stamp"), _NUMBERS)
         and message.get("activity", 0) in (-1, 0, 1)
@@ -323,5 +322,5 @@ def _kind(about: Mapping[str, str]) -> str:
 
 
 def recorded_ports(file: File) -> dict[str, Any]:
-    """The channels of ports, by path."""
+    """Return the channels of ports, by path."""
     return {one.topic: one for one in file.channels.values() if one.topic not in (MARKERS, EVENTS)}

@@ -1,10 +1,10 @@
-"""Values as JSON and back, to the bit: what comes out is equal, of the same types, and made afresh.
+"""Values as JSON and back, bit for bit: the result is equal, of the same types, and a new object.
 
-For each type of a port a pair of functions is made. What is exactly of the type is written plainly, a struct as an
-object of its fields, a tuple as a list, so that other programs can read it; whatever is not (a whole number where the
-type says float, not a number at all) is written with its type beside it, `{"$type": "tuple", "value": [1, 2]}`. What
-is made shares nothing with the value that others may go on changing. Nothing that is read is ever executed, apart from
-pickle where somebody has asked for it. Stands on `forms` and numpy.
+A pair of functions is made for each type of a port. Values that are exactly of the type are written plainly, a struct
+as an object of its fields, a tuple as a list, so that other programs can read them. Other values (an integer where the
+type is float, a value that is not a number) are written together with their type, `{"$type": "tuple", "value": [1,
+2]}`. The encoded data shares nothing with the value, which may change afterwards. Data that is read is never executed,
+except pickles if the user has allowed them. Depends on `forms` and numpy.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ _NONE: Final = type(None)
 
 
 class CannotKeep(HfgError):
-    """A value that has no place in a recording."""
+    """A value that cannot be recorded."""
 
 
 def array_fields(value: np.ndarray[Any, Any]) -> dict[str, Any]:
-    """Give what an array consists of, as data of its own."""
+    """Return the parts of an array, as data of its own."""
     if value.dtype.hasobject:
         raise CannotKeep("an array of objects has no fixed bytes")
     descr: Any = value.dtype.str if value.dtype.fields is None else np.lib.format.dtype_to_descr(value.dtype)
@@ -72,9 +72,9 @@ class Codec:
     """Writes and reads values of one type.
 
     Attributes:
-      encode: makes data that JSON knows, and bytes, of a value.
-      decode: makes the value of the data.
-      bytes_kept: of all arrays and bytes that were written.
+      encode: converts a value to JSON data and bytes.
+      decode: converts the data back.
+      bytes_kept: total size of all arrays and bytes written.
     """
 
     def __init__(self, hint: Any, *, may_pickle: bool = False) -> None:
@@ -92,10 +92,10 @@ class Codec:
         hint = bare(hint)
         try:
             made = self._encoders.get(hint)
-        except TypeError:  # with a part that cannot be hashed
+        except TypeError:  # a part of it is unhashable
             return self._any
         if made is None:
-            self._encoders[hint] = lambda value: self._encoders[hint](value)  # of a type that contains itself
+            self._encoders[hint] = lambda value: self._encoders[hint](value)  # for recursive types
             made = self._encoders[hint] = self._make_encoder(hint)
         return made
 
@@ -159,7 +159,7 @@ class Codec:
         return of_tuples
 
     def _apart(self, value: Any, kind: Any) -> Any:
-        """What would be taken for a value of the type is written with its own."""
+        """Write a value together with its type, if it could be mistaken for a value of the declared type."""
         if type(value) is not kind:
             return self._any(value)
         if kind is str:
@@ -210,7 +210,7 @@ class Codec:
                 parts = {name: self._any(getattr(value, name)) for name in fields}
                 return {_TAG: "object", "class": reference(kind), "fields": parts}
         if not self._may_pickle:
-            raise CannotKeep(f"{kind.__module__}.{kind.__qualname__} is no data that JSON can hold")
+            raise CannotKeep(f"{kind.__module__}.{kind.__qualname__} is not data that JSON can hold")
         try:
             return {_TAG: "pickle", "data": pickle.dumps(value)}
         except Exception as error:
@@ -258,7 +258,7 @@ class Codec:
         return revived
 
     def _unless_tagged(self, decode: Encode) -> Encode:
-        """Make what decodes objects, but for those that stand for a value with its type beside it."""
+        """Return a decoder of objects that first handles values with a type of their own."""
         revived = self._revived
         return lambda data: decode(data) if type(data) is dict and _TAG not in data else revived(data)
 
@@ -308,27 +308,30 @@ class Codec:
                 return self._unpickled(data)
         read = _READ.get(name)
         if read is None:
-            raise CannotKeep(f'values of kind "{name}" are unknown here: was it recorded by a newer hfg?')
+            raise CannotKeep(f'values of kind "{name}" are unknown here: was it recorded with a newer hfg?')
         plain = data["value"]
         return read([self._revived(one) for one in plain] if type(plain) is list else plain)
 
     def _unpickled(self, data: Any) -> Any:
         if not self._may_pickle:
-            raise CannotKeep("it is pickled, and reading that runs code: allow it, pickle=True, if you trust the file")
+            raise CannotKeep("it is pickled, and reading it runs code: allow it with pickle=True if you trust the file")
         return pickle.loads(base64.b64decode(data["data"]))
 
     def _class(self, name: str, form: str) -> type:
-        """A class of data that somebody has imported already, never another: any object could run code as it ends."""
+        """Return a data class that is already imported, never another one.
+
+        An object of any class could run code when it is deleted.
+        """
         found = self._classes.get(name) or _found(name)
         if found is None:
             raise CannotKeep(f"its type {name} is unknown here: import the module that has it first")
         if form_of(found).kind != form or hasattr(found, "__del__"):
-            raise CannotKeep(f"its type {name} is no data: only structs, dataclasses, named tuples and enums are")
+            raise CannotKeep(f"its type {name} is not data: only structs, dataclasses, named tuples and enums are")
         return found
 
 
 def _made(kind: Any, fields: dict[str, Any]) -> Any:
-    """Make an object of its fields, as it was; a dataclass without what its class does with new ones."""
+    """Make an object from its fields, as it was; a dataclass without running its own initialisation."""
     if issubclass(kind, tuple):
         return tuple.__new__(kind, fields.values())
     if issubclass(kind, msgspec.Struct):
@@ -346,14 +349,14 @@ def _tuple_items(arguments: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
 
 
 def _has_names(value: dict[Any, Any]) -> bool:
-    """Whether all keys can be names in JSON, and none is the one that says a type."""
+    """Return whether all keys can be names in JSON, and none of them is the type key."""
     return _TAG not in value and all(type(key) is str and type(_text(key)) is str for key in value)
 
 
 def _text(value: str) -> Any:
     try:
         value.encode()
-    except UnicodeEncodeError:  # half a character, which JSON cannot write
+    except UnicodeEncodeError:  # a lone surrogate, which JSON cannot hold
         return {_TAG: "text", "value": value.encode("utf-16-le", "surrogatepass").hex()}
     return value
 

@@ -1,8 +1,8 @@
-"""The thread that writes a recording: encodes what the run hands over, and puts it into the file chunk by chunk.
+"""The thread that writes a recording: encodes tokens from the run, and writes them to the file chunk by chunk.
 
-A chunk is written when it is large enough or a second old, and handed to the system at once: whatever becomes of the
-process, the file opens up to its last chunk. Batches are small, and between them others have a turn at the interpreter.
-Stands on `mcap` and `messages`.
+A chunk is written when it is large enough or a second old, and passed to the system at once: if the process dies, the
+file can be read up to its last chunk. Batches are small, so that other threads get the interpreter in between. Depends
+on `mcap` and `messages`.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _EVENT_SCHEMA: Final = b'{"title":"hfg event","type":"object"}'
 
 
 class _Batch(NamedTuple):
-    """Columns of what was handed over; see `ITEM`."""
+    """Columns of the tokens from the run; see `ITEM`."""
 
     places: Sequence[Any]
     passed: Sequence[Any]
@@ -58,11 +58,11 @@ class RecordingWriter:
     """Writes one file in a thread of its own.
 
     Attributes:
-      items: what lies before it.
-      sizes: of the values among them that were kept by copying.
-      places: what is recorded; each has its channel from the beginning, also if nothing passes.
-      bytes_taken: of the values that it has taken, as they were counted when they came.
-      error: why it writes no more; None while it does.
+      items: its queue.
+      sizes: sizes of the copied values in the queue.
+      places: the recorded ports; each has a channel from the start, even if it sends nothing.
+      bytes_taken: size of the values that it has taken, as counted when they were queued.
+      error: why it has stopped writing; None while it writes.
       bytes_written: length of the file.
     """
 
@@ -101,15 +101,15 @@ class RecordingWriter:
         return self._file.chunks_written
 
     def start(self) -> None:
-        """Begin to write."""
+        """Start writing."""
         self._thread.start()
 
     def wake(self) -> None:
-        """There is something to write."""
+        """Wake the thread because the queue is not empty."""
         self._something.set()
 
     def is_alive(self) -> bool:
-        """Whether it still writes."""
+        """Return whether it still writes."""
         return self._thread.is_alive()
 
     def join(self, timeout: float | None = None) -> None:
@@ -117,7 +117,7 @@ class RecordingWriter:
         self._thread.join(timeout)
 
     def finish(self) -> None:
-        """Write what is left and close the file."""
+        """Write the rest and close the file."""
         self._finishing = True
         self._something.set()
 
@@ -126,7 +126,7 @@ class RecordingWriter:
     def _live(self) -> None:
         try:
             self._write_all()
-        except BaseException as error:  # the disk is full, above all: whoever records is told
+        except BaseException as error:  # most of all a full disk: reported to the recording's user
             self.error = error
             self.failed(error)
         finally:
@@ -160,14 +160,14 @@ class RecordingWriter:
                 return
 
     def _write(self, items: list[Any]) -> None:
-        """Encode what was handed over, all together, and put it into the chunk."""
+        """Encode a batch, and put it into the chunk."""
         self._declare_places()
         if not self._file.chunk_messages:
             self._chunk_since = time.monotonic()
         columns = _Batch(*(items[at::ITEM] for at in range(ITEM)))
         bodies, channels, sequences, stamps = self._plain_columns(columns) or self._columns(columns)
         lines = self._encode.encode_lines(bodies).split(b"\n")
-        lines.pop()  # behind the last line
+        lines.pop()  # after the last line
         times = np.maximum.accumulate(np.maximum(_nanoseconds(columns.whens), self._last_ns))
         self._last_ns = times[-1]
         published = _nanoseconds(stamps)
@@ -184,7 +184,7 @@ class RecordingWriter:
             self._declared += 1
 
     def _plain_columns(self, batch: _Batch) -> Any:
-        """Where all are finite numbers, they need not be looked at one by one; None: there is something else."""
+        """Return plain columns if all values are finite numbers, which need no check each; otherwise None."""
         places, bodies, stamps, sequences, whens = batch
         counts = Counter(places)
         if None in counts or any(place.keep is not None or place.firings is not None for place in counts):
@@ -213,7 +213,7 @@ class RecordingWriter:
                     self._end_firings()
                 continue
             firing = 0 if place.firings is None else place.firings.number(place.path)
-            if not isinstance(token, Token):  # it has passed in a wave
+            if not isinstance(token, Token):  # it was sent in a wave
                 token = Token(NO_MESSAGE if token is None else token, 0, stamp, sequence)
             late = when if self._exact and when != token.stamp else None
             if type(token.value) is Marker:
@@ -251,21 +251,21 @@ class RecordingWriter:
 
 
 def open_new(path: Path, *, force: bool) -> BinaryIO:
-    """Open a file that is to be made.
+    """Create and open a file.
 
     Raises:
-      UsageError: it is there already, or cannot be made.
+      UsageError: it already exists, or cannot be made.
     """
     try:
         return path.open("wb" if force else "xb")
     except FileExistsError:
         raise is_there(path) from None
     except OSError as error:
-        raise UsageError(f"the recording cannot be written to {path}: {error.strerror}") from None
+        raise UsageError(f"cannot write the recording to {path}: {error.strerror}") from None
 
 
 def _parts(lines: Sequence[bytes]) -> Iterator[slice]:
-    """Divide messages so that large ones do not all come into one chunk, which is read as a whole."""
+    """Yield messages in parts, so that large ones do not all go into one chunk, which is read as a whole."""
     if sum(map(len, lines)) <= _CHUNK_BYTES:
         yield slice(None)
         return
@@ -278,12 +278,12 @@ def _parts(lines: Sequence[bytes]) -> Iterator[slice]:
 
 
 def is_there(path: Path) -> UsageError:
-    """Make the error that says that a file which is to be made is there already."""
-    return UsageError(f"{path} is there already: choose another name, or write over it, --force or force=True")
+    """Return the error for a file that already exists."""
+    return UsageError(f"{path} already exists: choose another name, or overwrite it with --force or force=True")
 
 
 def _are_finite(values: Sequence[Any]) -> bool:
-    """Whether all are numbers that JSON has."""
+    """Return whether all values are numbers that JSON can hold."""
     try:
         return _NUMBERS.issuperset(map(type, values)) and isfinite(sum(values))
     except OverflowError:
@@ -296,7 +296,7 @@ def _nanoseconds(seconds: Sequence[float]) -> npt.NDArray[np.uint64]:
 
 
 def _text(value: Any) -> Any:
-    """Describe what JSON does not know; of an event, whose values are for reading only."""
+    """Return a text for a value that JSON does not support; for an event, whose values are only for reading."""
     return f"{value!r:.200}"
 
 

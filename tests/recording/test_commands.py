@@ -41,18 +41,18 @@ def test_a_run_is_recorded_told_of_and_played_back(program: Path, command: Comma
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["info", "nowhere.mcap"], "hfg: the recording nowhere.mcap cannot be opened: No such file or directory\n"),
+        (["info", "nowhere.mcap"], "hfg: cannot open the recording nowhere.mcap: No such file or directory\n"),
         (
             ["info", "robot.py"],
-            "hfg: robot.py is no MCAP file: hfg record writes them, and so do many other programs\n",
+            "hfg: robot.py is not an MCAP file; hfg record writes such files, and so do many other programs\n",
         ),
         (
             ["record", "robot.py", "-o", "robot.py"],
-            "hfg: robot.py is there already: choose another name, or write over it, --force or force=True\n",
+            "hfg: robot.py already exists: choose another name, or overwrite it with --force or force=True\n",
         ),
         (
             ["record", "robot.py", "-o", "run.mcap", "--select", "lidar*"],
-            'hfg: no port fits "lidar*"; the ports that send here are "camera.out", "double.out"\n',
+            'hfg: no port matches "lidar*"; the sending ports are "camera.out", "double.out"\n',
         ),
         (
             ["play", "robot.py", "--into", "robot.py", "--speed", "fast"],

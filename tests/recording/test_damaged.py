@@ -198,7 +198,7 @@ def test_recover_finishes_a_file_whose_process_was_killed(
     cut = written(whole[: in_a_chunk(whole, 3)])
     assert main(["recover", str(cut), "-o", str(tmp_path / "new.mcap")]) == 0
     out = capsys.readouterr().out
-    assert "it was cut off here; how many messages are lost by that is not known" in out
+    assert "it was cut off here; the number of lost messages is unknown" in out
     info, those = seen(tmp_path / "new.mcap")
     assert info.whole
     assert those == seen(cut)[1]
@@ -233,7 +233,7 @@ def test_recover_of_a_whole_file_loses_nothing(whole: bytes, written: Written, t
 
 def test_recover_writes_over_nothing_unasked(whole: bytes, written: Written, tmp_path: Path) -> None:
     (tmp_path / "new.mcap").write_text("mine")
-    with pytest.raises(UsageError, match="is there already"):
+    with pytest.raises(UsageError, match="already exists"):
         recover(written(whole), tmp_path / "new.mcap")
     with pytest.raises(UsageError, match="is the recording itself"):
         recover(written(whole), written(whole), force=True)
@@ -260,7 +260,7 @@ def test_a_message_nested_without_end_is_a_sentence(tmp_path: Path) -> None:
     (tmp_path / "deep.mcap").write_bytes(damage.with_message(b"[" * 100_000))
     graph = hfg.Graph("again")
     graph.add(Playback(file=tmp_path / "deep.mcap", port="a.out"))
-    with pytest.raises(HfgError, match="is damaged: a message in it is no JSON"):
+    with pytest.raises(HfgError, match="is damaged: a message in it is not JSON"):
         hfg.run(graph, clock="virtual")
 
 
@@ -310,9 +310,9 @@ def test_only_data_is_made_of_what_a_recording_names(tmp_path: Path) -> None:
     """An object with fields of somebody's choice could remove a file as it ends."""
     codec = Codec(Any)
     for name in ("tempfile:_TemporaryFileCloser", "subprocess:Popen", "builtins:object"):
-        with pytest.raises(CannotKeep, match="is no data: only structs"):
+        with pytest.raises(CannotKeep, match="is not data: only structs"):
             codec.decode({"$type": "object", "class": name, "fields": {"name": str(tmp_path)}})
-        with pytest.raises(CannotKeep, match="is no data: only structs"):
+        with pytest.raises(CannotKeep, match="is not data: only structs"):
             codec.decode({"$type": "enum", "class": name, "name": "RED"})
 
 
@@ -403,8 +403,8 @@ def test_sources_of_one_output_have_no_numbers_and_that_is_said(
     hfg.run(joined(), clock="virtual", begin=lambda run: record(run, tmp_path / "run.mcap", select=["*.left"]))
     data = (tmp_path / "run.mcap").read_bytes()
     said = [
-        f'firings of "{node}" have no numbers in the recording, as one output of it was recorded: those that are lost '
-        "are not played as silence, and what comes later may meet other tokens in a join"
+        f'firings of "{node}" have no numbers in the recording because only one output of it was recorded: lost '
+        "firings are not played as silence, and later tokens may meet other tokens in a join"
         for node in ("one", "other")
     ]
     assert play_into(joined(), written(data)).gaps == []

@@ -244,10 +244,10 @@ def read(value: str) -> None:
 
 def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
-    with pytest.raises(UsageError, match="cannot be opened: No such file"):
+    with pytest.raises(UsageError, match="cannot open the recording .*: No such file"):
         play_into(build(), file)
     file.write_bytes(b"no")
-    with pytest.raises(UsageError, match="is no MCAP file"):
+    with pytest.raises(UsageError, match="is not an MCAP file;"):
         play_into(build(), file)
     run(build(count=3), file)
     other = hfg.Graph("other")
@@ -256,9 +256,9 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
         play_into(other, file)
     with pytest.raises(UsageError, match='no port "camera.ou" was recorded .* did you mean "camera.out"'):
         play_into(build(), file, ports={"camera.ou": "double.value"})
-    with pytest.raises(UsageError, match='the graph lacks "double.valu"'):
+    with pytest.raises(UsageError, match='the graph has no "double.valu"'):
         play_into(build(), file, ports={"camera.out": "double.valu"})
-    with pytest.raises(UsageError, match="speed= says how much faster"):
+    with pytest.raises(UsageError, match="speed= is a factor of the"):
         play_into(build(), file, speed=0.0)
 
 
@@ -267,7 +267,7 @@ def test_a_type_that_no_longer_fits_names_port_and_value(tmp_path: Path) -> None
     graph = hfg.Graph()
     graph.add(texts(), name="camera") >> graph.add(read())
     play_into(graph, tmp_path / "run.mcap")
-    with pytest.raises(hfg.errors.NodeError, match='"camera.out" in .* has the value 0, which is no str'):
+    with pytest.raises(hfg.errors.NodeError, match='"camera.out" in .* has the value 0, which is not str'):
         hfg.run(graph, clock="virtual")
 
 
@@ -334,7 +334,9 @@ def test_a_recording_without_numbers_of_firings_is_played_by_the_order_of_its_to
     hfg.run(two_outputs(), begin=lambda run: record(run, file))
     graph = two_outputs()
     playing = play_into(graph, file, speed=None)
-    assert [gap.partition(",")[0] for gap in playing.gaps] == ['firings of "camera" have no numbers in the recording']
+    assert [gap.partition(" because")[0] for gap in playing.gaps] == [
+        'firings of "camera" have no numbers in the recording'
+    ]
     assert hfg.run(graph).outputs["out"] == PAIRS
 
 
@@ -425,9 +427,9 @@ def test_ports_of_two_recorded_nodes_cannot_be_played_by_one(tmp_path: Path) -> 
     graph = two_outputs()
     graph.add(camera(), name="other") >> graph.add(show())
     hfg.run(graph, clock="virtual", begin=lambda run: record(run, file))
-    with pytest.raises(UsageError, match='"camera" already, and the firings of one node come from one recorded node'):
+    with pytest.raises(UsageError, match=", and the firings of one node come from one recorded node"):
         play_into(two_outputs("front", Webcam), file, ports={"camera.image": "front.frame", "other.out": "front.index"})
     with pytest.raises(UsageError, match='"camera.image" cannot be played as "pair.processed"'):
         play_into(two_outputs(), file, ports={"camera.image": "pair.processed"})
-    with pytest.raises(UsageError, match='played to a port, and "pair" is none'):
+    with pytest.raises(UsageError, match='played into a port, but "pair" is not a port;'):
         play_into(two_outputs(), file, ports={"camera.image": "pair"})

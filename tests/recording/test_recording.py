@@ -194,7 +194,7 @@ def test_a_port_whose_values_are_no_data_is_refused_before_there_is_a_file(tmp_p
     graph = hfg.Graph()
     graph.add(handles()) >> graph.add(take())
     with pytest.raises(
-        UsageError, match=r'values of "handles.out" cannot be recorded: .*Handle is no data.*pickle=True'
+        UsageError, match=r'values of "handles.out" cannot be recorded: .*Handle is not data.*pickle=True'
     ):
         recorded(graph, tmp_path / "run.mcap")
     assert not (tmp_path / "run.mcap").exists()
@@ -209,7 +209,7 @@ def test_a_value_that_is_no_data_is_left_out_told_once_and_counted(
         found = recorded(graph, tmp_path / "run.mcap")
     assert found.left_out == {"anything.out": 1}
     assert [one.message for one in caplog.records if one.name == "hfg.recording"] == [
-        'values of "anything.out" cannot be recorded: tests.recording.test_recording.Handle is no data that JSON can '
+        'values of "anything.out" cannot be recorded: tests.recording.test_recording.Handle is not data that JSON can '
         "hold; make it a dataclass, record without this port, or allow pickle=True, which other programs cannot read"
     ]
     assert info(tmp_path / "run.mcap").refused == {"anything.out": 1}
@@ -217,18 +217,16 @@ def test_a_value_that_is_no_data_is_left_out_told_once_and_counted(
 
 def test_wrong_wishes_are_refused_with_the_remedy(tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
-    with pytest.raises(
-        UsageError, match='no port fits "foo\\*"; the ports that send here are "camera.out", "double.out"'
-    ):
+    with pytest.raises(UsageError, match='no port matches "foo\\*"; the sending ports are "camera.out", "double.out"'):
         recorded(build(), file, select="foo*")
     with pytest.raises(UsageError, match='there is no port "camera.ou" to record; did you mean "camera.out"'):
         recorded(build(), file, select="camera.ou")
-    with pytest.raises(UsageError, match="select= says which ports"):
+    with pytest.raises(UsageError, match="select= is empty; it selects the ports"):
         recorded(build(), file, select=[])
-    with pytest.raises(UsageError, match="cannot be written to .*nowhere"):
+    with pytest.raises(UsageError, match="cannot write the recording to .*nowhere"):
         recorded(build(), tmp_path / "nowhere" / "run.mcap")
     file.write_text("mine")
-    with pytest.raises(UsageError, match="is there already: choose another name, or write over it"):
+    with pytest.raises(UsageError, match="already exists: choose another name, or overwrite it with"):
         recorded(build(), file)
     assert file.read_text() == "mine"
     recorded(build(), file, force=True)
@@ -341,7 +339,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(
     )
     assert report.outcome == "done"
     assert isinstance(found[0].error, OSError)
-    assert "is not whole, nothing more is written" in caplog.text
+    assert "is incomplete, writing has stopped:" in caplog.text
 
 
 @pytest.mark.parametrize("cut", [1, 40, 300])

@@ -133,7 +133,7 @@ class Handle:
 
 
 def test_an_object_that_is_no_data_is_refused_unless_pickle_is_allowed() -> None:
-    with pytest.raises(CannotKeep, match=r"test_values\.Handle is no data"):
+    with pytest.raises(CannotKeep, match=r"test_values\.Handle is not data"):
         Codec(Any).encode(Handle())
     assert type(there_and_back(Any, Handle(), may_pickle=True)) is Handle
 
