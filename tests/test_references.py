@@ -31,7 +31,7 @@ MODULE = re.compile(
     r"(?<![\w./@-])((?:hfg|hfg_transports|tests|benchmarks|examples)(?:\.[a-zA-Z_]\w*)+)(?![\w/-]|\.\w)"
 )
 BELOW = re.compile(r"\b(?:Stands|Depends|Builds) on ([^.;]*(?:\.\w[^.;]*)*)")
-SECTION = re.compile(r"\b([A-Z]{3,})(?:\.md)? §")
+SECTION = re.compile(r'\b([A-Z]{6,})(?:\.md)?(?: §|, ")')
 
 # Files that a sentence makes up, to say what would happen with one.
 INVENTED = {
@@ -227,7 +227,7 @@ def test_documents_whose_sections_are_named_exist() -> None:
         (FILE, "see docs/howto/nodes.md, and worker.py", ["docs/howto/nodes.md", "worker.py"]),
         (MODULE, "see hfg.base.token and hfg.run.", ["hfg.base.token", "hfg.run"]),
         (BELOW, "Stands on `problem` and `hfg.engine`; knows no run.", ["`problem` and `hfg.engine`"]),
-        (SECTION, "(ARCHITECTURE §1, rules R1), the paper's §5.2", ["ARCHITECTURE"]),
+        (SECTION, '(ARCHITECTURE §1), the paper\'s §5.2 (SEMANTICS, "quiet")', ["ARCHITECTURE", "SEMANTICS"]),
     ],
 )
 def test_references_are_seen(pattern: re.Pattern[str], text: str, found: list[str]) -> None:

@@ -38,7 +38,7 @@ class Edge:
       mandatory: whether it feeds a mandatory input (F4's m).
       sent, dropped, drained: counts for the report; `sent` is also the number of the newest token.
       lost: number of its tokens that were lost with a process (L2).
-      live: whether both ends are enabled (SEMANTICS, "live edge").
+      live: whether both ends are enabled (F1).
       sequential: its tokens are processed when the consumer's outputs are, not when they are taken (F5).
       follows: work that it enables runs before all other work of the group (R2): the edge is sequential, within one
         group, and the group works first in, first out.

@@ -1,4 +1,4 @@
-"""What one can do with a run from outside (rules R1, R7, P10).
+"""The handle of a run, by which code outside the graph controls it (rules R1, R7, P10).
 
 A thin face: what is asked for is done by the parts of `composition`.
 """
@@ -48,7 +48,10 @@ T = TypeVar("T")
 
 
 class Run:
-    """A graph that runs; made by `running`."""
+    """A run of a graph: the handle by which code outside the graph feeds, watches, edits and ends it.
+
+    `running` makes one, and `run(begin=...)` passes one to its function.
+    """
 
     def __init__(self, graph: Graph, parts: Composition) -> None:
         self.graph = graph
@@ -75,17 +78,18 @@ class Run:
     async def trigger(
         self, port: Any, value: Any = None, *, activity: int | None = None, stamp: float | None = None
     ) -> None:
-        """Send a signal into a slot, or trigger an event as its node would; waits while a queue is full (F8).
+        """Send a signal into a slot, or trigger an event as its node would. Wait while a queue is full (F8).
 
         Args:
           port: a slot or an event of a node in the graph, or its path.
-          value: of the port's type; a token passed on keeps its modifier and stamp.
-          activity: the modifier; into a slot it acts as over an active edge.
-          stamp: seconds on the run's clock; now, if not given.
+          value: a value of the port's type, or a token, which keeps its modifier and stamp.
+          activity: the modifier. Into a slot it acts as over an active edge.
+          stamp: seconds on the run's clock; by default now.
 
         Raises:
           TypeError: the value is not of the port's type.
-          GraphError: the path leads nowhere.
+          GraphError: the path does not exist.
+          UsageError: the port is neither a slot nor an event of a node.
           NotRunning: the run is over.
         """
         port = self._at(port)
@@ -127,9 +131,17 @@ class Run:
     @overload
     def feed(self, port: str, *, end: bool = True) -> outside.Feed[Any]: ...
     def feed(self, port: GraphInput[Any] | str, *, end: bool = True) -> outside.Feed[Any]:
-        """Open a feed into a graph input; use it with `async with`.
+        """Open a feed into a graph input. Use it with `async with`; it holds the run open until it is closed (P10).
 
-        Which holds the run open and sends END at its end unless `end=False`.
+        Args:
+          port: the graph input, or its name.
+          end: send END when the feed is closed.
+
+        Returns:
+          The feed; its `send` waits until the token is processed.
+
+        Raises:
+          UsageError: the graph has no such input, or nothing is connected to it.
         """
         name = self._boundary(port, self.graph.inputs)
         for worker in self._engine.core.feeds:
@@ -144,9 +156,18 @@ class Run:
     @overload
     def read(self, port: str) -> AsyncIterator[Any]: ...
     def read(self, port: GraphOutput[Any] | str) -> AsyncIterator[Any]:
-        """Read a graph output, value by value and lossless: a reader that does not read holds the graph back (P10).
+        """Read a graph output, value by value and without loss (P10).
 
-        While something lies before a reader that goes on, the run does not end.
+        A reader that does not read holds the graph back. The run does not end while values wait for a reader.
+
+        Args:
+          port: the graph output, or its name.
+
+        Returns:
+          An async iterator over the values; it ends with the run.
+
+        Raises:
+          UsageError: the graph has no such output, or nothing is connected to it.
         """
         name = self._boundary(port, self.graph.outputs)
         for worker in self._engine.core.readers:
@@ -157,35 +178,39 @@ class Run:
         )
 
     def tap(self, what: PortEnd | Edge | str, *, size: int | None = None, max_rate_hz: float | None = None) -> Tap:
-        """Look at a port or an edge, given itself or by path: an async iterator over the tokens, markers too.
+        """Watch a port or an edge: return an async iterator over its tokens, including markers.
 
-        The graph never waits for a tap: tokens that it has no room for are skipped, oldest first, and counted.
+        A tap never slows the graph down. When its buffer is full, it skips the oldest tokens and counts them.
 
         Args:
-          what: a port or an edge of the graph, "fetch/go_to.goal", or "a.out -> b.in". An event shows its signals, an
-            output each token once whatever its fan-out, a slot what comes over all its edges and from outside.
-          size: how many tokens are kept for the reader; 100, or 1, the latest, with `max_rate_hz`.
-          max_rate_hz: give at most so many tokens a second of the run's clock.
+          what: a port or an edge, or its path: "fetch/go_to.goal", "a.out -> b.in". An event yields its signals, an
+            output yields each token once regardless of fan-out, and a slot yields everything that arrives over its
+            edges or from outside.
+          size: number of tokens to buffer for the reader. Default 100; with `max_rate_hz` 1, the latest.
+          max_rate_hz: yield at most this many tokens per second on the run's clock.
 
         Raises:
-          UsageError: it is in no run or has no edge.
-          GraphError: there is no such path.
+          UsageError: the port belongs to no run, or has no edge.
+          GraphError: the path does not exist.
           NotRunning: the run is over.
         """
         self._need_running("nothing will pass there any more")
         return self._parts.taps.add(what, size, max_rate_hz)
 
     def trace(self, consumer: Consumer, *, size: int | None = None) -> Listener:
-        """Let a consumer see every event of the run from now on (R7); gives back what removes it.
+        """Send every event of the run to a consumer from now on (R7).
 
         Args:
-          consumer: a function that takes an event, called at once and on the loop, so let it be quick; or a list.
-            One that raises is logged and removed, and the run goes on.
-          size: the events that a buffer of its own holds; the function is then called on a thread of its own. An async
-            function has a task and a buffer in any case. Whoever is too slow loses the oldest, counted as `lost`.
+          consumer: a function that takes an event, or a list. A function is called immediately and on the loop, so it
+            must be quick. A consumer that raises is logged and removed; the run continues.
+          size: number of events to buffer; the function is then called in a thread of its own. An async function always
+            has a task and a buffer. A consumer that is too slow loses the oldest events, which are counted as `lost`.
+
+        Returns:
+          A listener; its `remove` removes the consumer.
 
         Raises:
-          UsageError: it cannot take events.
+          UsageError: the consumer cannot take events.
         """
         return self._parts.consumers.add(consumer, size)
 
@@ -199,22 +224,22 @@ class Run:
         pickle: bool = False,
         force: bool = False,
     ) -> RunRecording:
-        """Write what passes ports to an MCAP file from now on: tokens, activity, parameters, the graph itself.
+        """Record ports to an MCAP file from now on: tokens, activity, parameters and the graph itself.
 
-        In `begin=`, before nodes are set up, nothing is missed. It ends with the run, which waits until the file is
-        whole; `stop()`, `close()` or the end of an `async with` block end it sooner.
+        Call it in `begin=` to record everything from the start. The recording ends with the run, which waits until the
+        file is complete. `stop()`, `close()` or leaving an `async with` block ends it sooner.
 
         Args:
-          file: where to; it can be read at any time up to its last second, whatever becomes of the program.
-          select: paths of ports or nodes, or patterns of them, "camera/*"; by default all outputs and events.
-          lossless: nothing is left out: nodes whose ports are recorded wait where the disk is slower. Else the graph is
-            never slowed, and what there is no time for is counted.
-          images: how images are written: "raw", "png" (smaller, slower, the same to the bit), "jpeg" (with losses).
-          pickle: write values that are no data with pickle; reading such a file runs code.
-          force: write over a file that is there.
+          file: the file. It can be read at any time up to its last second, even if the program crashes.
+          select: paths of ports or nodes, or patterns such as "camera/*"; by default all outputs and events.
+          lossless: record everything: recorded nodes wait while the disk is slower. Otherwise the graph is never slowed
+            down, and tokens that cannot be written in time are counted.
+          images: format of images: "raw", "png" (smaller, slower, lossless) or "jpeg" (lossy).
+          pickle: write values that are not data with pickle. Reading such a file runs code.
+          force: overwrite an existing file.
 
         Raises:
-          UsageError: no port fits, values of one cannot be recorded, or the file is there already or cannot be made.
+          UsageError: no port matches, the values of one cannot be recorded, or the file exists or cannot be written.
           NotRunning: the run is over.
         """
         recording: RunRecording = hooks.record(
@@ -226,20 +251,22 @@ class Run:
         """Refuse to record chosen ports, by their paths, that are in another process; here none is."""
 
     def report_page(self, file: str | os.PathLike[str], *, pictures: int = 24, picture_size: int = 320) -> RunPage:
-        """Write a page about the run when it is over: one HTML file that needs nothing besides itself.
+        """Write a page about the run when it is over: one self-contained HTML file.
 
-        It has the drawing with who was active at any time, the times of activity and of firings, counts, times, errors
-        and pictures. In `begin=`, before nodes are set up, nothing is missed; what is asked for later begins there.
-        However long the run is, memory and file are bounded, and the page says what it leaves out.
+        The page has the drawing with the active nodes at any time, activity and firings over time, counts, times,
+        errors and images. Call it in `begin=` to cover the whole run. Memory and file size are bounded however long the
+        run is; the page says what it leaves out.
 
         Args:
-          file: where to; one that is there is written over.
-          pictures: how many of those that pass outputs and events are shown, spread evenly over ports and time; 0 shows
-            none. They are images of 8 bits.
-          picture_size: how many pixels their longer side has at most.
+          file: the file; an existing one is overwritten.
+          pictures: number of images from outputs and events to show, spread evenly over ports and time; 0 shows none.
+          picture_size: maximum length of their longer side in pixels.
+
+        Returns:
+          The page, to which you can add sections of your own.
 
         Raises:
-          UsageError: the file cannot be written, or a number is out of its range.
+          UsageError: the file cannot be written, or a number is out of range.
           NotRunning: the run is over.
         """
         self._need_running("there is nothing left to see for a page")
@@ -251,18 +278,18 @@ class Run:
     @overload
     def set(self, parameter: str, value: object) -> None: ...
     def set(self, parameter: ParameterPort[Any] | str, value: Any) -> None:
-        """Set a parameter of a node between its firings: now, or when the one under way is over (P8).
+        """Set a parameter of a node: now, or as soon as its current firing is over (P8).
 
-        That of a subgraph sets those inside that it stands for.
+        Setting a promoted parameter of a subgraph sets the inner parameters that it stands for.
 
         Args:
-          parameter: its port, `node.ports.parameters["gain"]`, or its path, "fetch/filter.gain".
-          value: within its limits.
+          parameter: the port, `node.ports.parameters["gain"]`, or its path, "fetch/filter.gain".
+          value: a value within the parameter's limits.
 
         Raises:
-          ValueError: the value is out of the parameter's limits; nothing is changed.
-          UsageError: it would have no effect: a generator function has been given the old value.
-          GraphError: the path leads nowhere.
+          ValueError: the value is out of limits; nothing was changed.
+          UsageError: setting it would have no effect, because a generator function has already received the old value.
+          GraphError: the path does not exist.
           NotRunning: the run is over.
         """
         if isinstance(parameter, str):
@@ -280,43 +307,50 @@ class Run:
     # --- changing it (R4): one edit after the other, in the order they were asked for ---------------------------------
 
     async def edit(self, *commands: Command) -> None:
-        """Change the graph while it runs: all of it, or when a command is refused, nothing.
+        """Change the graph while it runs. If any command is refused, nothing is changed (R4).
 
-        New nodes are set up first. The change takes effect at one moment, between firings of the nodes it touches, and
-        then this returns; other nodes go on meanwhile. What lies on an edge that is removed is dropped and counts as
-        processed; a new edge starts empty. Cancelled before it takes effect, it changes nothing.
+        New nodes are set up first. The change takes effect at one moment, between firings of the nodes that it affects,
+        and then this returns; other nodes keep running. Tokens on a removed edge are dropped and count as processed; a
+        new edge starts empty. If the call is cancelled before the change takes effect, nothing is changed.
+
+        Args:
+          *commands: edits from `hfg.commands`, in order.
 
         Raises:
-          GraphError: a command cannot be carried out; the message says which and why.
-          NodeError: the `setup()` of a node that comes failed; one that it was to replace is set up again.
-          UsageError: it is an edit that only a graph at rest allows, or was asked for by code whose end it waits for.
+          GraphError: a command cannot be carried out; the message says which one and why.
+          NodeError: the `setup()` of a new node failed. A node that it was to replace is set up again.
+          UsageError: the edit is only possible while the graph is not running, or was requested by code that it has to
+            wait for.
           NotRunning: the run is over.
         """
         await self._edits.edit(commands)
 
     async def undo(self) -> None:
-        """Take the last edit back, be it of this run or from before; nodes that come back start afresh.
+        """Undo the last edit, whether it was made in this run or before. Nodes that come back start from scratch.
 
         Raises:
-          UsageError: there is none, or the graph was changed by hand since.
+          UsageError: there is no edit to undo, or the graph was changed by other means since.
         """
         await self._edits.undo()
 
     async def redo(self) -> None:
-        """Carry the edit out again that was undone last.
+        """Carry out the edit again that was undone last.
 
         Raises:
-          UsageError: there is none.
+          UsageError: there is no edit to redo.
         """
         await self._edits.redo()
 
     async def reload(self, module: str | ModuleType) -> None:
-        """Run a changed module again; its node types replace those of its nodes.
+        """Reload a changed module and replace the nodes whose types it defines.
 
-        Parameters, edges, what lies on them and activity stay; the nodes are torn down and set up.
+        Parameters, edges, tokens on them and activity stay; the nodes are torn down and set up.
+
+        Args:
+          module: the module, or its name.
 
         Raises:
-          GraphError: the module fails, or a type does not fit; the graph goes on with what it has.
+          GraphError: the module fails, or a type does not fit; the graph continues as it is.
         """
         await self._edits.reload(module)
 
@@ -324,7 +358,7 @@ class Run:
 
     @property
     def paused(self) -> bool:
-        """Whether no new firing or slot call starts at the moment."""
+        """Whether the run is paused: no new firing or slot call starts."""
         return self._pausing.paused
 
     @property
@@ -333,10 +367,10 @@ class Run:
         return self._pausing.breakpoints
 
     def pause(self) -> None:
-        """Let no new firing and no new slot call start (R3).
+        """Start no new firing and no new slot call (R3).
 
-        What is under way goes on to its end, tokens stay where they are, signals from outside are still taken in. Time
-        goes on too, also virtual time.
+        Firings and calls in progress finish, tokens stay where they are, and signals from outside are still accepted.
+        Time passes, including virtual time.
 
         Raises:
           NotRunning: the run is over.
@@ -345,15 +379,15 @@ class Run:
         self._pausing.pause()
 
     def resume(self) -> None:
-        """Go on after a pause, past the breakpoints that caused it. Does nothing if the run is not paused.
+        """Continue after a pause, past the breakpoints that caused it. Does nothing if the run is not paused.
 
         Raises:
-          UsageError: a step is under way.
+          UsageError: a step is in progress.
         """
         self._pausing.resume()
 
     async def wait_paused(self) -> str:
-        """Wait until the run is paused, by `pause` or a breakpoint, and nothing is under way any more.
+        """Wait until the run is paused, by `pause` or a breakpoint, and nothing is in progress any more.
 
         Returns:
           The path of the breakpoint that was hit, or "pause".
@@ -364,31 +398,37 @@ class Run:
         return await self._pausing.wait_paused()
 
     async def step(self, node: Node | str | None = None) -> Step:
-        """Let a paused run make one step, and wait until it is over (R3).
+        """Let a paused run make one step, and wait until the step is over (R3).
 
         Args:
-          node: makes one firing or one slot call, whichever is next in its order (F9); one that cannot move does not,
-            and the step says why. Without a node: a wave, in which each node makes at most one firing and one call,
-            those included that become able to by it.
+          node: the node to step. It makes one firing or one slot call, whichever is next (F9). If it cannot move, the
+            step says why. Without a node, each node makes at most one firing and one call, including those that become
+            possible during the step.
+
+        Returns:
+          The step: what moved, or why nothing did.
 
         Raises:
-          UsageError: the run is not paused or has ended, another step is under way, or the node is a subgraph.
+          UsageError: the run is not paused or has ended, another step is in progress, or the node is a subgraph.
         """
         return await (self._pausing.wave() if node is None else self._pausing.step(node))
 
     def break_at(
         self, place: Node | PortEnd | Edge | str, *, when: Callable[[Token[Any]], object] | None = None
     ) -> Breakpoint:
-        """Pause the run at a place from now on; `wait_paused` tells when.
+        """Pause the run whenever it reaches a place; `wait_paused` waits until it has.
 
         Args:
-          place: a node, before each of whose firings and calls the run pauses; an edge, port, or path of one, on which
-            the run pauses as soon as a token lies there.
-          when: for edges and ports: pause only if this holds for the token. If it raises, it is logged and the
-            breakpoint removed.
+          place: a node, an edge or a port, or its path. The run pauses before each firing and call of a node, and as
+            soon as a token is on an edge or port.
+          when: for edges and ports: pause only if this returns true for the token. If it raises, the error is logged
+            and the breakpoint is removed.
+
+        Returns:
+          The breakpoint; its `remove` removes it.
 
         Raises:
-          UsageError: there is no such place in the run, or `when` was given for a node or cannot be called.
+          UsageError: the run has no such place, or `when` was given for a node or is not callable.
           NotRunning: the run is over.
         """
         self._need_running("nothing will come there any more")
@@ -401,11 +441,17 @@ class Run:
     @overload
     async def wait_for(self, event: str) -> Token[Any]: ...
     async def wait_for(self, event: EventPort[Any] | str) -> Token[Any]:
-        """Wait for the next signal of an event, given itself or by its path.
+        """Wait for the next signal of an event.
+
+        Args:
+          event: the event of a node, or its path.
+
+        Returns:
+          The signal's token.
 
         Raises:
-          NotRunning: the run ended without one.
-          UsageError: it is no event of a node in this graph, or the graph's `start`, which is over by now.
+          NotRunning: the run ended without a signal.
+          UsageError: it is not an event of a node in this graph, or it is the graph's `start`, which is over by now.
         """
         event = self._at(event)
         if not isinstance(event, EventPort):
@@ -433,16 +479,24 @@ class Run:
             subscription.dispose()
 
     async def wait_quiet(self) -> None:
-        """Wait until nothing runs, nothing can start and no timer is pending (SEMANTICS, "quiet")."""
+        """Wait until nothing runs, nothing can start and no timer is pending that could start something (R5)."""
         await self._engine.wait_quiet()
         self._parts.raise_failure()
 
     async def wait_inputs(self, node: Node | str) -> None:
-        """Wait for the node's input barrier: every live input holds a token."""
+        """Wait for a node's input barrier: every live input holds a token.
+
+        Args:
+          node: the node, or its path.
+        """
         await self._barrier(self._at(node), "inputs")
 
     async def wait_outputs(self, node: Node | str) -> None:
-        """Wait for the node's output barrier: every token it sent is processed."""
+        """Wait for a node's output barrier: every token that it has sent is processed.
+
+        Args:
+          node: the node, or its path.
+        """
         await self._barrier(self._at(node), "outputs")
 
     async def _barrier(self, node: Node, which: Literal["inputs", "outputs"]) -> None:
@@ -455,7 +509,10 @@ class Run:
         await outside.until(self._engine, getattr(worker, which).when_complete)
 
     async def wait_finished(self) -> Report:
-        """Let the run end by itself (R5), wait for that and give back the report.
+        """Let the run end by itself (R5), and wait until it has ended.
+
+        Returns:
+          The report.
 
         Raises:
           RunError: the run failed, stalled or was aborted.
@@ -469,7 +526,7 @@ class Run:
     # --- looking ----------------------------------------------------------------------------------------------------
 
     def active(self) -> list[str]:
-        """The paths of all active nodes, in order of adding."""
+        """Return the paths of all active nodes, in the order in which they were added."""
         return [
             worker.path
             for worker in self._engine.core.workers
@@ -477,63 +534,68 @@ class Run:
         ]
 
     def statistics(self) -> Statistics:
-        """What the run has done so far: a frozen snapshot of counts, rates, times and depths, ready for JSON.
+        """Return a frozen snapshot of counts, rates, times and depths, ready for JSON.
 
-        Counts are kept anyway. Times are measured from the first call on, so make it at the start of the block if they
-        are to cover the whole run; it costs some 0.2 us a firing.
+        Counts are always kept. Times are measured from the first call on, at a cost of about 0.2 us per firing: call
+        this at the start of the block to cover the whole run.
         """
         return self._parts.measuring.snapshot()
 
     def glance(self) -> Glance:
-        """Take the few counts that a live table shows, cheap enough for many times a second; on the run's loop.
+        """Return the few counts that a live table shows; cheap enough for many calls per second, on the run's loop.
 
-        The first glance begins to measure, as `statistics` does.
+        The first call starts measuring times, as `statistics` does.
         """
         _ = self._parts.measuring
         return glance_at(self._engine)
 
     async def refresh(self) -> None:
-        """Ask nodes in other processes for their counts, and wait for those.
+        """Ask the nodes in other processes for their counts, and wait for the answers.
 
-        `active`, `glance`, `statistics` and `report` answer at once: of other processes with what these last said,
-        which they are asked for again each time. Behind this they say how it is now. In one process it does nothing.
+        `active`, `glance`, `statistics` and `report` return immediately. For other processes they show the last report,
+        and request a new one each time. After `refresh` they are up to date. In a run with one process this does
+        nothing.
         """
 
     def now(self) -> float:
-        """Seconds on the run's clock, as in stamps; `hfg.now` says where it has its zero."""
+        """Return seconds on the run's clock, as in stamps; `hfg.now` says where its zero is."""
         return self._engine.now()
 
     def elapsed(self) -> float:
-        """Seconds since the run began, up to its end; 0 before it has begun."""
+        """Return seconds since the run started, up to its end; 0 before it has started."""
         return self._engine.elapsed()
 
     def wake(self, node: Node | str) -> None:
-        """Ask a node's `ready()` again (F1)."""
+        """Make a node ask its `ready()` again (F1).
+
+        Args:
+          node: the node, or its path.
+        """
         unblock(self._engine.worker_of(self._at(node)), UNREADY)
         self._engine.kick()
 
     def stop(self) -> None:
-        """End the run well, as the graph's slot `stop` does."""
+        """End the run normally, as the graph's slot `stop` does."""
         self._engine.finish("stopped", None)
 
     def reset_activity(self) -> None:
-        """Take all activity away and trigger `start` again (A14)."""
+        """Deactivate all nodes, clear all modifiers and trigger `start` again (A14)."""
         reset_activity(self._engine.core)
         self._engine.kick()
 
     @property
     def error(self) -> HfgError | None:
-        """What the run failed with; None if it did not. A run that was cancelled can fail in its teardown."""
+        """The error that the run failed with, or None. A cancelled run can still fail in its teardown."""
         return self._engine.error
 
     def report(self) -> Report:
-        """What the run has done; final once it is over."""
+        """Return the report: what each node and edge has done so far. It is final once the run is over."""
         return self._parts.report()
 
     # --- inside -----------------------------------------------------------------------------------------------------
 
     def _at(self, what: Any) -> Any:  # noqa: ANN401 - of a path type checkers know nothing
-        """Give what was named by its path, or is given itself."""
+        """Return the thing at a path; anything else is returned as it is."""
         return self.graph[what] if isinstance(what, str) else what
 
     def _need_running(self, why: str) -> None:
@@ -541,7 +603,7 @@ class Run:
             raise NotRunning(f"the run is over: {why}; do it inside of `async with hfg.running(graph)`, before the end")
 
     def _boundary(self, port: object, ports: Mapping[str, object]) -> str:
-        """Find one of the graph's own ports, given itself or by name."""
+        """Return the name of one of the graph's own ports, given as port or name."""
         name = str(getattr(port, "name", port))
         if name in ports and (port == name or port is ports[name]):
             return name
