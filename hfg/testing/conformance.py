@@ -187,7 +187,7 @@ class Replay:
         self.seen.append(event)
 
     def _was_torn_down(self, event: TraceEvent) -> bool:
-        """Whether a do-activity ends because an edit takes its node away, before or behind the edit itself (R4)."""
+        """Return whether a do-activity ends because an edit takes its node away, before or behind the edit itself (R4)."""
         if not isinstance(event, DoEnded) or event.outcome != "cancelled" or key(event) in map(key, self.expected):
             return False
         index = self.machine.paths.get(event.node)
@@ -265,7 +265,7 @@ class Replay:
         return [move for move in self.machine.moves() if move.kind in _STEPS and move.node == node]
 
     def _is_idle(self, event: TraceEvent) -> bool:
-        """Whether nobody could tell: events without edges, and what is not compared."""
+        """Return whether nobody could tell: events without edges, and what is not compared."""
         if isinstance(event, EventTriggered):
             return event.event not in self._connected
         if isinstance(event, TokenProcessed):  # a delay or buffer: nobody waits, so nobody is told when
@@ -330,11 +330,11 @@ class Replay:
                 self._apply(move)
 
     def _ends_unseen(self, task: Task) -> bool:
-        """Whether its end is not to be seen: one sees it of a do-activity that has begun (A15)."""
+        """Return whether its end is not to be seen: one sees it of a do-activity that has begun (A15)."""
         return not task.is_activity or (not task.stepped and self.machine.is_closing(task.station))
 
     def _resets(self, move: Move) -> bool:
-        """Whether the node is reset by this, because a subgraph around it is (G2)."""
+        """Return whether the node is reset by this, because a subgraph around it is (G2)."""
         return move.kind == "go on" and self.machine.under_way(move).kind == "reset"
 
     def _end(self, event: RunEnded) -> None:
@@ -380,7 +380,7 @@ class Replay:
         return timeout and self.machine.times_out(self.machine.paths[move.node])
 
     def _leads_to(self, move: Move, event: TraceEvent, node: str | None) -> bool:
-        """Whether something that is due at the node, or at the edge that the event tells of, may lie behind it."""
+        """Return whether something that is due at the node, or at the edge that the event tells of, may lie behind it."""
         match move.kind:
             case "timer":
                 return (move.node or self._source_of(move.edge)) == node
@@ -391,7 +391,7 @@ class Replay:
         return False
 
     def _follows_from_quiet(self, move: Move, event: TraceEvent) -> bool:
-        """Whether a step that follows from quiet alone may lie behind the event."""
+        """Return whether a step that follows from quiet alone may lie behind the event."""
         match move.kind:
             case "grow":
                 return isinstance(event, QueueGrown) and move.edge == event.edge
@@ -408,7 +408,7 @@ class Replay:
         return False
 
     def _may_go_unseen(self, move: Move, event: TraceEvent) -> bool:
-        """Whether it is a step of which nothing need be seen: of a task, a restart, or to a firing's turn (F14)."""
+        """Return whether it is a step of which nothing need be seen: of a task, a restart, or to a firing's turn (F14)."""
         if move.kind == "timer":
             return not (move.node and self.machine.times_out(self.machine.paths[move.node]))
         return move.kind == "task" or self._resets(move) or (move.kind == "go on" and isinstance(event, QueueGrown))
@@ -468,7 +468,7 @@ class Replay:
             self._apply(steps[0])
 
     def _reaches(self, name: str) -> bool:
-        """Whether somebody would see what is fed."""
+        """Return whether somebody would see what is fed."""
         return any(self.machine.is_live(line) for line in self.machine.lines_from(-1, "output", name))
 
     def _let_time_go(self, event: TraceEvent) -> None:
@@ -544,13 +544,13 @@ def _is_of_task(event: TraceEvent) -> bool:
 
 
 def _owner(event: str) -> str:
-    """Give the path of the node whose event it is; "" for the graph's own `start`."""
+    """Return the path of the node whose event it is; "" for the graph's own `start`."""
     path, dot, _ = event.partition(".")
     return path if dot else ""
 
 
 def describe(event: TraceEvent) -> str:
-    """Give an event in a few words."""
+    """Return an event in a few words."""
     fields = {name: getattr(event, name) for name in event.__struct_fields__ if name not in ("time", "token")}
     words = " ".join(str(value) for value in fields.values())
     token = getattr(event, "token", None)

@@ -255,7 +255,7 @@ ALL: Final[tuple[Invariant, ...]] = (
 
 
 def of_graph(graph: Any) -> list[Invariant]:
-    """Give all invariants, those included that ask which edges are active or synchronous."""
+    """Return all invariants, those included that ask which edges are active or synchronous."""
     from hfg.testing.reference.structure import dissolve, whole
 
     edges = dissolve(graph).edges
@@ -323,7 +323,7 @@ def _doubles(numbers: list[int]) -> list[int]:
 
 
 def _left(events: list[TraceEvent], edge: str) -> bool:
-    """Whether activity on the edge was accounted for otherwise; and what lies at a disabled node may stay there."""
+    """Return whether activity on the edge was accounted for otherwise; and what lies at a disabled node may stay there."""
     lost = any(isinstance(event, ActivityLost) and event.edge == edge for event in events)
     target = edge.partition(" -> ")[2].rpartition(".")[0]
     return lost or any(

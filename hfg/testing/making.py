@@ -511,7 +511,7 @@ class _Making:
             self._edge(source, target, active=False if before.type == "listed" else None)
 
     def _has_other_input(self, target: End) -> bool:
-        """Whether something else than a ring feeds the node, so that the ring ends."""
+        """Return whether something else than a ring feeds the node, so that the ring ends."""
         return any(
             edge.target[0] == target[0] and edge.target[1] == "input" and "initial" not in edge.options
             for edge in self.edges
@@ -685,7 +685,7 @@ class _Making:
 
 
 def description(kind: str) -> Any:
-    """Give the type of a node of a plan, by its name."""
+    """Return the type of a node of a plan, by its name."""
     made: Any = getattr(types, kind)
     return (made if isinstance(made, type) else type(made()))._type  # type: ignore[attr-defined]
 

@@ -95,13 +95,13 @@ __all__ = [
 
 @hfg.node
 def script(*, values: tuple[int | None, ...] = (1, 2, 3)) -> Iterator[int | None]:
-    """Give the values one by one; None is silence."""
+    """Yield the values one by one; None is silence."""
     yield from values
 
 
 @hfg.node
 async def ascript(*, values: tuple[int | None, ...] = (1, 2, 3), pause_s: float = 0.0) -> AsyncIterator[int | None]:
-    """Give the values one by one, after a pause each."""
+    """Yield the values one by one, after a pause each."""
     for value in values:
         await asyncio.sleep(pause_s)
         yield value
@@ -109,20 +109,20 @@ async def ascript(*, values: tuple[int | None, ...] = (1, 2, 3), pause_s: float 
 
 @hfg.node
 def double(value: int) -> int:
-    """Give twice the value."""
+    """Return twice the value."""
     return 2 * value
 
 
 @hfg.node
 async def slow_double(value: int, *, pause_s: float = 0.01) -> int:
-    """Give twice the value, later."""
+    """Return twice the value, later."""
     await asyncio.sleep(pause_s)
     return 2 * value
 
 
 @hfg.node
 def add(a: int, b: int) -> int:
-    """Give the sum."""
+    """Return the sum."""
     return a + b
 
 
@@ -139,13 +139,13 @@ def sink(value: int) -> None:
 
 @hfg.node
 def with_default(value: int, other: int = 5) -> int:
-    """Give the sum; what is absent counts five."""
+    """Return the sum; what is absent counts five."""
     return value + other
 
 
 @hfg.node
 def either(first: int | None = None, second: int | None = None) -> int | None:
-    """Give the first that is there; all inputs are optional."""
+    """Return the first that is there; all inputs are optional."""
     return second if first is None else first
 
 
@@ -166,7 +166,7 @@ def parted(value: int) -> Parts | None:
 
 @hfg.node
 def mood(value: int) -> int:
-    """Give a number of one type or another."""
+    """Return a number of one type or another."""
     return value > 3 if value % 3 == 0 else value
 
 
@@ -188,19 +188,19 @@ def gives_up(value: int, *, at: int = 3) -> int:
 
 @hfg.node
 def handing(value: int) -> Any:
-    """Give a token now and then, with a modifier or without."""
+    """Return a token now and then, with a modifier or without."""
     return value if value % 3 else hfg.Token(value, value % 2)
 
 
 @hfg.node(outputs=Any)
 def odd(value: Any, *, what: str = "0-d array", every: int = 2) -> Any:
-    """Give a value now and then that nobody can look at."""
+    """Return a value now and then that nobody can look at."""
     return STRANGE[what]() if isinstance(value, int) and value % every == 0 else value
 
 
 @hfg.node
 async def calm(value: int) -> int:
-    """Give the value at once."""
+    """Return the value at once."""
     return value
 
 
@@ -222,7 +222,7 @@ async def _later(value: int) -> int:
 
 @hfg.node
 def calling(value: int) -> Any:
-    """Give the call of an async function now and then."""
+    """Return the call of an async function now and then."""
     return _later(value) if value % 2 == 0 else value
 
 
@@ -367,7 +367,7 @@ class Talks(hfg.Node):
     at = hfg.State(0)
 
     def process(self) -> int | None:
-        """Give the next number."""
+        """Return the next number."""
         if self.at >= self.count:
             raise hfg.EndOfStream
         self.at += 1
@@ -384,7 +384,7 @@ class TalksLater(hfg.Node):
     at = hfg.State(0)
 
     async def process(self) -> int | None:
-        """Give the next number."""
+        """Return the next number."""
         if self.at >= self.count:
             raise hfg.EndOfStream
         self.at += 1
@@ -400,7 +400,7 @@ class Draws(hfg.Node):
     way = hfg.Parameter("send")
 
     def process(self) -> Iterator[int | None]:
-        """Give the numbers."""
+        """Yield the numbers."""
         for number in range(1, self.count + 1):
             yield _say(self.out, self.way, number)
 
@@ -435,7 +435,7 @@ class LendsLater(hfg.Node):
 
 @hfg.node
 def unlent(array: NDArray[np.int64]) -> int:
-    """Give what is in an array that was lent."""
+    """Return what is in an array that was lent."""
     return int(array[0])
 
 
@@ -559,7 +559,7 @@ class Merge(hfg.Node):
     lefts = hfg.Output(int)
 
     def process(self, value: int, left: int | None, right: int) -> tuple[int, int | None]:
-        """Give the sum of what there is, and the left one."""
+        """Return the sum of what there is, and the left one."""
         return value + (left or 0) + right, left
 
 
@@ -572,7 +572,7 @@ class Latch(hfg.Node):
     last = hfg.State(0)
 
     def process(self, first: int | None, second: int | None) -> int:
-        """Give what came, else what came last."""
+        """Return what came, else what came last."""
         self.last = first if first is not None else second if second is not None else self.last
         return self.last
 
@@ -834,7 +834,7 @@ class Tuned(hfg.Node):
     said = hfg.Parameter("", read_only=True)
 
     def process(self, value: int) -> int:
-        """Give the value and all that is set, and say so."""
+        """Return the value and all that is set, and say so."""
         self.done = (self.done + 0.25) % 1
         numbers = [
             self.soft,
@@ -974,7 +974,7 @@ class Hums(hfg.Node):
     tone = hfg.Parameter(1)
 
     def process(self) -> int:
-        """Give the tone."""
+        """Return the tone."""
         return self.tone
 
 
@@ -1168,7 +1168,7 @@ def listed(value: int) -> list[list[int]]:
 
 @hfg.node
 def summed(lists: list[list[int]]) -> int:
-    """Give the sum of all that is in the lists."""
+    """Return the sum of all that is in the lists."""
     return sum(map(sum, lists))
 
 

@@ -199,7 +199,7 @@ class _Drawing:
 
 
 def _share(places: int, number: int, parts: int) -> int:
-    """How many places of a buffer lie on one part of an edge: they add up (G1)."""
+    """Return how many places of a buffer lie on one part of an edge: they add up (G1)."""
     return places // parts + (number < places % parts)
 
 

@@ -40,7 +40,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture
 def virtual_time() -> Callable[[Coroutine[Any, Any, T]], T]:
-    """Give a function that runs a coroutine to its end in virtual time: hours of sleep take no time."""
+    """Return a function that runs a coroutine to its end in virtual time: hours of sleep take no time."""
 
     def run(main: Coroutine[Any, Any, T]) -> T:
         import hfg
@@ -53,7 +53,7 @@ def virtual_time() -> Callable[[Coroutine[Any, Any, T]], T]:
 
 @pytest.fixture
 def run_graph() -> Callable[..., Ran]:
-    """Give a function that runs a graph in virtual time, with the arguments of `hfg.run`; errors are told.
+    """Return a function that runs a graph in virtual time, with the arguments of `hfg.run`; errors are told.
 
     In debug mode, unless it is said otherwise: values fit the types of their ports, and shared ones are not changed.
     """

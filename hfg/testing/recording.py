@@ -43,37 +43,37 @@ class Recorder(list[TraceEvent]):
         self.append(event)
 
     def of(self, kind: type[E]) -> list[E]:
-        """Give the events of one kind."""
+        """Return the events of one kind."""
         return [event for event in self if isinstance(event, kind)]
 
     def edges(self) -> list[str]:
-        """Give the labels of all edges that something was sent over, in order of first use."""
+        """Return the labels of all edges that something was sent over, in order of first use."""
         return list(dict.fromkeys(event.edge for event in self.of(TokenSent)))
 
     def tokens(self, edge: str) -> list[Token[Any]]:
-        """Give every token that was put on an edge; a label may be cut short to its source, "camera.out"."""
+        """Return every token that was put on an edge; a label may be cut short to its source, "camera.out"."""
         labels = self._labels(edge)
         first = labels[:1]
         return [event.token for event in self.of(TokenSent) if event.edge in first]
 
     def values(self, edge: str) -> list[Any]:
-        """Give values and markers on an edge."""
+        """Return values and markers on an edge."""
         return [token.value for token in self.tokens(edge)]
 
     def signals(self, event: str) -> list[Any]:
-        """Give the values of an event's signals, whether anybody was connected or not."""
+        """Return the values of an event's signals, whether anybody was connected or not."""
         return [one.token.value for one in self.of(EventTriggered) if one.event == event]
 
     def taken(self, edge: str) -> list[Any]:
-        """Give what firings and calls took from an edge."""
+        """Return what firings and calls took from an edge."""
         return [event.token.value for event in self.of(TokenTaken) if event.edge in self._labels(edge)]
 
     def dropped(self, edge: str) -> list[Any]:
-        """Give what was discarded on an edge."""
+        """Return what was discarded on an edge."""
         return [event.token.value for event in self.of(TokenDropped) if event.edge in self._labels(edge)]
 
     def drained(self, edge: str) -> list[Any]:
-        """Give what was processed without anybody taking it."""
+        """Return what was processed without anybody taking it."""
         return [event.token.value for event in self.of(TokenDrained) if event.edge in self._labels(edge)]
 
     def firings(self, node: str) -> int:
@@ -81,17 +81,17 @@ class Recorder(list[TraceEvent]):
         return sum(event.node == node for event in self.of(FiringStarted))
 
     def calls(self, node: str) -> list[str]:
-        """Give the slots of a node that were called, in order."""
+        """Return the slots of a node that were called, in order."""
         return [event.slot for event in self.of(CallStarted) if event.node == node]
 
     def activity(self, node: str | None = None) -> list[tuple[float, str, bool]]:
-        """Give each change of A(v): when, which node, its new value; of one node or of all."""
+        """Return each change of A(v): when, which node, its new value; of one node or of all."""
         return [
             (event.time, event.node, event.active) for event in self.of(ActivityChanged) if node in (None, event.node)
         ]
 
     def active_at_end(self) -> list[str]:
-        """Give the nodes that were left active."""
+        """Return the nodes that were left active."""
         state = {event.node: event.active for event in self.of(ActivityChanged)}
         return [node for node, active in state.items() if active]
 

@@ -167,7 +167,7 @@ ERRORS: Final[dict[str, Callable[[], BaseException]]] = {
 
 @hfg.node(outputs=Any)
 def gives(*, what: str = "0-d array", count: int = 3) -> Iterator[Any]:
-    """Give a strange value again and again."""
+    """Yield a strange value again and again."""
     for _ in range(count):
         yield STRANGE[what]()
 

@@ -46,7 +46,7 @@ def _plans(draw: st.DrawFn, allowed: Allowed | None) -> GraphPlan:
 
 
 def graphs(allowed: Allowed | None = None) -> st.SearchStrategy[GraphPlan]:
-    """Give plans of graphs: call one to build its graph, afresh each time.
+    """Return plans of graphs: call one to build its graph, afresh each time.
 
     Args:
       allowed: what may occur; `SYNCHRONOUS` is what rule F7 speaks of.
@@ -55,7 +55,7 @@ def graphs(allowed: Allowed | None = None) -> st.SearchStrategy[GraphPlan]:
 
 
 def tokens(values: st.SearchStrategy[Any] | None = None, *, markers: bool = True) -> st.SearchStrategy[Token[Any]]:
-    """Give tokens with every modifier; NO_MESSAGE always has none (T3)."""
+    """Return tokens with every modifier; NO_MESSAGE always has none (T3)."""
     value = st.integers(-9, 9) if values is None else values
     stamp = st.floats(0, 1000, allow_nan=False)
     number = st.integers(1, 99)
@@ -67,7 +67,7 @@ def tokens(values: st.SearchStrategy[Any] | None = None, *, markers: bool = True
 
 
 def schedules() -> st.SearchStrategy[int]:
-    """Give seeds: each is one order in which what may run is run.
+    """Return seeds: each is one order in which what may run is run.
 
     For `hfg.run(graph, policy="random", seed=seed)` and `reference_run(graph, seed=seed)`.
     """

@@ -70,7 +70,7 @@ class Collected(Generic[T]):
 
 
 def _plain(message: Message) -> tuple[bytes, bytes]:
-    """Give a datagram as bytes, to be compared."""
+    """Return a datagram as bytes, to be compared."""
     return bytes(message[0]), bytes(message[1])
 
 

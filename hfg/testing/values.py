@@ -81,7 +81,7 @@ _ALIKE: Final = st.sampled_from(
 def values_of(
     hint: Any, limits: Collection[Any] = (), choices: Collection[Any] | None = None, *, alike: Alike | None = None
 ) -> st.SearchStrategy[Any]:
-    """Give a strategy for the values of a type hint.
+    """Return a strategy for the values of a type hint.
 
     Args:
       hint: a type hint; limits in `Annotated` count.
@@ -109,7 +109,7 @@ def values_of(
 
 
 def values_of_parameter(spec: ParameterSpec, *, alike: Alike | None = None) -> st.SearchStrategy[Any]:
-    """Give a strategy for the values that a parameter allows.
+    """Return a strategy for the values that a parameter allows.
 
     Examples:
       >>> from annotated_types import Ge
@@ -234,7 +234,7 @@ def _is_path(hint: Any) -> bool:
 
 
 def _bounds(limits: tuple[Any, ...]) -> tuple[Any, Any, Any]:
-    """Give least, most and step; None where there is none."""
+    """Return least, most and step; None where there is none."""
     least: Any = None
     most: Any = None
     step: Any = None
@@ -373,7 +373,7 @@ def _container(
 
 
 def _hashable(hint: Any, limits: tuple[Any, ...], alike: Alike | None) -> st.SearchStrategy[Any]:
-    """Give values that can be keys."""
+    """Return values that can be keys."""
     return _anything(hashable=True) if bare_type(hint) in (Any, object) else _values(hint, limits, alike)
 
 
@@ -388,7 +388,7 @@ def _is_record(kind: Any) -> bool:
 
 @functools.lru_cache(maxsize=256)
 def _record(kind: Any, alike: Alike | None) -> st.SearchStrategy[Any]:
-    """Give one strategy for each kind, so that those that hold themselves come to an end."""
+    """Return one strategy for each kind, so that those that hold themselves come to an end."""
     return st.deferred(lambda: _records(kind, alike))
 
 
@@ -429,13 +429,13 @@ def _arrays(facts: ArrayFacts, alike: Alike | None) -> st.SearchStrategy[Any]:
 
 
 def _chosen(shapes: tuple[tuple[int | None, ...], ...], channels: int) -> tuple[int | None, ...]:
-    """Give the shape with so many channels, else the first."""
+    """Return the shape with so many channels, else the first."""
     wanted = (None, None) if channels == 1 else (None, None, channels)
     return wanted if wanted in shapes else shapes[0]
 
 
 def _sized(shape: tuple[int | None, ...], sides: tuple[int, int], length: int) -> tuple[int, ...]:
-    """Give the open axes a length: rows and columns, if there are two."""
+    """Return the open axes a length: rows and columns, if there are two."""
     open_axes = [index for index, axis in enumerate(shape) if axis is None]
     lengths = dict(zip(open_axes, sides if len(open_axes) > 1 else (length,), strict=False))
     return tuple(lengths.get(index, 2) if axis is None else axis for index, axis in enumerate(shape))

@@ -112,14 +112,14 @@ class Calling(Tending):
         self.launch(flight, lambda: None, set_up_there)
 
     def begins_afresh(self, flight: Flight) -> bool:
-        """Whether what an automatic slot does begins with a teardown (A9, F10)."""
+        """Return whether what an automatic slot does begins with a teardown (A9, F10)."""
         index = flight.station.leaf.index
         if flight.slot == "reset":
             return flight.station.resting_until is None or flight.station.is_flying
         return flight.slot == "enable" and not self.is_enabled(index) and self.is_enabled_around(index)
 
     def is_async_slot(self, flight: Flight) -> bool:
-        """Whether the handler may wait."""
+        """Return whether the handler may wait."""
         return bool(flight.station.type.slots[flight.slot].is_async)
 
     def end_call(self, flight: Flight, error: BaseException | None) -> None:

@@ -35,7 +35,7 @@ class Editing(Calling):
         self.held = {id(self.stations[self.paths[path]]) for path in paths}
 
     def is_held(self, index: int) -> bool:
-        """Whether an edit waits for the node, or for others with it."""
+        """Return whether an edit waits for the node, or for others with it."""
         return id(self.stations[index]) in self.held
 
     def edit(self, what: str) -> None:
@@ -317,7 +317,7 @@ class Editing(Calling):
 
 
 def _is_switch(change: OptionsChange) -> bool:
-    """Whether it is about what is enabled, not about the group."""
+    """Return whether it is about what is enabled, not about the group."""
     return change.before.group == change.after.group
 
 

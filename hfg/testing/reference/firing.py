@@ -95,7 +95,7 @@ class Firing(RunningCode):
         return taken
 
     def would_end(self, index: int) -> bool:
-        """Whether the node's next firing would be its last (F4)."""
+        """Return whether the node's next firing would be its last (F4)."""
         joined = [line for line in self.lines_joined(index) if self.is_live(line) or self.takes_part(line)]
         lying = [(line, line.queue[0]) for line in joined if self.takes_part(line) and line.queue]
         ending = [line for line, first in lying if first.token.value is END]
@@ -458,7 +458,7 @@ class Firing(RunningCode):
         return "stop" if limited and station.restarts >= options.restart_limit else str(options.on_error)
 
     def may_try_again(self, flight: Flight, error: BaseException) -> bool:
-        """Whether there is another attempt: of its function alone, and as long as none has sent a signal."""
+        """Return whether there is another attempt: of its function alone, and as long as none has sent a signal."""
         return (
             flight.kind == "process"
             and isinstance(error, Exception)
@@ -468,7 +468,7 @@ class Firing(RunningCode):
         )
 
     def is_tried_again(self, error: Exception, names: tuple[str, ...]) -> bool:
-        """Whether the error is one of those that are named, by its own name or that of a base."""
+        """Return whether the error is one of those that are named, by its own name or that of a base."""
         kinds = [(kind.__module__, kind.__qualname__) for kind in type(error).__mro__]
         named = [tuple(name.split(":")) if ":" in name else ("builtins", name) for name in names]
         return not named or any(kind in named for kind in kinds)

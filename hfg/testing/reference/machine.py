@@ -143,7 +143,7 @@ class ReferenceMachine(Rings):
     # --- what may happen
 
     def moves(self) -> list[Move]:
-        """Give every permitted next move; none after the end, or if only the world outside can go on."""
+        """Return every permitted next move; none after the end, or if only the world outside can go on."""
         if self.outcome is not None:
             return []
         working = self.working_moves()
@@ -158,7 +158,7 @@ class ReferenceMachine(Rings):
         return found
 
     def owed_moves(self) -> list[Move]:
-        """Give the moves of which one must be taken before anybody may call it quiet."""
+        """Return the moves of which one must be taken before anybody may call it quiet."""
         if self.outcome is not None:
             return []
         moot = self.moot_sources()
@@ -215,7 +215,7 @@ class ReferenceMachine(Rings):
         return found
 
     def is_limited(self, flight: Flight) -> bool:
-        """Whether the time limit of its node counts for it (X2)."""
+        """Return whether the time limit of its node counts for it (X2)."""
         return flight.what == "firing" and flight.task is not None and flight.then is not None
 
     def under_way(self, move: Move) -> Flight:
@@ -230,7 +230,7 @@ class ReferenceMachine(Rings):
         return next(task for task in self.stations[self.paths[move.node]].tasks if task.number == move.number)
 
     def can_feed(self, name: str) -> bool:
-        """Whether the graph's input is free (P10)."""
+        """Return whether the graph's input is free (P10)."""
         return not any(self.is_occupied(line) for line in self.lines_from(ROOT, "output", name))
 
     def is_read(self, line: Line) -> bool:
@@ -239,12 +239,12 @@ class ReferenceMachine(Rings):
         return self.is_outside(target.owner) and target.kind == "input" and target.name not in self.unread
 
     def can_iterate(self, index: int) -> bool:
-        """Whether the next element may go in: it is quiet inside (G4)."""
+        """Return whether the next element may go in: it is quiet inside (G4)."""
         inside = self.all_inside(index)
         return not self.is_moving_inside(index, inside)
 
     def is_moving_inside(self, index: int, inside: Set[int]) -> bool:
-        """Whether something happens inside an iterating subgraph, or will when time goes on."""
+        """Return whether something happens inside an iterating subgraph, or will when time goes on."""
         boxes = [box for box in self.structure.boxes if inside & set(box.members)]
         paths = {self.stations[number].path for number in inside} | {box.path for box in boxes}
         for move in self.working_moves(inside):
@@ -263,24 +263,24 @@ class ReferenceMachine(Rings):
         )
 
     def is_moving(self, index: int) -> bool:
-        """Whether a node works, or waits for a time to come; not if its code waits until a queue has room (F8)."""
+        """Return whether a node works, or waits for a time to come; not if its code waits until a queue has room (F8)."""
         station = self.stations[index]
         works = any(not work.waiting_for for work in station.work)
         return works or station.resting_until is not None or self.waits_for_rate(index)
 
     def waits_for_rate(self, index: int) -> bool:
-        """Whether it fires when its time has come, or is held by a full queue alone then."""
+        """Return whether it fires when its time has come, or is held by a full queue alone then."""
         if self.may_fire(index, ignore="timers"):
             return True
         by_time = self.is_held_by_time(index) or self.is_resting(index)
         return by_time and not self.stations[index].is_busy and self.may_fire(index, ignore="timers and queues")
 
     def all_inside(self, index: int) -> set[int]:
-        """Give all nodes inside an iterating subgraph."""
+        """Return all nodes inside an iterating subgraph."""
         return {number for number in range(len(self.stations)) if self.is_inside(number, index)}
 
     def is_inside(self, index: int, around: int) -> bool:
-        """Whether a node belongs to what iterates, directly or inside another one that does (G3, G4)."""
+        """Return whether a node belongs to what iterates, directly or inside another one that does (G3, G4)."""
         within = self.stations[index].leaf.within
         return within is not None and (within == around or self.is_inside(within, around))
 
@@ -391,7 +391,7 @@ class ReferenceMachine(Rings):
         ]
 
     def has_ended(self, owner: int) -> bool:
-        """Whether the node has ended, or is about to."""
+        """Return whether the node has ended, or is about to."""
         return owner >= 0 and self.stations[owner].ending
 
     def stalled(self) -> list[str]:
@@ -434,7 +434,7 @@ class ReferenceMachine(Rings):
         return bool(lines) and all(self._ends_with(line, moot) for line in lines)
 
     def _ends_with(self, line: Line, moot: Set[int]) -> bool:
-        """Whether what comes on the edge is for a node that has ended or counts so; its slots go on (F12)."""
+        """Return whether what comes on the edge is for a node that has ended or counts so; its slots go on (F12)."""
         target = line.edge.target.owner
         if target < 0 or line not in self.lines_joined(target):
             return False
@@ -515,7 +515,7 @@ class ReferenceMachine(Rings):
         return found
 
     def times_out(self, owner: int) -> bool:
-        """Whether the node or subgraph has been active for so long that its event `timeout` is due (A12)."""
+        """Return whether the node or subgraph has been active for so long that its event `timeout` is due (A12)."""
         moment = self.time_of_timeout(owner)
         return moment is not None and self.is_over(moment)
 

@@ -42,7 +42,7 @@ class ReferenceReport:
     error: BaseException | None = None
 
     def values(self, edge: str) -> list[Any]:
-        """Give the values and markers on one edge."""
+        """Return the values and markers on one edge."""
         return [token.value for token in self.tokens[edge]]
 
 

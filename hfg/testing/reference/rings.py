@@ -59,7 +59,7 @@ class Rings(Editing):
         return [ROOT, *(-2 - box.index for box in self.structure.boxes), *range(len(self.stations))]
 
     def is_held_back(self, owner: int) -> bool:
-        """Whether a full queue alone holds it back: code that waits for room, a slot call, or its next firing."""
+        """Return whether a full queue alone holds it back: code that waits for room, a slot call, or its next firing."""
         if owner < 0:
             return self.next_call(owner) is not None
         station = self.stations[owner]
@@ -77,7 +77,7 @@ class Rings(Editing):
         return self.full_lines(deed.owner) if held else []
 
     def _stuck(self, begin: Iterable[_Deed]) -> dict[_Deed, set[_Deed]]:
-        """Give what can never come about, and what of that each waits for."""
+        """Return what can never come about, and what of that each waits for."""
         needs: dict[_Deed, _Need] = {}
         waiting = list(begin)
         while waiting:
@@ -144,7 +144,7 @@ class Rings(Editing):
         return _Need("all", deeds)
 
     def _fires_ever(self, owner: int) -> bool:
-        """Whether it would fire if all came that it waits for."""
+        """Return whether it would fire if all came that it waits for."""
         station = self.stations[owner]
         if station.ended or not self.is_enabled(owner) or owner in self.moot_sources():
             return False
@@ -233,7 +233,7 @@ class Rings(Editing):
         return _Deed(target.owner, "happen" if self.is_outside(target.owner) else "fire")
 
     def _is_at_work(self, flight: Flight) -> bool:
-        """Whether a firing or call is under way that waits neither for room nor for the firings before it."""
+        """Return whether a firing or call is under way that waits neither for room nor for the firings before it."""
         if flight.over is not None or flight.waits_to_end:
             return False
         return not self._waits_for_room(flight.station, flight)

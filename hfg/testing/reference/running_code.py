@@ -119,7 +119,7 @@ class RunningCode(Sending):
         raise NotImplementedError
 
     def has_no_room(self, station: Station) -> bool:
-        """Whether a queue behind an event of the node is full, which holds back its firings too (F8)."""
+        """Return whether a queue behind an event of the node is full, which holds back its firings too (F8)."""
         return bool(self.full_lines(station.leaf.index))
 
     @contextmanager
@@ -161,7 +161,7 @@ class RunningCode(Sending):
         then(result, error)
 
     def can_go_on(self, flight: Flight) -> bool:
-        """Whether something of the flight can happen without time going by."""
+        """Return whether something of the flight can happen without time going by."""
         if flight.pause_until is not None:
             return self.is_over(flight.pause_until)
         if flight.when_rested is not None:
@@ -178,7 +178,7 @@ class RunningCode(Sending):
         return self.loop.can_step(flight)
 
     def can_iterate(self, index: int) -> bool:
-        """Whether the next element may go into an iterating subgraph (G4)."""
+        """Return whether the next element may go into an iterating subgraph (G4)."""
         raise NotImplementedError
 
     def go_on_iterating(self, flight: Flight) -> None:

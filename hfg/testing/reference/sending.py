@@ -165,7 +165,7 @@ class Sending(State):
         self.send(owner, [(line, value, activity, stamp) for line in lines], flight)
 
     def is_automatic(self, owner: int, name: str) -> bool:
-        """Whether nobody declared the event (A9)."""
+        """Return whether nobody declared the event (A9)."""
         return is_box(owner) or (owner >= 0 and name not in self.stations[owner].type.events)
 
     def event_path(self, owner: int, name: str) -> str:
@@ -320,7 +320,7 @@ class Sending(State):
         return False
 
     def may_leave(self, flight: Flight) -> bool:
-        """Whether nothing lies where the outputs of the firing go."""
+        """Return whether nothing lies where the outputs of the firing go."""
         says_nothing = flight.void or (flight.over is not None and flight.over[0] == "ended" and not flight.writes)
         return says_nothing or self.outputs_are_free(flight.station.leaf.index)
 
@@ -388,7 +388,7 @@ class Sending(State):
         return False
 
     def is_amid(self, box: int) -> bool:
-        """Whether a node inside is amid a step of its own, so that the subgraph's activity is not looked at yet."""
+        """Return whether a node inside is amid a step of its own, so that the subgraph's activity is not looked at yet."""
         return False
 
     def moot_sources(self) -> set[int]:
@@ -416,7 +416,7 @@ class Sending(State):
             station.rested |= station.place is not None and station.leaf.index in moot
 
     def is_next(self, station: Station) -> bool:
-        """Whether a firing is the next thing that the node does (F9)."""
+        """Return whether a firing is the next thing that the node does (F9)."""
         line = self.next_call(station.leaf.index)
         return (
             station.place is not None

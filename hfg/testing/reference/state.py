@@ -280,7 +280,7 @@ class State:
         return [line for line in self.lines if line.edge.target.owner == owner and self.is_called(line)]
 
     def is_deaf(self, line: Line) -> bool:
-        """Whether it leads to a slot that listens only while its node is active, and that does not now (T4)."""
+        """Return whether it leads to a slot that listens only while its node is active, and that does not now (T4)."""
         target = line.edge.target
         if target.kind != "slot" or target.owner < 0:
             return False
@@ -296,7 +296,7 @@ class State:
         )
 
     def is_called(self, line: Line) -> bool:
-        """Whether the edge leads into a slot, or a signal into a parameter."""
+        """Return whether the edge leads into a slot, or a signal into a parameter."""
         kind = line.edge.target.kind
         return kind == "slot" or (kind == "parameter" and line.edge.is_event)
 
@@ -317,7 +317,7 @@ class State:
         return self.is_enabled(target.owner)
 
     def is_outside(self, owner: int) -> bool:
-        """Whether a port belongs to the world outside, of the graph or of an iterating subgraph."""
+        """Return whether a port belongs to the world outside, of the graph or of an iterating subgraph."""
         return owner < 0 and not is_box(owner)
 
     def is_enabled(self, owner: int) -> bool:
@@ -332,7 +332,7 @@ class State:
         return station.enabled and station.afterwards != "enable" and self.is_enabled_around(owner)
 
     def is_enabled_around(self, index: int) -> bool:
-        """Whether all subgraphs around a node are enabled."""
+        """Return whether all subgraphs around a node are enabled."""
         return all(self._box_open(box) for box in self.stations[index].leaf.boxes)
 
     def _box_open(self, box: int) -> bool:
@@ -351,7 +351,7 @@ class State:
         return target.kind == "parameter" or bool(self.stations[target.owner].type.inputs[target.name].optional)
 
     def is_occupied(self, line: Line) -> bool:
-        """Whether the producer's token is not processed yet (P4, P7)."""
+        """Return whether the producer's token is not processed yet (P4, P7)."""
         if not self.is_live(line):
             return False
         return line.under_way > line.slack
@@ -456,7 +456,7 @@ class State:
         return self.stations[index].type.is_source and not self.within_idle_rate(index)
 
     def within_idle_rate(self, index: int) -> bool:
-        """Whether every gate allows a firing that runs the function now."""
+        """Return whether every gate allows a firing that runs the function now."""
         station = self.stations[index]
         return all(rate is not None and self.is_over(station.last_function + 1 / rate) for rate in self.gates_of(index))
 
@@ -466,7 +466,7 @@ class State:
         return not self.is_over(station.hold_until) or station.resting_until is not None
 
     def is_over(self, moment: float) -> bool:
-        """Whether a moment has come."""
+        """Return whether a moment has come."""
         return self.now + MOMENT_S >= moment
 
     # --- what is next for one node (F9)

@@ -41,7 +41,7 @@ def box_owner(box: int) -> int:
 
 
 def is_box(owner: int) -> bool:
-    """Whether ports of this owner are those of a dissolved subgraph."""
+    """Return whether ports of this owner are those of a dissolved subgraph."""
     return _BOUNDARIES < owner < ROOT
 
 
@@ -215,7 +215,7 @@ class _Dissolving:
     # --- edges: rule G1
 
     def _is_relay(self, port: Any) -> bool:
-        """Whether tokens only pass here: a declared port of a dissolved subgraph, seen from either side."""
+        """Return whether tokens only pass here: a declared port of a dissolved subgraph, seen from either side."""
         outer = getattr(port, "outer", port)
         node: Any = getattr(outer, "node", None)
         if id(node) not in self.box_of or outer.kind == "parameter":
@@ -223,7 +223,7 @@ class _Dissolving:
         return outer.name in getattr(node._type, f"{outer.kind}s")
 
     def _behind(self, port: Any) -> Iterator[tuple[Any, int]]:
-        """Give the edges that go on behind a relay."""
+        """Yield the edges that go on behind a relay."""
         for level, depth in self.levels:
             for edge in level.edges:
                 source = edge.source
@@ -251,7 +251,7 @@ class _Dissolving:
                 self._join(source, real, parts, (*via, *entered))
 
     def _real(self, port: Any) -> Iterator[tuple[Any, tuple[int, ...]]]:
-        """Give the port itself, or for a subgraph's parameter those it stands for."""
+        """Yield the port itself, or for a subgraph's parameter those it stands for."""
         node = getattr(port, "node", None)
         if node is None:
             return

@@ -52,7 +52,7 @@ class Tending(Firing):
         return sorted(able, key=turn.index)
 
     def is_waiting(self, task: Task) -> bool:
-        """Whether it waits until a queue has room, and is not to end (F8)."""
+        """Return whether it waits until a queue has room, and is not to end (F8)."""
         return bool(task.waiting_for) and not task.cancelled and self.has_no_room(task.station)
 
     def go_on_with(self, task: Task) -> None:
@@ -125,7 +125,7 @@ class Tending(Firing):
         return next((task for task in station.tasks if task.is_activity), None)
 
     def is_closing(self, station: Station) -> bool:
-        """Whether its tasks are to end because it is about to be torn down."""
+        """Return whether its tasks are to end because it is about to be torn down."""
         return (bool(station.afterwards) and not station.is_amid) or any(
             flight.when_rested is not None for flight in station.flights
         )

@@ -34,7 +34,7 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
     # --- what asyncio asks of a loop
 
     def time(self) -> float:
-        """Give the machine's time."""
+        """Return the machine's time."""
         return self._now()
 
     def get_debug(self) -> bool:
@@ -107,11 +107,11 @@ class HandTurnedLoop(asyncio.AbstractEventLoop):
         return self.create_task(coroutine, context=context)
 
     def can_step(self, owner: object) -> bool:
-        """Whether something of `owner` can go on now."""
+        """Return whether something of `owner` can go on now."""
         return any(one is owner and not handle.cancelled() for one, handle in self._ready)
 
     def owners_in_turn(self) -> list[object]:
-        """Give those of whom something can go on now, in the order in which it could."""
+        """Return those of whom something can go on now, in the order in which it could."""
         return [owner for owner, handle in self._ready if not handle.cancelled()]
 
     def step(self, owner: object) -> bool:
